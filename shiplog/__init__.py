@@ -1,0 +1,32 @@
+"""What a sea trial is, and how it is kept.
+
+>>> import shiplog
+>>> log = shiplog.read("sample_data/zigzag_20_20.mcap")
+>>> log["yaw_rate"].values
+"""
+
+__version__ = "0.1.0"
+
+from .clock import resample
+from .errors import LayoutError, LogError, ShiplogError, UsageError, VesselError
+from .reader import read
+from .types import Channel, Signals, TrialLog
+from .vessel import Vessel, load_vessel
+from .writer import LogWriter, write
+
+__all__ = [
+    "Channel",
+    "LayoutError",
+    "LogError",
+    "LogWriter",
+    "ShiplogError",
+    "Signals",
+    "TrialLog",
+    "UsageError",
+    "Vessel",
+    "VesselError",
+    "load_vessel",
+    "read",
+    "resample",
+    "write",
+]

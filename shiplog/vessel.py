@@ -1,0 +1,244 @@
+"""`vessel.toml`: the ship whose trial it is, and the presets."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf, isfinite, pi
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import VesselError
+from .units import did_you_mean
+
+if TYPE_CHECKING:  # ship.py brings numba; only verbs that compute need it
+    from .ship import Coefficients
+
+
+@dataclass(frozen=True)
+class FilterSettings:
+    """What a vessel file says of the filter; None where the log itself shall tell."""
+
+    process_ratio: float | None = None  # process to measurement intensity, 1/s^2: the paper's Q/R
+    yaw_rate_std: float | None = None  # rad/s, of the white noise of one sample
+    speed_std: float | None = None  # m/s
+
+
+@dataclass(frozen=True)
+class Vessel:
+    """A ship: its model's coefficients, its steering gear, and how its states are filtered."""
+
+    name: str
+    coefficients: "Coefficients"
+    length: float | None = None  # m, between perpendiculars
+    approach_rpm: float = 80.0
+    rudder_max: float = 35 * pi / 180  # rad
+    rudder_rate: float = 2.5 * pi / 180  # rad/s
+    filter: FilterSettings = FilterSettings()
+
+
+_PAPER = """\
+name = "{name}"
+angle_unit = "{angle_unit}"     # of c2, c3, f and the rudder
+approach_rpm = 80.0
+
+[yaw]                    # Burylin's Table 1
+T1 = 150.0               # s
+T2 = 50.0                # s
+T3 = 0.5                 # s
+c2 = 10.0
+c3 = 20.0
+
+[rudder]
+alpha1 = 0.0171          # s/m
+alpha2 = 0.0015          # 1/rpm
+alpha3 = 0.0654          # s/m
+max = {rudder_max}
+rate = {rudder_rate}
+
+[surge]
+f = -0.1
+g = -0.0003
+h = 0.0004
+
+[filter]
+process_ratio = 2.5e-5   # the paper's Q = 0.01 over its R = 400
+"""
+
+PRESETS = {
+    "table1": _PAPER.format(
+        name="Burylin's Table 1, angles in degrees",
+        angle_unit="deg",
+        rudder_max="35.0",
+        rudder_rate="2.5",
+    ),
+    "table1-rad": _PAPER.format(
+        name="Burylin's Table 1, angles in radians",
+        angle_unit="rad",
+        rudder_max=repr(35 * pi / 180),
+        rudder_rate=repr(2.5 * pi / 180),
+    ),
+}
+
+# section -> key -> (lowest, highest) of the value; "" is the top level
+_TIME_CONSTANTS = {"T1": (0.0, inf), "T2": (0.0, inf), "T3": (-inf, inf)}
+_NONLINEAR = {"c2": (-inf, inf), "c3": (-inf, inf)}
+_PRODUCTS = dict.fromkeys(("a", "b1", "b2", "b3", "d", "e"), (-inf, inf))
+_KEYS: dict[str, dict[str, tuple[float, float]]] = {
+    "": {"length": (0.0, 1000.0), "approach_rpm": (-3000.0, 3000.0)},
+    "yaw": _TIME_CONSTANTS | _NONLINEAR | _PRODUCTS,
+    "rudder": {
+        "alpha1": (-inf, inf),
+        "alpha2": (-inf, inf),
+        "alpha3": (-inf, inf),
+        "max": (0.0, inf),
+        "rate": (0.0, inf),
+    },
+    "surge": dict.fromkeys(("f", "g", "h"), (-inf, inf)),
+    "filter": {"process_ratio": (0.0, inf), "yaw_rate_std": (0.0, inf), "speed_std": (0.0, inf)},
+}
+_TEXTS = ("name", "angle_unit")
+_POSITIVE = {"T1", "T2", "length", "max", "rate", "process_ratio", "yaw_rate_std", "speed_std"}
+
+
+def load_vessel(preset_or_path: str | os.PathLike[str]) -> tuple[Vessel, str]:
+    """A vessel by the name of a preset or from a file, and its text to be kept with a log.
+
+    Raises `VesselError` with all the faults of the file at once.
+    """
+    name = os.fspath(preset_or_path)
+    if name in PRESETS:
+        return parse_vessel(PRESETS[name], name), PRESETS[name]
+    path = Path(name)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise VesselError(
+            f"no vessel file and no preset{did_you_mean(name, PRESETS)}; "
+            f"presets are {', '.join(PRESETS)}: {path}"
+        ) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise VesselError(f"cannot read the vessel file ({error}): {path}") from error
+    return parse_vessel(text, name), text
+
+
+def parse_vessel(text: str, where: str) -> Vessel:
+    """A vessel from the text of its file; `where` names it in errors.
+
+    Raises `VesselError` with all the faults at once.
+    """
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise VesselError(f"not a TOML file ({error}); mend that line: {where}") from error
+    faults: list[str] = []
+    numbers = _numbers(table, faults)
+    form = _yaw_form(numbers["yaw"], faults)
+    _require(numbers, form, faults)
+    faults += [f"{key} must be a text" for key in _TEXTS if not isinstance(table.get(key, ""), str)]
+    angle_unit = table.get("angle_unit", "rad")
+    if angle_unit not in ("deg", "rad"):
+        faults.append(f"angle_unit must be 'deg' or 'rad', got {angle_unit!r}")
+    if faults:
+        count = f"{len(faults)} faults" if len(faults) > 1 else "one fault"
+        raise VesselError(f"{count} in the vessel file: {'; '.join(faults)}: {where}")
+    return _vessel(str(table.get("name", Path(where).stem)), angle_unit, numbers)
+
+
+def _numbers(table: Mapping[str, Any], faults: list[str]) -> dict[str, dict[str, float]]:
+    """Every number of the file, section by section; what is wrong goes to `faults`."""
+    numbers: dict[str, dict[str, float]] = {section: {} for section in _KEYS}
+    for key, value in table.items():
+        if key in _KEYS and key:
+            if isinstance(value, dict):
+                for inner, number in value.items():
+                    _number(key, inner, number, numbers[key], faults)
+            else:
+                faults.append(f"[{key}] must be a section")
+        elif key not in _TEXTS:
+            _number("", key, value, numbers[""], faults)
+    return numbers
+
+
+def _number(
+    section: str, key: str, value: object, into: dict[str, float], faults: list[str]
+) -> None:
+    label = f"{section}.{key}" if section else key
+    if key not in _KEYS[section]:
+        known = [*_KEYS[section], *(() if section else (*_TEXTS, *filter(None, _KEYS)))]
+        faults.append(f"unknown key {label!r}{did_you_mean(key, known).replace(';', ',')}")
+        return
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        faults.append(f"{label} must be a number, got {value!r}")
+        return
+    low, high = _KEYS[section][key]
+    if not isfinite(value):
+        faults.append(f"{label} must be finite, got {value}")
+    elif key in _POSITIVE and value <= 0:
+        faults.append(f"{label} must be positive, got {value:g}")
+    elif not low <= value <= high:
+        faults.append(f"{label} must lie between {low:g} and {high:g}, got {value:g}")
+    into[key] = float(value)
+
+
+def _yaw_form(yaw: Mapping[str, float], faults: list[str]) -> tuple[str, ...]:
+    """Whether [yaw] gives the paper's time constants or the products; never a mixture."""
+    times = {*_TIME_CONSTANTS, *_NONLINEAR} & set(yaw)
+    products = set(_PRODUCTS) & set(yaw)
+    if times and products:
+        faults.append(
+            f"[yaw] mixes time constants ({', '.join(sorted(times))}) "
+            f"with products ({', '.join(sorted(products))}); give one or the other"
+        )
+    return tuple(_PRODUCTS) if products else (*_TIME_CONSTANTS, *_NONLINEAR)
+
+
+def _require(
+    numbers: Mapping[str, Mapping[str, float]], form: tuple[str, ...], faults: list[str]
+) -> None:
+    named = " ".join(faults)
+    for section, keys in (
+        ("yaw", form),
+        ("rudder", ("alpha1", "alpha2", "alpha3")),
+        ("surge", ("f", "g", "h")),
+    ):
+        missing = [k for k in keys if k not in numbers[section] and f"{section}.{k} " not in named]
+        if missing:
+            faults.append(f"[{section}] lacks {', '.join(missing)}")
+
+
+def _vessel(name: str, angle_unit: str, numbers: Mapping[str, Mapping[str, float]]) -> Vessel:
+    from .ship import Coefficients  # noqa: PLC0415 - numba, see above
+
+    per_rad = 180 / pi if angle_unit == "deg" else 1.0
+    yaw, rudder, surge, top = (numbers[s] for s in ("yaw", "rudder", "surge", ""))
+    if "T1" in yaw:
+        d = 1 / (yaw["T1"] * yaw["T2"])
+        a, b1, e = -(yaw["T1"] + yaw["T2"]) * d, -d, yaw["T3"] * d
+        b2, b3 = -yaw["c2"] * d, -yaw["c3"] * d
+    else:
+        a, b1, b2, b3, d, e = (yaw[key] for key in _PRODUCTS)
+    coefficients = Coefficients(
+        a=a,
+        b1=b1,
+        b2=b2 * per_rad,
+        b3=b3 * per_rad**2,
+        d=d,
+        e=e,
+        f=surge["f"] * per_rad**2,
+        g=surge["g"],
+        h=surge["h"],
+        alpha1=rudder["alpha1"],
+        alpha2=rudder["alpha2"],
+        alpha3=rudder["alpha3"],
+    )
+    defaults = Vessel(name, coefficients)
+    return Vessel(
+        name,
+        coefficients,
+        length=top.get("length"),
+        approach_rpm=top.get("approach_rpm", defaults.approach_rpm),
+        rudder_max=rudder["max"] / per_rad if "max" in rudder else defaults.rudder_max,
+        rudder_rate=rudder["rate"] / per_rad if "rate" in rudder else defaults.rudder_rate,
+        filter=FilterSettings(**numbers["filter"]),
+    )
