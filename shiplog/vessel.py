@@ -35,6 +35,7 @@ class Vessel:
     rudder_max: float = 35 * pi / 180  # rad
     rudder_rate: float = 2.5 * pi / 180  # rad/s
     filter: FilterSettings = FilterSettings()
+    angle_unit: str = "rad"  # of its file; inside all angles are radians
 
 
 _PAPER = """\
@@ -81,7 +82,7 @@ PRESETS = {
 }
 
 # section -> key -> (lowest, highest) of the value; "" is the top level
-_TIME_CONSTANTS = {"T1": (0.0, inf), "T2": (0.0, inf), "T3": (-inf, inf)}
+_TIME_CONSTANTS = {"T1": (1e-3, 1e6), "T2": (1e-3, 1e6), "T3": (-inf, inf)}
 _NONLINEAR = {"c2": (-inf, inf), "c3": (-inf, inf)}
 _PRODUCTS = dict.fromkeys(("a", "b1", "b2", "b3", "d", "e"), (-inf, inf))
 _KEYS: dict[str, dict[str, tuple[float, float]]] = {
@@ -241,4 +242,5 @@ def _vessel(name: str, angle_unit: str, numbers: Mapping[str, Mapping[str, float
         rudder_max=rudder["max"] / per_rad if "max" in rudder else defaults.rudder_max,
         rudder_rate=rudder["rate"] / per_rad if "rate" in rudder else defaults.rudder_rate,
         filter=FilterSettings(**numbers["filter"]),
+        angle_unit=angle_unit,
     )

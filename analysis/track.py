@@ -1,0 +1,51 @@
+"""Where the ship went."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog import Channel, TrialLog
+from shiplog.schema import GEOGRAPHIC
+from shiplog.types import FloatArray, Signals
+
+EARTH_RADIUS = 6_371_008.8  # m, mean
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Positions in m from the first one."""
+
+    north: FloatArray  # (k,)
+    east: FloatArray  # (k,)
+    origin: str  # how it is known, in words
+
+
+def find_track(log: TrialLog, signals: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
+    """The positions recorded, or else dead reckoning from heading and speed ahead.
+
+    `yaw_rate` and `speed` are the filter's, (n,) on the signals' clock; without a heading the
+    yaw rate is integrated.
+    """
+    position = log.get("position")
+    if position is not None and len(position) > 1:
+        return _recorded(position)
+    if "heading" in signals and np.isfinite(signals["heading"]).sum() > 1:
+        known = np.isfinite(signals["heading"])
+        at = np.arange(len(signals))
+        heading = np.interp(at, at[known], signals["heading"][known])
+        origin = "dead reckoning from heading and speed ahead"
+    else:
+        heading = np.cumsum(yaw_rate) * signals.dt_secs
+        origin = "dead reckoning from yaw rate and speed ahead"
+    north = np.cumsum(speed * np.cos(heading)) * signals.dt_secs
+    east = np.cumsum(speed * np.sin(heading)) * signals.dt_secs
+    return Track(north - north[0], east - east[0], origin)
+
+
+def _recorded(position: Channel) -> Track:
+    known = np.isfinite(position.values).all(axis=1)
+    first, second = position.values[known, 0], position.values[known, 1]
+    if position.fields == GEOGRAPHIC:
+        second = np.radians(second) * EARTH_RADIUS * np.cos(np.radians(first[0]))
+        first = np.radians(first) * EARTH_RADIUS
+    return Track(first - first[0], second - second[0], "positions recorded")

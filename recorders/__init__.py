@@ -1,0 +1,1 @@
+"""Sources of samples, and the loop that writes them to a log."""

@@ -1,0 +1,137 @@
+"""What the sensors make of the truth: rates, jitter, noise, bias, dropouts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shiplog.errors import UsageError
+from shiplog.types import FloatArray
+from shiplog.units import did_you_mean
+
+DEG = pi / 180
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One instrument. All in SI of its channel; its noise is a sum of the parts given."""
+
+    rate_hz: float = 10.0
+    jitter_secs: float = 0.0  # the standard deviation of the instant of measurement
+    delay_secs: float = 0.005  # from measurement to reception, at the most
+    white: float = 0.0  # standard deviation of Gaussian white noise
+    uniform: float = 0.0  # half width of uniform white noise
+    uniform_relative: float = 0.0  # the same, as a share of the value
+    wave: float = 0.0  # amplitude of a slow sine on the sensor
+    wave_tau_secs: float = 10.0  # sin(t / tau)
+    bias: float = 0.0
+    dropout: float = 0.0  # share of the samples lost
+    dropout_secs: float = 0.0  # how long one loss lasts; 0: single samples
+
+
+Suite = Mapping[str, Sensor]
+
+_NAVIGATION = {"heading": Sensor(rate_hz=2.0), "position": Sensor(rate_hz=1.0)}
+_PERFECT = {
+    "yaw_rate": Sensor(),
+    "speed": Sensor(),
+    "rudder": Sensor(),
+    "rpm": Sensor(),
+    **_NAVIGATION,
+}
+SUITES = ("none", "white", "paper")
+
+
+def suite(
+    name: str, settings: Mapping[str, float] | None = None, *, angle_unit: str = "deg"
+) -> Suite:
+    """A suite by name, with single settings changed: `{"yaw_rate.bias": 1e-4}`.
+
+    `paper` is Burylin's law: w (1 + 0.02 nu) + 5e-5 sin(t/10) and v + 0.2 nu + 0.05 sin(t/10),
+    nu uniform on [-1, 1]; the yaw rate is in the angle unit in which his table is read.
+    Raises `UsageError` for a suite, a sensor or a setting nobody knows, or a value out of range.
+    """
+    if name not in SUITES:
+        raise UsageError(
+            f"unknown noise {name!r}{did_you_mean(name, SUITES)}; known are {', '.join(SUITES)}"
+        )
+    sensors = dict(_PERFECT)
+    if name == "white":
+        sensors |= {"yaw_rate": Sensor(white=0.005 * DEG), "speed": Sensor(white=0.1)}
+    elif name == "paper":
+        wave = 5e-5 * (DEG if angle_unit == "deg" else 1.0)
+        sensors |= {
+            "yaw_rate": Sensor(uniform_relative=0.02, wave=wave),
+            "speed": Sensor(uniform=0.2, wave=0.05),
+        }
+    for key, value in (settings or {}).items():
+        channel, _, setting = key.partition(".")
+        _check_known(channel, setting, sensors)
+        sensors[channel] = replace(sensors[channel], **{setting: value})
+        _check_range(channel, sensors[channel])
+    return sensors
+
+
+def _check_known(channel: str, setting: str, sensors: Suite) -> None:
+    known = sorted(field.name for field in fields(Sensor))
+    if channel not in sensors:
+        raise UsageError(
+            f"no sensor {channel!r}{did_you_mean(channel, sensors)}; there are {', '.join(sensors)}"
+        )
+    if setting not in known:
+        raise UsageError(
+            f"a sensor has no {setting!r}{did_you_mean(setting, known)}; it has {', '.join(known)}"
+        )
+
+
+def _check_range(channel: str, sensor: Sensor) -> None:
+    for field in fields(Sensor):
+        value = getattr(sensor, field.name)
+        if not np.isfinite(value) or (field.name != "bias" and value < 0):
+            raise UsageError(f"{channel}.{field.name} must be finite and not negative, got {value}")
+    if sensor.rate_hz == 0 or sensor.wave_tau_secs == 0:
+        raise UsageError(f"{channel}.rate_hz and {channel}.wave_tau_secs must be positive")
+    if sensor.dropout >= 1:
+        raise UsageError(f"{channel}.dropout is the share lost: below 1, got {sensor.dropout}")
+
+
+def sample_times(sensor: Sensor, duration_secs: float, rng: np.random.Generator) -> FloatArray:
+    """When the sensor measures, (n,) seconds, whole microseconds; lost samples left out."""
+    count = int(np.floor(duration_secs * sensor.rate_hz + 1e-9)) + 1
+    times = np.arange(count) / sensor.rate_hz
+    if sensor.jitter_secs:
+        times = np.sort(np.abs(times + sensor.jitter_secs * rng.standard_normal(count)))
+    times = np.unique(np.round(np.minimum(times, duration_secs), 6))
+    return times[~_lost(sensor, times, rng)]
+
+
+def _lost(sensor: Sensor, times: FloatArray, rng: np.random.Generator) -> NDArray[np.bool_]:
+    if not sensor.dropout:
+        return np.zeros(len(times), bool)
+    run = max(1, round(sensor.dropout_secs * sensor.rate_hz))
+    starts = rng.random(len(times)) < 1 - (1 - sensor.dropout) ** (1 / run)
+    lost = np.convolve(starts, np.ones(run))[: len(times)] > 0
+    lost[[0, -1]] = False
+    return lost
+
+
+def corrupt(
+    sensor: Sensor, times: FloatArray, truth: FloatArray, rng: np.random.Generator
+) -> FloatArray:
+    """What the sensor reports, (n,) or (n, k), of what was true at those times."""
+    shape = truth.shape
+    wave = sensor.wave * np.sin(times / sensor.wave_tau_secs)
+    return (
+        truth * (1 + sensor.uniform_relative * rng.uniform(-1, 1, shape))
+        + sensor.white * rng.standard_normal(shape)
+        + sensor.uniform * rng.uniform(-1, 1, shape)
+        + wave.reshape(-1, *([1] * (truth.ndim - 1)))
+        + sensor.bias
+    )
+
+
+def delays(sensor: Sensor, count: int, rng: np.random.Generator) -> FloatArray:
+    """How long each sample takes to arrive, (n,) seconds, whole microseconds."""
+    return np.round(sensor.delay_secs * rng.uniform(0.2, 1.0, count), 6)
