@@ -10,7 +10,7 @@ from shiplog.types import Signals
 from shiplog.vessel import Vessel
 
 from .sliding import fit
-from .weak_form import Rows, weak_form
+from .weak_form import Rows, weak_form, with_constant
 
 # The rudder works in proportion to the speed: without a model nothing is known of the
 # slipstream, and d and e take the factor up.
@@ -28,7 +28,7 @@ def fit_first_model(signals: Signals, name: str) -> Vessel:
     """
     yaw, surge = weak_form(signals, _BARE)
     yaw_names = ("a", "b1", "b2", "d", "e")
-    found = dict(zip(yaw_names, fit(_with_constant(_only(yaw, yaw_names))).values, strict=False))
+    found = dict(zip(yaw_names, fit(with_constant(_only(yaw, yaw_names))).values, strict=False))
     found |= dict(zip(SURGE_COEFFICIENTS, fit(surge).values, strict=True))
     if not np.all(np.isfinite(list(found.values()))):
         raise LogError(
@@ -43,10 +43,3 @@ def fit_first_model(signals: Signals, name: str) -> Vessel:
 def _only(rows: Rows, names: tuple[str, ...]) -> Rows:
     kept = [rows.names.index(name) for name in names]
     return replace(rows, names=names, regressors=rows.regressors[:, kept])
-
-
-def _with_constant(rows: Rows) -> Rows:
-    ones = np.ones((len(rows.target), 1))
-    return replace(
-        rows, names=(*rows.names, "constant"), regressors=np.hstack((rows.regressors, ones))
-    )

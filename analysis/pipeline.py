@@ -80,7 +80,8 @@ def analyse(
     disturbance = observe_disturbance(known, model, noise)
 
     on_step("coefficients")
-    yaw, surge = (identify(rows) for rows in weak_form(signals, model))
+    yaw_rows, surge_rows = weak_form(signals, model)
+    yaw, surge = identify(yaw_rows, constant=True), identify(surge_rows)
     track = find_track(log, signals, estimates.states[:, 0], estimates.states[:, 3])
     return Analysis(
         log, vessel, origin, signals, noise, estimates, residuals, disturbance, yaw, surge, track,

@@ -1,4 +1,4 @@
-"""Innovations: are they as large as the filter expects, and are they white?"""
+"""Whether innovations are as large as the filter expects, and white."""
 
 from dataclasses import dataclass
 
@@ -42,14 +42,14 @@ def judge(
     seen = np.isfinite(innovations)
     e, count = innovations[seen], int(seen.sum())
     squared = (e / innovation_stds[seen]) ** 2
-    low, high = chi2.ppf([0.005, 0.995], count) / count
+    low, high = (float(chi2.ppf(q, count)) / count for q in (0.005, 0.995))
     return OutputResiduals(
         name,
         unit,
         count,
         float(np.sqrt(np.mean(e**2))),
         float(np.mean(squared)),
-        (float(low), float(high)),
+        (low, high),
         whiteness(innovations),
     )
 

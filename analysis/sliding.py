@@ -5,14 +5,14 @@ its integral form (`weak_form`). Columns are scaled to unit length before anythi
 any condition number is told.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shiplog.ship import COEFFICIENT_UNITS
 from shiplog.types import FloatArray
 
-from .weak_form import STRIDE_SECS, Rows
+from .weak_form import Rows, with_constant
 
 WINDOW_SECS = 200.0
 WORST_CONDITION = 1e4  # beyond it a window cannot tell its coefficients apart
@@ -60,16 +60,20 @@ class _Fit:
     condition: float
 
 
-def identify(rows: Rows, window_secs: float = WINDOW_SECS) -> Identification:
+def identify(
+    rows: Rows, *, constant: bool = False, window_secs: float = WINDOW_SECS
+) -> Identification:
     """The coefficients of one equation over the whole trial and over each window.
 
-    A trial shorter than the window is one window.
+    With `constant`, a constant disturbance is estimated beside those of the whole trial (a gyro's
+    bias, the rudder's zero); within one window it cannot be told from the rest. A trial shorter
+    than the window is one window.
     """
-    whole = fit(rows)
+    whole = fit(with_constant(rows) if constant else rows)
     return Identification(
         {
             name: Coefficient(float(value), float(std), COEFFICIENT_UNITS[name])
-            for name, value, std in zip(rows.names, whole.values, whole.stds, strict=True)
+            for name, value, std in zip(rows.names, whole.values, whole.stds, strict=False)
         },
         whole.condition,
         _history(rows, window_secs),
@@ -84,23 +88,12 @@ def fit(rows: Rows) -> _Fit:
 
 def _history(rows: Rows, window_secs: float) -> History:
     count = len(rows.centres_secs)
-    bump_secs = rows.overlap * STRIDE_SECS
-    length = max(1, min(count, round((window_secs - bump_secs) / STRIDE_SECS) + 1))
+    length = max(1, min(count, round((window_secs - rows.bump_secs) / rows.stride_secs) + 1))
     fits, ends = [], []
     for start in range(count - length + 1):
         cut = slice(start, start + length)
-        fits.append(
-            fit(
-                Rows(
-                    rows.names,
-                    rows.centres_secs[cut],
-                    rows.target[cut],
-                    rows.regressors[cut],
-                    rows.overlap,
-                )
-            )
-        )
-        ends.append(rows.centres_secs[start + length - 1] + bump_secs / 2)
+        fits.append(fit(replace(rows, target=rows.target[cut], regressors=rows.regressors[cut])))
+        ends.append(rows.centres_secs[start + length - 1] + rows.bump_secs / 2)
     return History(
         rows.names,
         np.array(ends),

@@ -32,7 +32,7 @@ def find_track(log: TrialLog, signals: Signals, yaw_rate: FloatArray, speed: Flo
     if "heading" in signals and np.isfinite(signals["heading"]).sum() > 1:
         known = np.isfinite(signals["heading"])
         at = np.arange(len(signals))
-        heading = np.interp(at, at[known], signals["heading"][known])
+        heading: FloatArray = np.interp(at, at[known], signals["heading"][known])
         origin = "dead reckoning from heading and speed ahead"
     else:
         heading = np.cumsum(yaw_rate) * signals.dt_secs

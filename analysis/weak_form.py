@@ -12,7 +12,7 @@ integrated by parts: the derivatives go over to phi,
 and only what was measured remains. One bump gives one row of a linear regression.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import upfirdn
@@ -34,7 +34,13 @@ class Rows:
     centres_secs: FloatArray  # (m,) since the signals' start
     target: FloatArray  # (m,)
     regressors: FloatArray  # (m, p)
-    overlap: int  # rows that share a bump's data with one row, on either side
+    stride_secs: float  # from one bump to the next
+    bump_secs: float  # the length of one
+
+    @property
+    def overlap(self) -> int:
+        """How many rows on either side share a bump's data."""
+        return max(1, int(self.bump_secs / self.stride_secs))
 
 
 def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
@@ -68,22 +74,21 @@ def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
         ("g", integral(v**2, bump)),
         ("h", integral(n, bump)),
     )
-    centres = (half + stride * np.arange(len(yaw[0][1]))) * dt
-    overlap = 2 * half // stride
-    return (
-        _rows(yaw, integral(w, curvature), centres, overlap),
-        _rows(surge, -integral(v, slope), centres, overlap),
+    rows = []
+    for columns, target in ((yaw, integral(w, curvature)), (surge, -integral(v, slope))):
+        names, values = zip(*columns, strict=True)
+        centres = (half + stride * np.arange(len(target))) * dt
+        regressors = np.column_stack(values)
+        rows.append(Rows(names, centres, target, regressors, stride * dt, 2 * half * dt))
+    return rows[0], rows[1]
+
+
+def with_constant(rows: Rows) -> Rows:
+    """The same with one more regressor: a disturbance or a sensor's bias that never changes."""
+    ones = np.ones((len(rows.target), 1))
+    return replace(
+        rows, names=(*rows.names, "constant"), regressors=np.hstack((rows.regressors, ones))
     )
-
-
-def _rows(
-    columns: tuple[tuple[str, FloatArray], ...],
-    target: FloatArray,
-    centres: FloatArray,
-    overlap: int,
-) -> Rows:
-    names, values = zip(*columns, strict=True)
-    return Rows(names, centres, target, np.column_stack(values), overlap)
 
 
 def _bump(half: int, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:

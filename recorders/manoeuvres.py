@@ -56,9 +56,7 @@ def manoeuvre(
     """
     for pattern, build in _BUILDERS.items():
         if match := re.fullmatch(pattern, name):
-            angles = [
-                float(angle) * DEG for angle in match.groups() if angle not in (None, "-port")
-            ]
+            angles = [float(angle) * DEG for angle in match.groups() if angle is not None]
             side = -1.0 if name.endswith("-port") else 1.0
             return build(name, _Setting(duration_secs, rpm, side, angles, rng))
     raise UsageError(
@@ -144,7 +142,7 @@ def _steps(
     hold: tuple[float, float],
     level: tuple[float, float],
 ) -> dict[float, float]:
-    """Levels drawn evenly, each held for a time drawn evenly, changed on whole tenths of seconds."""
+    """Levels drawn evenly, each held for a time drawn evenly, on whole tenths of seconds."""
     steps, time = {}, APPROACH_SECS
     while time < duration:
         steps[time] = float(rng.uniform(*level))

@@ -123,13 +123,14 @@ def corrupt(
     """What the sensor reports, (n,) or (n, k), of what was true at those times."""
     shape = truth.shape
     wave = sensor.wave * np.sin(times / sensor.wave_tau_secs)
-    return (
+    reported: FloatArray = (
         truth * (1 + sensor.uniform_relative * rng.uniform(-1, 1, shape))
         + sensor.white * rng.standard_normal(shape)
         + sensor.uniform * rng.uniform(-1, 1, shape)
         + wave.reshape(-1, *([1] * (truth.ndim - 1)))
         + sensor.bias
     )
+    return reported
 
 
 def delays(sensor: Sensor, count: int, rng: np.random.Generator) -> FloatArray:

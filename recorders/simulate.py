@@ -228,16 +228,11 @@ def _sail(
         count += 1
         if t >= duration:
             return rows[:count]
-        # where the next knot is
         while grid_index * grid <= t + 1e-9:
             grid_index += 1
-        end = min(grid_index * grid, duration)
-        if at + 1 < len(schedule):
-            end = min(end, schedule[at + 1, 0])
-        if t < zigzag_start:
-            end = min(end, zigzag_start)
-        if moving:
-            end = min(end, arrival)
+        end = min(grid_index * grid, duration, arrival if moving else inf)
+        end = min(end, schedule[at + 1, 0] if at + 1 < len(schedule) else inf)
+        end = min(end, zigzag_start if t < zigzag_start else inf)
         # a zig-zag turns the rudder at the very instant the heading is reached
         after = step(c, state, forcing, t, end - t)
         if t >= zigzag_start and after.heading * np.sign(order) >= zigzag_heading:

@@ -5,6 +5,8 @@ averaged; where nothing was measured there is NaN. What is commanded (rudder, rp
 its samples too and is interpolated, but not across a gap.
 """
 
+from math import inf
+
 import numpy as np
 
 from .errors import LogError, UsageError
@@ -13,7 +15,7 @@ from .units import CATALOGUE
 
 GAP_PERIODS = 5.0  # a silence of so many usual periods is a gap
 GAP_SECS = 1.0  # but nothing shorter than this
-MAX_SAMPLES = 200_000_000  # of a grid: beyond it the times are wrong, not the trial long
+MAX_SAMPLES = 20_000_000  # of a grid: beyond it the times are wrong, not the trial long
 
 
 def resample(
@@ -28,26 +30,28 @@ def resample(
     channels have no time in common.
     """
     names = channels or tuple(c.name for c in log if not c.fields)
+    if not names:
+        raise LogError(f"no channel to resample; choose a log that has samples: {log.name}")
     used = {name: log[name] for name in names}
     for name, channel in used.items():
         _require_samples(log, name, channel)
     dt = usual_period_secs(used[names[0]]) if dt_secs is None else dt_secs
-    if not dt > 0:
+    if not 0 < dt < inf:
         raise UsageError(f"the time step must be positive, got {dt} s")
     start_ns, end_ns = _common_span(log, list(used.values()))
-    count = int(np.floor((end_ns - start_ns) * 1e-9 / dt + 1e-6)) + 1
-    if count > MAX_SAMPLES:
+    steps = (end_ns - start_ns) * 1e-9 / dt + 1e-6
+    if steps > MAX_SAMPLES:
         raise LogError(
-            f"its times span {(end_ns - start_ns) / 8.64e13:.0f} days, which no trial lasts; "
+            f"its times span {(end_ns - start_ns) / 8.64e13:.4g} days, too many steps of {dt:g} s; "
             f"correct the clock of one of {', '.join(names)}: {log.name}"
         )
+    count = int(steps) + 1
     grid = np.arange(count) * dt
     values = {}
     for name, channel in used.items():
         at = (channel.measured_ns - start_ns) * 1e-9
-        commanded = name in CATALOGUE and CATALOGUE[name].commanded
-        circular = name in CATALOGUE and CATALOGUE[name].circular
-        place = _interpolated if commanded or circular else _binned
+        kind = CATALOGUE.get(channel.name)
+        place = _interpolated if kind and (kind.commanded or kind.circular) else _binned
         values[name] = place(at, channel, grid, dt)
     return Signals(start_ns, dt, values)
 
@@ -75,6 +79,11 @@ def gaps(channel: Channel) -> list[tuple[float, float]]:
 
 
 def _require_samples(log: TrialLog, name: str, channel: Channel) -> None:
+    if channel.fields:
+        raise UsageError(
+            f"channel {name!r} has components ({', '.join(channel.fields)}), "
+            f"and a clock takes one value a sample; name others: {log.name}"
+        )
     measured = int(np.isfinite(channel.values).sum())
     if measured < 2 or usual_period_secs(channel) == 0:
         has = "one sample" if measured == 1 else f"{measured} samples at one instant or none"

@@ -16,6 +16,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     is gone and whatever stood under the final name stands there still.
     """
     final = Path(path)
+    if final.is_dir():
+        raise cannot_write(final, IsADirectoryError())
     part = final.with_name(f".{final.name}.{os.getpid()}.part")
     try:
         part.touch()

@@ -17,14 +17,16 @@ from typing import IO, Any
 
 import numpy as np
 import zstandard
+from google.protobuf.message import DecodeError
 from mcap import records
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
-from .errors import LogError
+from .errors import LogError, UsageError
 from .schema import FORMAT_VERSION, METADATA_NAME, VESSEL_ATTACHMENT, Schema, decode, schema_named
 from .types import Channel, TrialLog
-from .units import CATALOGUE, UNITS, did_you_mean, factor
+from .units import CATALOGUE, factor
 
 MAGIC = b"\x89MCAP0\r\n"
 _RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
@@ -34,8 +36,14 @@ _MESSAGE_HEAD = np.dtype(
      ("received", "<u8"), ("measured", "<u8")]
 )  # fmt: skip
 _INDEX_ENTRY = np.dtype([("received", "<u8"), ("offset", "<u8")])
+_SHORTEST_MESSAGE = _MESSAGE_HEAD.itemsize
+_MALFORMED = (  # what decoders raise on damaged bytes: no one family
+    McapError, zstandard.ZstdError, struct.error,
+    ValueError, OverflowError, RuntimeError, MemoryError,
+)  # fmt: skip
 
 Bytes = memoryview
+_Located = tuple[np.ndarray[Any, Any], int, np.ndarray[Any, Any]]  # bytes, channel, offsets in them
 
 
 def read(path: str | os.PathLike[str]) -> TrialLog:
@@ -48,12 +56,9 @@ def read(path: str | os.PathLike[str]) -> TrialLog:
     """
     path = Path(path)
     contents = _Contents()
-    with open_mcap(path) as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        view = memoryview(data)
-        try:
-            _scan(view, contents)
-        finally:
-            view.release()
+    with open_mcap(path) as stream:
+        # unmapped by its last reader: closing it would fail while an exception holds a slice
+        _scan(memoryview(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)), contents)
     return _trial_log(path, contents)
 
 
@@ -65,6 +70,7 @@ def open_mcap(path: Path) -> IO[bytes]:
         raise LogError(_cannot_read(path, error)) from error
     try:
         magic = stream.read(len(MAGIC))
+        stream.seek(0)
     except OSError as error:
         stream.close()
         raise LogError(_cannot_read(path, error)) from error
@@ -73,7 +79,6 @@ def open_mcap(path: Path) -> IO[bytes]:
         if not magic:
             raise LogError(f"the file is empty: record or convert it again: {path}")
         raise LogError(f"not an MCAP file; tables are read by `shiplog convert`: {path}")
-    stream.seek(0)
     return stream
 
 
@@ -93,30 +98,41 @@ class _Contents:
     channels: dict[int, records.Channel] = field(default_factory=dict)
     columns: dict[int, list[np.ndarray[Any, Any]]] = field(default_factory=dict)
     ragged: dict[int, list[tuple[int, int, bytes]]] = field(default_factory=dict)
+    orphans: list[_Located] = field(default_factory=list)  # their channel is not yet described
     metadata: dict[str, str] = field(default_factory=dict)
     vessel_toml: str | None = None
     finished: bool = False
+    cut: bool = False  # unfinished, and what it ends with is no whole record
     damage: list[str] = field(default_factory=list)
 
 
 def _scan(data: Bytes, contents: _Contents) -> None:
     """Go through the file's top-level records once, chunk by chunk."""
-    loose: list[tuple[int, int]] = []  # messages outside any chunk
+    loose: dict[int, list[int]] = {}  # messages outside any chunk
     end = len(MAGIC)
     for opcode, start, end in _records(data, len(MAGIC)):
         if opcode == Opcode.CHUNK:
             _read_chunk(data[start:end], _index_after(data, end), contents)
         elif opcode == Opcode.MESSAGE:
-            loose.append((start - _RECORD_HEAD.size, end))
-        elif opcode == Opcode.FOOTER:
+            _locate(data, start, end, loose)
+        elif opcode == Opcode.DATA_END:
+            _check(data[: start - _RECORD_HEAD.size], data[start:end], "data", contents)
+        elif opcode == Opcode.FOOTER and data[end : end + len(MAGIC)] == MAGIC:
+            summary_start = int.from_bytes(data[start : start + 8], "little")
+            summary_start = summary_start or start - _RECORD_HEAD.size
+            _check(data[summary_start : end - 4], data[end - 4 : end], "summary", contents)
             contents.finished = True
             break
         elif opcode != Opcode.MESSAGE_INDEX:
             _read_record(opcode, data[start:end], contents)
     if not contents.finished:
+        contents.cut = end < len(data)
         _read_cut_chunk(data[end:], contents)
-    for start, stop in loose:
-        _take_loose(np.frombuffer(data[start:stop], np.uint8), contents)
+        if data[end:][-len(MAGIC) :] == MAGIC:
+            contents.damage.append(f"damaged at byte {end}: what follows was not read")
+    for channel_id, offsets in loose.items():
+        _take_channel(np.frombuffer(data, np.uint8), channel_id, np.array(offsets), contents)
+    _take_orphans(contents)
 
 
 def _records(data: Bytes, at: int) -> Iterator[tuple[int, int, int]]:
@@ -140,14 +156,27 @@ def _index_after(data: Bytes, at: int) -> list[Bytes]:
     return index
 
 
+def _check(section: Bytes, checksum: Bytes, name: str, contents: _Contents) -> None:
+    """Whether a section of the file holds the bytes once written, where nothing yet says no."""
+    crc = int.from_bytes(checksum, "little")
+    if crc and not contents.damage and zlib.crc32(section) != crc:
+        contents.damage.append(f"damaged: the checksum of its {name} is wrong, some may be missing")
+
+
 def _read_record(opcode: int, content: Bytes, contents: _Contents) -> None:
-    stream = ReadDataStream(BytesIO(content))
+    try:
+        _keep_record(opcode, ReadDataStream(BytesIO(content)), contents)
+    except _MALFORMED as error:
+        contents.damage.append(f"left out a damaged record: {error}")
+
+
+def _keep_record(opcode: int, stream: ReadDataStream, contents: _Contents) -> None:
     if opcode == Opcode.SCHEMA:
         schema = records.Schema.read(stream)
-        contents.schemas[schema.id] = schema
+        contents.schemas.setdefault(schema.id, schema)
     elif opcode == Opcode.CHANNEL:
         channel = records.Channel.read(stream)
-        contents.channels[channel.id] = channel
+        contents.channels.setdefault(channel.id, channel)
     elif opcode == Opcode.METADATA:
         metadata = records.Metadata.read(stream)
         if metadata.name == METADATA_NAME:
@@ -159,15 +188,16 @@ def _read_record(opcode: int, content: Bytes, contents: _Contents) -> None:
 
 
 def _read_chunk(content: Bytes, index: list[Bytes], contents: _Contents) -> None:
-    first_ns, last_ns, size, crc, name_length = _CHUNK_HEAD.unpack_from(content, 0)
     try:
+        *_, size, crc, name_length = _CHUNK_HEAD.unpack_from(content, 0)
         raw = _inflate(*_compression_and_body(content, name_length), size)
-        fault = "its checksum is wrong" if crc and zlib.crc32(raw) != crc else ""
-    except (ValueError, zstandard.ZstdError, RuntimeError) as error:
-        raw, fault = b"", str(error)
-    if fault:
-        first, last = (np.datetime64(ns, "ns").astype("M8[ms]") for ns in (first_ns, last_ns))
-        contents.damage.append(f"lost what was received {first} to {last}: damaged chunk, {fault}")
+        if len(raw) != size or (crc and zlib.crc32(raw) != crc):
+            raise ValueError("its checksum is wrong")
+    except _MALFORMED as error:
+        span = np.frombuffer(bytes(content[:16]).ljust(16, b"\0"), "<M8[ns]").astype("M8[ms]")
+        contents.damage.append(
+            f"lost what was received {span[0]} to {span[1]}: damaged chunk, {error}"
+        )
     else:
         _take(np.frombuffer(raw, np.uint8), index, contents)
 
@@ -179,14 +209,7 @@ def _read_cut_chunk(content: Bytes, contents: _Contents) -> None:
         return
     content = content[_RECORD_HEAD.size :]
     *_, name_length = _CHUNK_HEAD.unpack_from(content, 0)
-    compression, body = _compression_and_body(content, name_length)
-    try:
-        if compression == "zstd":
-            raw = zstandard.ZstdDecompressor().decompressobj().decompress(body)
-        else:
-            raw = bytes(body) if compression == "" else b""
-    except zstandard.ZstdError:
-        return
+    raw = _inflate_cut(*_compression_and_body(content, name_length))
     _take(np.frombuffer(raw, np.uint8), [], contents)
 
 
@@ -208,20 +231,56 @@ def _inflate(compression: str, body: Bytes, size: int) -> bytes:
     raise ValueError(f"compression {compression!r} is not known")
 
 
+def _inflate_cut(compression: str, body: Bytes) -> bytes:
+    """As much as the beginning of a compressed text tells."""
+    written = bytes(body).rstrip(b"\0")  # a crash of the machine leaves zeros for what was not
+    if compression == "":
+        return written
+    if compression != "zstd":
+        return b""
+    inflater, raw = zstandard.ZstdDecompressor().decompressobj(), bytearray()
+    try:
+        for at in range(0, len(written), 1 << 10):
+            raw += inflater.decompress(written[at : at + (1 << 10)])
+    except zstandard.ZstdError:
+        pass  # what came before is whole
+    return bytes(raw)
+
+
 def _take(raw: np.ndarray[Any, Any], index: list[Bytes], contents: _Contents) -> None:
     """Sort a chunk's messages into the channels' columns."""
-    offsets: dict[int, np.ndarray[Any, Any]] = {}
+    indexed = _indexed(raw, index)
+    start = min((int(offsets[0]) for offsets in indexed.values()), default=len(raw))
+    for located in (_walk(raw[:start], contents), indexed):
+        for channel_id, offsets in located.items():
+            _take_channel(raw, channel_id, offsets, contents)
+
+
+def _indexed(raw: np.ndarray[Any, Any], index: list[Bytes]) -> dict[int, np.ndarray[Any, Any]]:
+    """Where each channel's messages stand by the index, which no checksum protects.
+
+    Nothing where it does not account for every byte from the first message on: it is damaged, or
+    schemas and channels stand among the messages.
+    """
+    located: dict[int, np.ndarray[Any, Any]] = {}
+    covered = 0
     for entry in index:
-        (channel_id,) = struct.unpack_from("<H", entry, 0)
-        if len(entry) > 6:  # the channel's id, the length of the array; the rest is entries
-            found = np.frombuffer(entry, _INDEX_ENTRY, offset=6)["offset"].astype(np.intp)
-            offsets[channel_id] = found
-    covered = sum(int(_lengths(raw, found).sum()) for found in offsets.values())
-    if covered != len(raw):  # schemas, channels or messages that the index does not name
-        walked = _walk(raw, contents)
-        offsets = walked if covered == 0 or not offsets else offsets | walked
-    for channel_id, found in offsets.items():
-        _take_channel(raw, channel_id, found, contents)
+        if len(entry) == 6:  # the channel's id, the length of the array; the rest is entries
+            continue
+        if len(entry) % _INDEX_ENTRY.itemsize != 6:
+            return {}
+        channel_id = int.from_bytes(entry[:2], "little")
+        offsets = np.frombuffer(entry, _INDEX_ENTRY, offset=6)["offset"].astype(np.intp)
+        ascending = offsets[0] >= 0 and bool(np.all(offsets[1:] > offsets[:-1]))
+        if channel_id in located or not ascending or offsets[-1] > len(raw) - _SHORTEST_MESSAGE:
+            return {}
+        heads = _heads(raw, offsets)
+        if np.any(heads["opcode"] != Opcode.MESSAGE) or np.any(heads["channel"] != channel_id):
+            return {}
+        located[channel_id] = offsets
+        covered += int(_lengths(heads).sum())
+    start = min((int(offsets[0]) for offsets in located.values()), default=0)
+    return located if start + covered == len(raw) else {}
 
 
 def _walk(raw: np.ndarray[Any, Any], contents: _Contents) -> dict[int, np.ndarray[Any, Any]]:
@@ -230,17 +289,28 @@ def _walk(raw: np.ndarray[Any, Any], contents: _Contents) -> dict[int, np.ndarra
     found: dict[int, list[int]] = {}
     for opcode, start, end in _records(data, 0):
         if opcode == Opcode.MESSAGE:
-            (channel_id,) = struct.unpack_from("<H", data, start)
-            found.setdefault(channel_id, []).append(start - _RECORD_HEAD.size)
+            _locate(data, start, end, found)
         else:
             _read_record(opcode, data[start:end], contents)
     return {channel_id: np.array(offsets, np.intp) for channel_id, offsets in found.items()}
 
 
-def _take_loose(raw: np.ndarray[Any, Any], contents: _Contents) -> None:
-    """A message that stands outside any chunk."""
-    at = np.zeros(1, np.intp)
-    _take_channel(raw, int(_heads(raw, at)["channel"][0]), at, contents)
+def _locate(data: Bytes, start: int, end: int, found: dict[int, list[int]]) -> None:
+    """Add where a message stands, if it is one, to what was found of its channel."""
+    start -= _RECORD_HEAD.size
+    if end - start >= _SHORTEST_MESSAGE:
+        (channel_id,) = struct.unpack_from("<H", data, start + _RECORD_HEAD.size)
+        found.setdefault(channel_id, []).append(start)
+
+
+def _take_orphans(contents: _Contents) -> None:
+    """Messages that came before what describes them, the chunk with that being damaged."""
+    orphans, contents.orphans = contents.orphans, []
+    for raw, channel_id, offsets in orphans:
+        _take_channel(raw, channel_id, offsets, contents)
+    if contents.orphans:
+        lost = sum(len(offsets) for *_, offsets in contents.orphans)
+        contents.damage.append(f"lost {lost} samples: nothing describes their channel any more")
 
 
 def _take_channel(
@@ -250,25 +320,28 @@ def _take_channel(
     contents: _Contents,
 ) -> None:
     channel = contents.channels.get(channel_id)
-    schema = _schema_of(channel, contents)
-    if schema is None or not len(offsets):
-        contents.columns.setdefault(channel_id, [])
+    if channel is None or channel.schema_id not in {0, *contents.schemas}:
+        contents.orphans.append((raw, channel_id, offsets))
         return
-    lengths = _lengths(raw, offsets)
-    dtype = schema.dtype
-    if dtype is not None and np.all(lengths == _MESSAGE_HEAD.itemsize + dtype.itemsize):
-        row = np.dtype(_MESSAGE_HEAD.descr + dtype.descr)
-        contents.columns.setdefault(channel_id, []).append(_gather(raw, offsets, row))
+    schema = _schema_of(channel, contents)
+    if schema is None:
         return
     heads = _heads(raw, offsets)
+    lengths = _lengths(heads)
+    dtype = schema.dtype
+    if dtype is not None and np.all(lengths == _MESSAGE_HEAD.itemsize + dtype.itemsize):
+        rows = _gather(raw, offsets, np.dtype(_MESSAGE_HEAD.descr + dtype.descr))
+        if all(np.all(rows[tag] == value) for tag, value in schema.tags.items()):
+            contents.columns.setdefault(channel_id, []).append(rows)
+            return
     ragged = contents.ragged.setdefault(channel_id, [])
     for at, length, head in zip(offsets.tolist(), lengths.tolist(), heads, strict=True):
         data = raw[at + _MESSAGE_HEAD.itemsize : at + length].tobytes()
         ragged.append((int(head["received"]), int(head["measured"]), data))
 
 
-def _schema_of(channel: records.Channel | None, contents: _Contents) -> Schema | None:
-    if channel is None or channel.message_encoding != "protobuf":
+def _schema_of(channel: records.Channel, contents: _Contents) -> Schema | None:
+    if channel.message_encoding != "protobuf":
         return None
     schema = contents.schemas.get(channel.schema_id)
     return schema_named(schema.name) if schema else None
@@ -286,11 +359,9 @@ def _heads(raw: np.ndarray[Any, Any], offsets: np.ndarray[Any, Any]) -> np.ndarr
     return _gather(raw, offsets, _MESSAGE_HEAD)
 
 
-def _lengths(raw: np.ndarray[Any, Any], offsets: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+def _lengths(heads: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """The size of each message record, its head included."""
-    if not len(offsets):
-        return np.zeros(0, np.int64)
-    return _heads(raw, offsets)["length"].astype(np.int64) + _RECORD_HEAD.size
+    return heads["length"].astype(np.int64) + _RECORD_HEAD.size
 
 
 def _trial_log(path: Path, contents: _Contents) -> TrialLog:
@@ -316,7 +387,12 @@ def _trial_log(path: Path, contents: _Contents) -> TrialLog:
     if foreign:
         warnings.append(f"passed over {len(foreign)} topics not ours: {', '.join(foreign)}")
     return TrialLog(
-        path.name, tuple(channels), contents.metadata, contents.vessel_toml, tuple(warnings)
+        path.name,
+        tuple(channels),
+        contents.metadata,
+        contents.vessel_toml,
+        tuple(warnings),
+        data_lost=contents.cut or bool(contents.damage),
     )
 
 
@@ -329,7 +405,12 @@ def _channel(
 ) -> Channel:
     topic_name, _, topic_source = record.topic.strip("/").partition("/")
     name = record.metadata.get("channel", topic_name)
-    received, measured, values = _columns(schema, contents, channel_id)
+    try:
+        received, measured, values = _columns(schema, contents, channel_id)
+    except DecodeError as error:
+        raise LogError(
+            f"channel {name!r} holds messages that are no {schema.name}: {path}"
+        ) from error
     if np.any(received[1:] < received[:-1]):
         order = np.argsort(received, kind="stable")
         received, measured, values = received[order], measured[order], values[order]
@@ -368,8 +449,8 @@ def _columns(
         received, measured, data = zip(*ragged, strict=True) if ragged else ((), (), ())
         slabs.append(
             (
-                np.array(received, np.int64),
-                np.array(measured, np.int64),
+                np.array(received, np.uint64).astype(np.int64),
+                np.array(measured, np.uint64).astype(np.int64),
                 decode(schema, list(data)),
             )
         )
@@ -380,9 +461,7 @@ def _to_si(path: Path, name: str, unit: str) -> tuple[float, str]:
     kind = CATALOGUE.get(name)
     if kind is None:
         return 1.0, unit
-    if unit not in UNITS:
-        raise LogError(
-            f"channel {name!r} is in an unknown unit {unit!r}{did_you_mean(unit, UNITS)}; "
-            f"it should be in {kind.unit}: {path}"
-        )
-    return factor(unit, kind.unit), kind.unit
+    try:
+        return factor(unit, kind.unit), kind.unit
+    except UsageError as error:
+        raise LogError(f"channel {name!r} should be in {kind.unit}: {error}: {path}") from error

@@ -45,6 +45,12 @@ class Schema:
             return None
         return np.dtype([part for f in self.fields for part in ((f"tag_{f}", "u1"), (f, "<f8"))])
 
+    @property
+    def tags(self) -> dict[str, int]:
+        """The tag bytes of that layout; a message with others is not laid out so."""
+        fixed64 = 1  # the wire type
+        return {f"tag_{f}": number << 3 | fixed64 for number, f in enumerate(self.fields, start=1)}
+
 
 def schema_for(fields: tuple[str, ...]) -> Schema:
     """The schema that carries these components (none: a scalar)."""
@@ -66,14 +72,15 @@ def schema_named(name: str) -> Schema | None:
 def encode(channel: Channel) -> list[bytes]:
     """The samples of a channel as messages."""
     schema = schema_for(channel.fields)
-    columns = channel.values.reshape(len(channel), -1)
+    columns = channel.values.reshape(len(channel), len(schema.fields))
     dtype = schema.dtype
     if dtype is None:
         return _encode_fixes(channel)
     messages = np.empty(len(channel), dtype)
-    for number, name in enumerate(schema.fields, start=1):
-        messages[f"tag_{name}"] = _tag(number)
-        messages[name] = columns[:, number - 1]
+    for tag, value in schema.tags.items():
+        messages[tag] = value
+    for name, column in zip(schema.fields, columns.T, strict=True):
+        messages[name] = column
     data, length = messages.tobytes(), dtype.itemsize
     return [data[i : i + length] for i in range(0, len(data), length)]
 
@@ -88,10 +95,6 @@ def decode(schema: Schema, messages: list[bytes]) -> FloatArray:
             if schema.name == LOCATION_FIX or message.HasField(name):
                 values[row, column] = getattr(message, name)
     return values
-
-
-def _tag(number: int) -> int:
-    return number << 3 | 1  # wire type 1: 64 bits
 
 
 @cache

@@ -78,6 +78,7 @@ class TrialLog:
     metadata: Mapping[str, str] = field(default_factory=dict)
     vessel_toml: str | None = None
     warnings: tuple[str, ...] = ()  # what reading it met: an unfinished file, foreign topics
+    data_lost: bool = False  # whether a part of the file could not be read
 
     def __getitem__(self, key: str) -> Channel:
         """The channel of that name, or of that name and source; `LogError` where there is none."""

@@ -10,17 +10,18 @@ from typing import Self
 from mcap.writer import CompressionType, Writer
 
 from . import __version__
-from .files import replacing
+from .files import cannot_write, replacing
 from .schema import (
     ENCODING,
     FORMAT_VERSION,
+    GEOGRAPHIC,
     METADATA_NAME,
     VESSEL_ATTACHMENT,
     encode,
     schema_for,
 )
 from .types import Channel, TrialLog
-from .units import CATALOGUE
+from .units import CATALOGUE, factor
 
 CHUNK_BYTES = 1 << 20  # what a crash between two flushes can lose
 
@@ -38,13 +39,18 @@ class LogWriter:
         metadata: Mapping[str, str] | None = None,
         vessel_toml: str | None = None,
     ) -> None:
-        self._stream = Path(path).open("wb")  # noqa: SIM115 - closed by `close`
-        self._writer = Writer(self._stream, CHUNK_BYTES, CompressionType.ZSTD)
+        try:
+            self._stream = Path(path).open("wb")  # noqa: SIM115 - closed by `close`
+        except OSError as error:
+            raise cannot_write(Path(path), error) from error
+        self._writer = Writer(
+            self._stream, CHUNK_BYTES, CompressionType.ZSTD, enable_data_crcs=True
+        )
         self._writer.start(profile="", library=f"shiplog {__version__} mcap {version('mcap')}")
         self._writer.add_metadata(
             METADATA_NAME,
-            {"format_version": FORMAT_VERSION, "written_by": f"shiplog {__version__}"}
-            | dict(metadata or {}),
+            dict(metadata or {})
+            | {"format_version": FORMAT_VERSION, "written_by": f"shiplog {__version__}"},
         )
         if vessel_toml is not None:
             self._writer.add_attachment(
@@ -68,7 +74,10 @@ class LogWriter:
         self.close()
 
     def write(self, *slabs: Channel) -> None:
-        """Add the slabs' samples, interleaved in the order in which they were received."""
+        """Add the slabs' samples, interleaved in the order in which they were received.
+
+        Raises `UsageError` where a slab's unit does not measure what its name says.
+        """
         messages = []
         for slab in slabs:
             channel_id, first = self._register(slab), self._sequences[slab.topic]
@@ -87,11 +96,13 @@ class LogWriter:
     def close(self) -> None:
         """Write the index and close the file."""
         if not self._stream.closed:
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._stream.close()
+            with self._stream:
+                self._writer.finish()  # type: ignore[no-untyped-call]
 
     def _register(self, slab: Channel) -> int:
         if slab.topic not in self._channel_ids:
+            if slab.name in CATALOGUE and slab.fields != GEOGRAPHIC:
+                factor(slab.unit, CATALOGUE[slab.name].unit)  # refused now, not when it is read
             schema = schema_for(slab.fields)
             if schema.name not in self._schema_ids:
                 self._schema_ids[schema.name] = self._writer.register_schema(
@@ -118,4 +129,4 @@ def channel_metadata(channel: Channel) -> dict[str, str]:
     said = {"channel": channel.name, "source": channel.source, "unit": channel.unit}
     if channel.name in CATALOGUE:
         said["positive"] = CATALOGUE[channel.name].positive
-    return said | dict(channel.metadata)
+    return dict(channel.metadata) | said

@@ -1,0 +1,282 @@
+"""A replay against its reference: the regression check.
+
+The reference of `zigzag.mcap` is `zigzag.ref.mcap` beside it: a log of what the replay found,
+in blocks of two seconds and in the order in which it is found, so that the first channel that
+differs is where to look. Each carries its own tolerance, in its own unit.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from shiplog import Channel, ShiplogError, TrialLog, Vessel, read, write
+from shiplog.ship import COEFFICIENT_UNITS
+from shiplog.types import FloatArray, TimeArray
+
+from .kalman import OUTPUTS, STATES
+from .pipeline import NEEDED, Analysis, analyse
+from .sliding import Identification
+
+SUFFIX = ".ref.mcap"
+NOT_LOGS = (SUFFIX, ".truth.mcap")
+BLOCK_SECS = 2.0
+
+# How far a channel may stray, as a share of its largest value when the reference was made: what
+# another processor's rounding may do to it, amplified by the condition of what is solved.
+_SHARES = {
+    "measured": 1e-12,
+    "model": 1e-12,
+    "estimate": 1e-9,
+    "std": 1e-9,
+    "innovation": 1e-9,
+    "whole": 1e-8,
+    "history": 1e-7,
+}
+_UNITS = {
+    "yaw_acceleration": "rad/s²",
+    "yaw_jerk": "rad/s³",
+    "surge_acceleration": "m/s²",
+    "yaw_disturbance": "rad/s³",
+    "surge_disturbance": "m/s²",
+    "yaw_rate": "rad/s",
+    "speed": "m/s",
+    "rudder": "rad",
+    "rpm": "rpm",
+    **COEFFICIENT_UNITS,
+}
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How one channel of a replay differs from its reference."""
+
+    topic: str
+    unit: str
+    tolerance: float
+    largest: float
+    rms: float
+    first_secs: float | None  # where it first leaves the tolerance, since the replay's start
+    fault: str = ""  # what is wrong beyond values: missing, other times, other gaps
+
+    @property
+    def ok(self) -> bool:
+        """Whether the channel is as it was."""
+        return not self.fault and self.first_secs is None
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A replay laid beside its reference."""
+
+    name: str
+    differences: tuple[Difference, ...]
+    problem: str = ""  # why there was nothing to compare
+    replay: TrialLog | None = None
+    reference: TrialLog | None = None
+
+    @property
+    def ok(self) -> bool:
+        """Whether the replay is as it was."""
+        return not self.problem and all(difference.ok for difference in self.differences)
+
+    @property
+    def changed(self) -> tuple[Difference, ...]:
+        """The channels that differ, the first to be computed first."""
+        return tuple(difference for difference in self.differences if not difference.ok)
+
+    def __str__(self) -> str:
+        """One line if all is well, else a line for each channel that differs."""
+        if self.ok:
+            return f"{self.name}: as it was ({len(self.differences)} channels)"
+        if self.problem:
+            return f"{self.name}: {self.problem}"
+        lines = [f"{self.name}: {len(self.changed)} of {len(self.differences)} channels differ"]
+        lines += [f"  {d.topic}: {describe(d)}" for d in self.changed]
+        return "\n".join(lines)
+
+
+def as_json(comparison: Comparison) -> dict[str, object]:
+    """The comparison as plain values; a largest difference that is no number is None."""
+    return {
+        "log": comparison.name,
+        "ok": comparison.ok,
+        "problem": comparison.problem or None,
+        "channels": [
+            {
+                "topic": d.topic,
+                "unit": d.unit,
+                "ok": d.ok,
+                "tolerance": d.tolerance if isfinite(d.tolerance) else None,
+                "largest": d.largest if isfinite(d.largest) else None,
+                "rms": d.rms if isfinite(d.rms) else None,
+                "first_secs": d.first_secs,
+                "fault": d.fault or None,
+            }
+            for d in comparison.differences
+        ],
+    }
+
+
+def describe(difference: Difference) -> str:
+    """A difference in words."""
+    if difference.fault:
+        return difference.fault
+    said = (
+        f"largest {difference.largest:.3g}, rms {difference.rms:.3g}, "
+        f"allowed {difference.tolerance:.3g} {difference.unit}"
+    )
+    if difference.first_secs is not None:
+        said += f"; first at {difference.first_secs:.1f} s"
+    return said
+
+
+def logs_in(path: Path) -> list[Path]:
+    """The log itself, or the logs of a folder without references and truths.
+
+    Raises `ShiplogError` where there is none.
+    """
+    if not path.is_dir():
+        return [path]
+    logs = sorted(p for p in path.glob("*.mcap") if not p.name.endswith(NOT_LOGS))
+    if not logs:
+        raise ShiplogError(f"no logs (*.mcap) in the folder; name one that has some: {path}")
+    return logs
+
+
+def reference_path(log: Path) -> Path:
+    """Where the reference of a log lies."""
+    return log.with_name(log.name.removesuffix(".mcap") + SUFFIX)
+
+
+def compare(
+    log: str | os.PathLike[str] | TrialLog,
+    reference: str | os.PathLike[str] | TrialLog | None = None,
+    *,
+    vessel: Vessel | None = None,
+) -> Comparison:
+    """Replay a log and compare it with its reference, channel by channel.
+
+    The reference is the file beside the log unless given. A log that does not replay, or has no
+    reference, is a comparison that is not `ok`; its `problem` says why.
+    """
+    name = log.name if isinstance(log, TrialLog) else Path(log).name
+    try:
+        if reference is None:
+            if isinstance(log, TrialLog):
+                raise ShiplogError("a log that is no file needs its reference given")
+            reference = reference_path(Path(log))
+            if not reference.exists():
+                raise ShiplogError(
+                    "has no reference; look at its replay, then run `shiplog check --update`"
+                )
+        known = reference if isinstance(reference, TrialLog) else read(reference)
+        replay = make_reference(analyse(log if isinstance(log, TrialLog) else read(log), vessel))
+    except ShiplogError as error:
+        return Comparison(name, (), str(error))
+    return Comparison(name, _differences(replay, known), "", replay, known)
+
+
+def update(log: Path) -> None:
+    """Make the replay as it is now the reference."""
+    write(make_reference(analyse(read(log))), reference_path(log))
+
+
+def make_reference(analysis: Analysis) -> TrialLog:
+    """What a replay found, as a log: means over short blocks, so that nothing slips between."""
+    signals, estimates, found = analysis.signals, analysis.estimates, analysis.disturbance
+    channels = [_blocks(analysis, name, "measured", signals[name]) for name in NEEDED]
+    channels += [
+        _single(analysis, name, "model", value)
+        for name, value in analysis.vessel.coefficients._asdict().items()
+    ]
+    for i, name in enumerate(STATES):
+        channels.append(_blocks(analysis, name, "estimate", estimates.states[:, i]))
+        channels.append(_blocks(analysis, name, "std", estimates.stds[:, i]))
+    for i, name in enumerate(OUTPUTS):
+        channels.append(_blocks(analysis, name, "innovation", estimates.innovations[:, i]))
+    channels.append(_blocks(analysis, "yaw_disturbance", "estimate", found.yaw))
+    channels.append(_blocks(analysis, "surge_disturbance", "estimate", found.surge))
+    for identification in (analysis.yaw, analysis.surge):
+        channels += _identified(analysis, identification)
+    metadata = {"reference_of": analysis.log.name, "model": analysis.model_origin}
+    return TrialLog(analysis.log.name, tuple(channels), metadata)
+
+
+def _identified(analysis: Analysis, found: Identification) -> list[Channel]:
+    channels = []
+    stamps = analysis.signals.start_ns + np.round(found.history.time_secs * 1e9).astype(np.int64)
+    for i, (name, whole) in enumerate(found.coefficients.items()):
+        channels.append(_single(analysis, name, "whole", whole.value))
+        channels.append(_channel(name, "history", stamps, found.history.values[:, i]))
+    return channels
+
+
+def _blocks(analysis: Analysis, name: str, kind: str, values: FloatArray) -> Channel:
+    """The means of what was there in each block; NaN where there was nothing."""
+    signals = analysis.signals
+    block = (signals.time_secs // BLOCK_SECS).astype(np.int64)
+    there = np.isfinite(values)
+    count = np.bincount(block[there], minlength=int(block[-1]) + 1)
+    total = np.bincount(block[there], weights=values[there], minlength=len(count))
+    with np.errstate(invalid="ignore"):
+        means = total / count
+    starts = np.arange(len(count)) * BLOCK_SECS
+    stamps = signals.start_ns + np.round(starts * 1e9).astype(np.int64)
+    return _channel(name, kind, stamps, means)
+
+
+def _single(analysis: Analysis, name: str, kind: str, value: float) -> Channel:
+    return _channel(name, kind, np.array([analysis.signals.start_ns]), np.array([value]))
+
+
+def _channel(name: str, kind: str, stamps: TimeArray, values: FloatArray) -> Channel:
+    largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+    tolerance = {"tolerance": repr(_SHARES[kind] * largest)}
+    return Channel(name, kind, _UNITS[name], stamps, stamps, values, metadata=tolerance)
+
+
+def _differences(replay: TrialLog, reference: TrialLog) -> tuple[Difference, ...]:
+    now = {channel.topic: channel for channel in replay}
+    before = {channel.topic: channel for channel in reference}
+    start_ns, _ = reference.span_ns
+    topics = [*now, *(topic for topic in before if topic not in now)]
+    return tuple(_difference(topic, now, before, start_ns) for topic in topics)
+
+
+def _difference(
+    topic: str, now: Mapping[str, Channel], before: Mapping[str, Channel], start_ns: int
+) -> Difference:
+    if topic not in before:
+        return _fault(now[topic], "is new: it is not in the reference")
+    known = before[topic]
+    if topic not in now:
+        return _fault(known, "is gone: it is only in the reference")
+    new = now[topic]
+    if not np.array_equal(new.measured_ns, known.measured_ns):
+        return _fault(known, f"has other times: {len(new)} against {len(known)} samples")
+    missing, was_missing = np.isnan(new.values), np.isnan(known.values)
+    if not np.array_equal(missing, was_missing):
+        at = (known.measured_ns[np.flatnonzero(missing != was_missing)[0]] - start_ns) * 1e-9
+        return _fault(
+            known,
+            f"has other gaps: {missing.sum()} values missing against {was_missing.sum()}, "
+            f"first at {at:.1f} s",
+        )
+    tolerance = float(known.metadata["tolerance"])
+    away = np.abs(new.values - known.values)[~missing]
+    beyond = np.flatnonzero(away > tolerance)
+    first = None
+    if len(beyond):
+        first = float((known.measured_ns[~missing][beyond[0]] - start_ns) * 1e-9)
+    largest = float(np.max(away, initial=0.0))
+    rms = float(np.sqrt(np.mean(away**2))) if len(away) else 0.0
+    return Difference(topic, known.unit, tolerance, largest, rms, first)
+
+
+def _fault(channel: Channel, fault: str) -> Difference:
+    tolerance = float(channel.metadata.get("tolerance", "nan"))
+    return Difference(channel.topic, channel.unit, tolerance, np.inf, np.inf, 0.0, fault)

@@ -1,0 +1,5 @@
+"""`python -m shiplog`."""
+
+from .cli import main
+
+raise SystemExit(main())

@@ -1,0 +1,359 @@
+"""The verbs: record, info, replay, check, convert.
+
+Results go to stdout, everything else to stderr. Exit codes: 0 fine, 1 failure, 2 usage,
+3 finished, but data were lost. Whatever is heavy is imported by the verb that needs it.
+"""
+
+import argparse
+import json
+import os
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from math import radians
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from . import __version__
+from .errors import ShiplogError, UsageError
+from .files import replacing
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from analysis.pipeline import Analysis
+    from recorders.simulate import Gust, WaveMoment
+
+FINE, FAILURE, USAGE, DATA_LOST = 0, 1, 2, 3
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one verb; the exit code says how it went."""
+    try:
+        parsed = _parser().parse_args(arguments)
+        return int(parsed.run(parsed))
+    except UsageError as error:
+        return _fail(error, USAGE)
+    except ShiplogError as error:
+        return _fail(error, FAILURE)
+    except BrokenPipeError:  # the reader of our output has gone: no matter
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FINE
+    except KeyboardInterrupt:
+        return _fail("interrupted; nothing was written", FAILURE)
+
+
+def _fail(error: object, code: int) -> int:
+    print(f"shiplog: {' '.join(str(error).split())}", file=sys.stderr)
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="shiplog", description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--version", action="version", version=f"shiplog {__version__}")
+    verbs = parser.add_subparsers(metavar="VERB", required=True)
+    _add_record(verbs)
+    _add_info(verbs)
+    _add_replay(verbs)
+    _add_check(verbs)
+    _add_convert(verbs)
+    return parser
+
+
+def _add_record(verbs: Any) -> None:  # noqa: ANN401 - argparse keeps that type to itself
+    record = verbs.add_parser("record", help="write sensor streams to a log")
+    sources = record.add_subparsers(metavar="SOURCE", required=True)
+    simulate = sources.add_parser(
+        "simulate",
+        help="a simulated trial",
+        description="Sail a manoeuvre with a model ship and record what its sensors say.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="""manoeuvres:
+  turning-circle[-ANGLE][-port]  zigzag-RUDDER-HEADING[-port]  pull-out[-ANGLE]
+  spiral  pseudo-random  paper
+sensors, each setting in SI:
+  --sensor yaw_rate.bias=1e-4 --sensor speed.rate_hz=2 --sensor rudder.dropout=0.02
+  rate_hz, jitter_secs, delay_secs, white, uniform, uniform_relative, wave, wave_tau_secs,
+  bias, dropout, dropout_secs""",
+    )
+    simulate.add_argument("manoeuvre", metavar="MANOEUVRE", help="such as zigzag-20-20")
+    simulate.add_argument(
+        "--vessel", default="table1", help="a preset (table1, table1-rad) or a vessel.toml"
+    )
+    simulate.add_argument("--seed", type=int, default=0, help="the same seed, the same samples")
+    simulate.add_argument(
+        "--duration", type=float, default=600.0, metavar="S", help="in seconds (default: 600)"
+    )
+    simulate.add_argument(
+        "--noise", default="paper", help="of the sensors: none, white, paper (default)"
+    )
+    simulate.add_argument(
+        "--sensor", action="append", default=[], metavar="CHANNEL.SETTING=VALUE", help="see below"
+    )
+    simulate.add_argument(
+        "--gust",
+        action="append",
+        default=[],
+        metavar="DEG@START[+LENGTH]",
+        help="a yaw moment worth DEG of rudder, from START s on, for LENGTH s",
+    )
+    simulate.add_argument(
+        "--wave", metavar="DEG@PERIOD", help="a sinusoidal yaw moment worth DEG of rudder"
+    )
+    simulate.add_argument("--truth", metavar="FILE", help="write what really happened there")
+    simulate.add_argument("-o", "--output", required=True, metavar="FILE", help="the log")
+    simulate.set_defaults(run=_run_simulate)
+
+
+def _add_info(verbs: Any) -> None:  # noqa: ANN401
+    info = verbs.add_parser("info", help="what is in a log, without reading it all")
+    info.add_argument("log", metavar="LOG")
+    info.add_argument("--json", metavar="FILE", help="as JSON, - for stdout")
+    info.set_defaults(run=_run_info)
+
+
+def _add_replay(verbs: Any) -> None:  # noqa: ANN401
+    replay = verbs.add_parser(
+        "replay",
+        help="filter, observe, identify; a Rerun review and a summary",
+        description="Replay a log through the filter, the observer and the identifier.",
+    )
+    replay.add_argument("log", metavar="LOG")
+    replay.add_argument("--vessel", help="a preset or a vessel.toml, instead of the log's own")
+    replay.add_argument(
+        "-o", "--output", metavar="FILE", help="the review (default: LOG's name with .rrd, here)"
+    )
+    replay.add_argument("--json", metavar="FILE", help="the summary as JSON, - for stdout")
+    replay.add_argument("--view", action="store_true", help="open the review in the Rerun viewer")
+    replay.set_defaults(run=_run_replay)
+
+
+def _add_check(verbs: Any) -> None:  # noqa: ANN401
+    check = verbs.add_parser(
+        "check",
+        help="compare replays with their references",
+        description="Replay a log, or the logs of a folder, and compare with NAME.ref.mcap.",
+    )
+    check.add_argument("path", metavar="PATH", type=Path)
+    check.add_argument(
+        "--update", action="store_true", help="after looking: make the replays the references"
+    )
+    check.add_argument("--json", metavar="FILE", help="the comparison as JSON, - for stdout")
+    check.set_defaults(run=_run_check)
+
+
+def _add_convert(verbs: Any) -> None:  # noqa: ANN401
+    convert = verbs.add_parser(
+        "convert",
+        help="a table to a log, a log to a table",
+        description="By the endings: .mcap, .csv, .parquet are ours; other tables need a layout.",
+    )
+    convert.add_argument("source", metavar="FROM", type=Path)
+    convert.add_argument("target", metavar="TO", type=Path)
+    convert.add_argument("--layout", type=Path, help="what the table's columns mean (TOML)")
+    convert.set_defaults(run=_run_convert)
+
+
+def _run_simulate(arguments: argparse.Namespace) -> int:
+    from .vessel import load_vessel
+    from .writer import write
+
+    sensors, simulation = _sibling("recorders.sensors"), _sibling("recorders.simulate")
+    vessel, text = load_vessel(arguments.vessel)
+    with _progress() as tell:
+        tell("sail and measure")
+        trial = simulation.simulate(
+            vessel,
+            arguments.manoeuvre,
+            duration_secs=arguments.duration,
+            seed=arguments.seed,
+            sensors=sensors.suite(
+                arguments.noise, _settings(arguments.sensor), angle_unit=vessel.angle_unit
+            ),
+            gusts=tuple(_gust(text, simulation.Gust) for text in arguments.gust),
+            wave=_wave(arguments.wave, simulation.WaveMoment) if arguments.wave else None,
+            vessel_toml=text,
+        )
+        tell("write")
+        count = _sibling("recorders.record").record(trial, arguments.output)
+        if arguments.truth:
+            write(trial.truth(), arguments.truth)
+    print(f"{arguments.output}: {count} samples of {len(trial.channels)} channels")
+    return FINE
+
+
+def _run_info(arguments: argparse.Namespace) -> int:
+    from .info import info
+
+    found = info(arguments.log)
+    if arguments.json:
+        _write_json(found.as_json(), arguments.json)
+        return FINE
+    print(f"{found.name}: {(found.end_ns - found.start_ns) * 1e-9:.1f} s")
+    rows = [("topic", "samples", "unit", "positive")]
+    rows += [(c.topic, str(c.samples), c.unit, c.positive) for c in found.channels]
+    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    for topic, samples, unit, positive in rows:
+        line = f"  {topic:<{widths[0]}}  {samples:>{widths[1]}}  {unit:<{widths[2]}}  {positive}"
+        print(line.rstrip())
+    for key, value in found.metadata.items():
+        print(f"  {key}: {value}")
+    print(f"  vessel.toml: {'attached' if found.has_vessel else 'none'}")
+    _warn(found.warnings)
+    return FINE
+
+
+def _run_replay(arguments: argparse.Namespace) -> int:
+    from .reader import read
+    from .vessel import load_vessel
+
+    pipeline, summary = _sibling("analysis.pipeline"), _sibling("analysis.summary")
+    vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
+    output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
+    with _progress() as tell:
+        tell("read")
+        log = read(arguments.log)
+        analysis = pipeline.analyse(log, vessel, on_step=tell)
+        tell("review")
+        view = _sibling("analysis.rerun_view")
+        view.write_review(analysis, output, text=summary.markdown(analysis))
+    if arguments.json:
+        _write_json(summary.summarise(analysis), arguments.json)
+    _print_tables(analysis, to_stderr=arguments.json == "-")
+    _warn(analysis.warnings)
+    print(f"review: {output} (open it with: rerun {output})", file=sys.stderr)
+    if arguments.view:
+        view.view_review(analysis, text=summary.markdown(analysis))
+    return DATA_LOST if log.data_lost else FINE
+
+
+def _run_check(arguments: argparse.Namespace) -> int:
+    check = _sibling("analysis.check")
+    if arguments.update and os.environ.get("CI"):
+        raise UsageError("references are not updated in CI; run it where somebody looks")
+    comparisons = []
+    logs = check.logs_in(arguments.path)
+    with _progress() as tell:
+        for log in logs:
+            tell(log.name)
+            comparisons.append(check.compare(log))
+    for comparison in comparisons:
+        print(comparison, file=sys.stderr if arguments.json == "-" else sys.stdout)
+    if arguments.json:
+        _write_json([check.as_json(comparison) for comparison in comparisons], arguments.json)
+    if arguments.update:
+        for log in logs:
+            check.update(log)
+            print(f"updated: {check.reference_path(log)}", file=sys.stderr)
+        return FINE
+    for comparison in comparisons:
+        if comparison.changed:
+            overlay = Path(f"{Path(comparison.name).stem}.check.rrd")
+            _sibling("analysis.check_view").write_overlay(comparison, overlay)
+            print(f"both, overlaid: {overlay}", file=sys.stderr)
+    return FINE if all(comparison.ok for comparison in comparisons) else FAILURE
+
+
+def _run_convert(arguments: argparse.Namespace) -> int:
+    from .convert import convert
+
+    with _progress() as tell:
+        tell(f"{arguments.source.name} to {arguments.target.name}")
+        log, warnings = convert(arguments.source, arguments.target, arguments.layout)
+    _warn(warnings)
+    print(f"{arguments.target}: {sum(map(len, log))} samples of {len(log.channels)} channels")
+    return DATA_LOST if log.data_lost else FINE
+
+
+def _sibling(name: str) -> ModuleType:
+    """A module of `recorders` or `analysis`: ours, not a folder of that name lying about."""
+    package = name.partition(".")[0]
+    home = Path(__file__).resolve().parents[1]
+    found = import_module(package)
+    where = Path(found.__file__ or next(iter(found.__path__))).resolve()
+    if home not in where.parents:
+        raise ShiplogError(
+            f"another package called {package!r} hides shiplog's own; "
+            f"run from another folder or rename it: {where}"
+        )
+    return import_module(name)
+
+
+@contextmanager
+def _progress() -> Iterator["Callable[[str], None]"]:
+    """Show on a terminal what is being done; the callable names the next step."""
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    console = Console(stderr=True)
+    shown = console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
+        task = progress.add_task("")
+        yield lambda step: progress.update(task, description=step)
+
+
+def _print_tables(analysis: "Analysis", *, to_stderr: bool) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(stderr=to_stderr, highlight=False)
+    for section in _sibling("analysis.summary").sections(analysis):
+        table = Table(title=section.title, title_justify="left", title_style="bold")
+        for i, column in enumerate(section.columns):
+            table.add_column(column, justify="left" if i == 0 else "right")
+        for row in section.rows:
+            table.add_row(*row)
+        console.print(table)
+        for remark in section.remarks:
+            console.print(remark)
+        console.print()
+
+
+def _warn(warnings: Sequence[str]) -> None:
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+
+
+def _write_json(value: object, where: str) -> None:
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    if where == "-":
+        sys.stdout.write(text)
+        return
+    with replacing(where) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def _settings(texts: Sequence[str]) -> dict[str, float]:
+    """`yaw_rate.bias=1e-4` as a name and a number."""
+    settings = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            settings[name] = float(value)
+        except ValueError:
+            raise UsageError(
+                f"--sensor wants CHANNEL.SETTING=VALUE, such as yaw_rate.bias=1e-4, got {text!r}"
+            ) from None
+    return settings
+
+
+_NUMBER = r"([-+]?\d*\.?\d+(?:e[-+]?\d+)?)"
+
+
+def _gust(text: str, gust: "type[Gust]") -> "Gust":
+    match = re.fullmatch(rf"{_NUMBER}@{_NUMBER}(?:\+{_NUMBER})?", text)
+    if not match:
+        raise UsageError(f"--gust wants DEG@START[+LENGTH], such as 2@200+60, got {text!r}")
+    angle, start, length = match.groups()
+    return gust(radians(float(angle)), float(start), *([float(length)] if length else []))
+
+
+def _wave(text: str, wave: "type[WaveMoment]") -> "WaveMoment":
+    match = re.fullmatch(rf"{_NUMBER}@{_NUMBER}", text)
+    if not match or float(match[2]) <= 0:
+        raise UsageError(f"--wave wants DEG@PERIOD, such as 0.5@8, got {text!r}")
+    return wave(radians(float(match[1])), float(match[2]))

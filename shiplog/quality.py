@@ -1,0 +1,291 @@
+"""What is wrong with a log's data, in words: for the person who could still sail again."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .clock import gap_threshold_secs, gaps, usual_period_secs
+from .errors import LogError
+from .schema import GEOGRAPHIC
+from .types import Channel, FloatArray, TimeArray, TrialLog
+from .units import CATALOGUE, factor
+
+STUCK_PERIODS = 30  # a value that stands still for more usual periods than this,
+STUCK_SECS = 5.0  # and for longer than this,
+STUCK_RUNS = 30  # and for so many times what is usual in its channel, is stuck
+IRREGULAR_SHARE = 0.1  # of the intervals, which may be more than half off the usual one
+
+WINDOW_SECS = 10.0  # over which the rudder's effect on the yaw rate is looked at
+WINDOWS = 12  # at least so many of them must fit into a record
+RUDDER_STD = 0.015  # rad: with less movement of the rudder nothing can be said
+SIGNIFICANT = 4.0  # standard errors
+MAX_CONDITION = 1e6  # beyond it rudder and yaw rate cannot be told apart
+
+_GLOBE = {"latitude": 90.0, "longitude": 180.0}
+
+
+def examine(log: TrialLog, names: tuple[str, ...]) -> list[str]:
+    """What is wrong with these channels of a log, a sentence each; nothing where all is well.
+
+    `names` are keys as `log[...]` takes them.
+
+    Raises `LogError` where a channel is missing, holds an infinite value, or has measured times
+    that run backwards: with these nothing can be computed.
+    """
+    said = []
+    for name in names:
+        channel = log[name]
+        _require_usable(log, channel)
+        if not len(channel):
+            said.append(f"{channel.topic}: no samples")
+            continue
+        said += [f"{channel.topic}: {fault}" for fault in _faults(channel)]
+    return said
+
+
+def _require_usable(log: TrialLog, channel: Channel) -> None:
+    times = channel.measured_ns
+    infinite = np.flatnonzero(np.isinf(_rows(channel)).any(axis=1))
+    if len(infinite):
+        at = (times[infinite[0]] - times[0]) * 1e-9
+        raise LogError(
+            f"{channel.topic} has {_count(len(infinite), 'infinite value')}, the first {at:.3f} s "
+            f"after its start; convert the log to CSV, make it nan there and convert it back: "
+            f"{log.name}"
+        )
+    back = np.flatnonzero(np.diff(times) < 0)
+    if len(back):
+        at, by = (times[back[0]] - times[0]) * 1e-9, (times[back[0]] - times[back[0] + 1]) * 1e-9
+        raise LogError(
+            f"the measured times of {channel.topic} run backwards {_times(len(back))}, first by "
+            f"{by:.3f} s, {at:.3f} s after its start; `shiplog convert IN.mcap OUT.mcap` sorts "
+            f"them: {log.name}"
+        )
+
+
+def _faults(channel: Channel) -> Iterator[str]:
+    silent = gaps(channel)
+    if silent:
+        start, longest = max(silent, key=lambda gap: gap[1])
+        count = _count(len(silent), "gap")
+        yield f"{count}, the longest {longest:.1f} s, {start:.1f} s after its start"
+    repeated = int(np.count_nonzero(np.diff(channel.measured_ns) == 0))
+    if repeated:
+        yield f"{_count(repeated, 'sample')} with the time of the one before"
+    missing = int(np.count_nonzero(np.isnan(_rows(channel)).all(axis=1)))
+    if missing:
+        share = 100 * missing / len(channel)
+        yield f"{_count(missing, 'sample')} ({share:.2g} %) not measured (NaN)"
+    yield from _stuck(channel)
+    yield from _impossible(channel)
+    yield from _irregular(channel)
+    early = channel.measured_ns - channel.received_ns
+    if np.any(early > 0):
+        yield (
+            f"{_count(int(np.count_nonzero(early > 0)), 'sample')} received before measured, by up "
+            f"to {early.max() * 1e-9:.3g} s: the sensor's clock is ahead of the recorder's"
+        )
+
+
+def _stuck(channel: Channel) -> Iterator[str]:
+    """Values that stand still for long, where neither the channel nor its print usually does."""
+    kind = CATALOGUE.get(channel.name)
+    if (kind is not None and kind.commanded) or len(channel) < 2:
+        return
+    values = _rows(channel)
+    steps = _steps(values)
+    changes = np.flatnonzero(steps != 0)
+    starts, ends = np.append(0, changes + 1), np.append(changes, len(values) - 1)
+    times = (channel.measured_ns - channel.measured_ns[0]) * 1e-9
+    lasted: FloatArray = times[ends] - times[starts]
+    least = max(STUCK_SECS, STUCK_PERIODS * usual_period_secs(channel))
+    long = np.asarray(lasted > least)
+    if bool(long.all()) or not bool(long.any()):
+        return
+    usual = np.median(np.repeat(lasted[~long], (ends - starts + 1)[~long]))
+    long &= lasted > STUCK_RUNS * usual
+    if usual > 0:  # printed coarsely: at a crest the print stands still and then moves one digit
+        jumps = np.concatenate([[0.0], steps[changes], [0.0]])
+        leap = np.nan_to_num(np.maximum(jumps[:-1], jumps[1:]), nan=np.inf)
+        long &= leap > 2 * np.nanmedian(steps[changes])
+    if np.any(long):
+        worst = int(np.argmax(np.where(long, lasted, -1.0)))
+        held = ", ".join(_shown(channel, float(value)) for value in values[starts[worst]])
+        yield (
+            f"stuck {_times(int(np.count_nonzero(long)))}, longest at {held} for "
+            f"{lasted[worst]:.1f} s, {times[starts[worst]]:.1f} s after its start"
+        )
+
+
+def _steps(values: FloatArray) -> FloatArray:
+    """By how much each row differs from the one before, (n - 1,); NaN next to one not measured."""
+    gone = np.isnan(values)
+    filled = np.where(gone, 0.0, values)
+    steps: FloatArray = np.abs(np.diff(filled, axis=0)).max(axis=1)
+    empty = np.asarray(gone.all(axis=1))
+    steps[empty[1:] | empty[:-1] | (gone[1:] != gone[:-1]).any(axis=1)] = np.nan
+    return steps
+
+
+def _impossible(channel: Channel) -> Iterator[str]:
+    """Values that no ship has."""
+    kind = CATALOGUE.get(channel.name)
+    if channel.fields:
+        limits = [_GLOBE.get(field, np.inf) for field in channel.fields]
+        bad = np.abs(channel.values) > np.array(limits)
+        if np.any(bad) and channel.fields == GEOGRAPHIC:
+            count = int(np.count_nonzero(bad.any(axis=1)))
+            yield f"{_count(count, 'impossible position')}, beyond 90 or 180 deg"
+    elif kind is not None:
+        beyond = np.maximum(kind.lowest - channel.values, channel.values - kind.highest)
+        count = int(np.count_nonzero(beyond > 0))
+        if count:
+            worst = float(channel.values[int(np.nanargmax(beyond))])
+            yield (
+                f"{_count(count, 'impossible value')}, such as {_shown(channel, worst)}; between "
+                f"{_shown(channel, kind.lowest)} and {_shown(channel, kind.highest)} is possible"
+            )
+
+
+def _irregular(channel: Channel) -> Iterator[str]:
+    """A rate that is not one, gaps and equal times apart."""
+    steps = np.diff(channel.measured_ns) * 1e-9
+    steps = steps[(steps > 0) & (steps <= gap_threshold_secs(channel))]
+    usual = usual_period_secs(channel)
+    if len(steps) < 10:
+        return
+    off = float(np.mean(np.abs(steps - usual) > 0.5 * usual))
+    if off > IRREGULAR_SHARE:
+        low, high = np.percentile(steps, [1, 99])
+        yield (
+            f"irregular: {100 * off:.0f} % of its intervals are more than half off the usual "
+            f"{usual:.3g} s; they go from {low:.2g} to {high:.2g} s"
+        )
+
+
+def rudder_sign_warning(log: TrialLog) -> str | None:
+    """A sentence if the data say that a positive rudder turns the bow to port, else None.
+
+    Over windows of length W, r(t + W) - r(t) = a ∫U r + b ∫U² δ + c W is solved for a, b and c by
+    least squares, U being the speed over its median (1 where there is none): so the forces on hull
+    and rudder grow. b is positive where the signs follow the convention. Integrals stand where
+    derivatives would only show the noise, and the standard error of b takes the windows' overlap
+    into account (Newey and West, 1987). None where a channel is missing, or the rudder moved too
+    little to tell.
+    """
+    rudder, yaw_rate = log.get("rudder"), log.get("yaw_rate")
+    if rudder is None or yaw_rate is None:
+        return None
+    grid = _common_grid(rudder, yaw_rate, log.get("speed"))
+    if grid is None:
+        return None
+    dt, r, delta, speed = grid
+    window = min(WINDOW_SECS, len(r) * dt / WINDOWS)
+    effect = _rudder_effect(dt, r, delta, speed, max(round(window / dt), 1))
+    if effect is None or effect[0] > -SIGNIFICANT * effect[1]:
+        return None
+    return (
+        f"a positive {rudder.topic} turns the bow to port, by {-effect[0] / effect[1]:.0f} "
+        f"standard errors; set the rudder's sign = -1 in the layout, or turn it in the recorder"
+    )
+
+
+Grid = tuple[float, FloatArray, FloatArray, FloatArray]
+
+
+def _common_grid(rudder: Channel, yaw_rate: Channel, speed: Channel | None) -> Grid | None:
+    """A step, yaw rate and rudder at it, NaN in gaps, and relative speed; None for too little."""
+    rate_at, rates = _measured(yaw_rate)
+    rudder_at, angles = _measured(rudder)
+    if min(len(rates), len(angles)) < 2 * WINDOWS:
+        return None
+    start, end = max(rate_at[0], rudder_at[0]), min(rate_at[-1], rudder_at[-1])
+    span = (end - start) * 1e-9
+    dt = max(usual_period_secs(yaw_rate), WINDOW_SECS / 100, span / 100_000)
+    if span < 2 * WINDOWS * dt:
+        return None
+    at = np.arange(int(span / dt) + 1) * dt
+    r = _between(at, (rate_at - start) * 1e-9, rates, gap_threshold_secs(yaw_rate))
+    delta = _between(at, (rudder_at - start) * 1e-9, angles, gap_threshold_secs(rudder))
+    return dt, r, delta, _relative_speed(at, start, speed)
+
+
+def _measured(channel: Channel) -> tuple[TimeArray, FloatArray]:
+    """The times and values of the samples that were measured, in order."""
+    good = np.isfinite(channel.values)
+    order = np.argsort(channel.measured_ns[good], kind="stable")
+    return channel.measured_ns[good][order], channel.values[good][order]
+
+
+def _between(at: FloatArray, times: FloatArray, values: FloatArray, gap_secs: float) -> FloatArray:
+    """Linear between the samples, NaN in gaps."""
+    after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+    gap = times[after] - times[after - 1] > gap_secs
+    return np.where(gap, np.nan, np.interp(at, times, values))
+
+
+def _relative_speed(at: FloatArray, start: np.int64, speed: Channel | None) -> FloatArray:
+    """The speed over its median; 1 where it is not known, or the ship did not make way."""
+    if speed is None or not np.isfinite(speed.values).any():
+        return np.ones_like(at)
+    times, values = _measured(speed)
+    placed = np.interp(at, (times - start) * 1e-9, values)
+    usual = float(np.median(placed))
+    return np.clip(placed / usual, 0.1, 10.0) if usual > 0 else np.ones_like(at)
+
+
+def _rudder_effect(
+    dt: float, r: FloatArray, delta: FloatArray, speed: FloatArray, length: int
+) -> tuple[float, float] | None:
+    """The rudder's coefficient, 1/s^2, and its standard error; None if nothing can be said."""
+    gone = np.isnan(r) | np.isnan(delta)
+    r, delta = np.where(gone, 0.0, r), np.where(gone, 0.0, delta)
+    forces = np.stack([speed * r, speed**2 * delta, np.ones_like(r)], axis=1)
+    sums = np.concatenate(
+        [np.zeros((1, 3)), np.cumsum((forces[1:] + forces[:-1]) * (dt / 2), axis=0)]
+    )
+    lost = np.cumsum(gone)
+    whole = (lost[length:] == lost[:-length]) & ~gone[:-length]
+    X, y = (sums[length:] - sums[:-length])[whole], (r[length:] - r[:-length])[whole]
+    if len(y) < length * WINDOWS / 2 or np.std(X[:, 1]) < RUDDER_STD * length * dt:
+        return None
+    scale = np.sqrt(np.mean(X**2, axis=0))
+    if np.any(scale == 0) or np.linalg.cond(X / scale) > MAX_CONDITION:
+        return None
+    X /= scale
+    solved, *_ = np.linalg.lstsq(X, y, rcond=None)
+    error = _standard_errors(X, y - X @ solved, 2 * length)[1]
+    return float(solved[1] / scale[1]), float(error / scale[1])
+
+
+def _standard_errors(X: FloatArray, residual: FloatArray, lags: int) -> FloatArray:
+    """Of least squares whose residuals stay alike over so many rows (Newey and West, 1987)."""
+    moments = X * residual[:, None]
+    middle = moments.T @ moments
+    for lag in range(1, min(lags, len(X) - 1)):
+        cross = moments[lag:].T @ moments[:-lag]
+        middle += (1 - lag / lags) * (cross + cross.T)
+    inverse = np.linalg.inv(X.T @ X)
+    errors: FloatArray = np.sqrt(np.abs(np.diag(inverse @ middle @ inverse)))
+    return errors
+
+
+def _rows(channel: Channel) -> FloatArray:
+    """The values as (n, k)."""
+    return channel.values.reshape(len(channel), -1) if len(channel) else np.zeros((0, 1))
+
+
+def _shown(channel: Channel, value: float) -> str:
+    """A value as a person reads it."""
+    kind = CATALOGUE.get(channel.name)
+    if kind is None or channel.fields == GEOGRAPHIC:
+        return f"{value:.4g} {channel.unit}"
+    return f"{value * factor(kind.unit, kind.display_unit):.4g} {kind.display_unit}"
+
+
+def _count(number: int, thing: str) -> str:
+    return f"1 {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"

@@ -1,0 +1,51 @@
+from pathlib import Path
+
+import pytest
+
+from analysis.pipeline import Analysis, analyse
+from recorders.sensors import suite
+from recorders.simulate import SimulatedTrial, simulate
+from shiplog import TrialLog, Vessel, load_vessel
+
+PROJECT = Path(__file__).parents[1]
+RECORDINGS = PROJECT.parent / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Path:
+    if not RECORDINGS.is_dir():
+        pytest.skip(f"the real recordings are not here: {RECORDINGS}")
+    return RECORDINGS
+
+
+@pytest.fixture(scope="session")
+def vessel() -> Vessel:
+    return load_vessel("table1")[0]
+
+
+def as_log(trial: SimulatedTrial, name: str = "trial.mcap") -> TrialLog:
+    return TrialLog(name, trial.channels, trial.metadata, trial.vessel_toml)
+
+
+@pytest.fixture(scope="session")
+def zigzag() -> SimulatedTrial:
+    """A 20/20 zig-zag of the paper's ship under the paper's noise."""
+    vessel, text = load_vessel("table1")
+    return simulate(
+        vessel,
+        "zigzag-20-20",
+        duration_secs=500.0,
+        seed=11,
+        sensors=suite("paper"),
+        vessel_toml=text,
+    )
+
+
+@pytest.fixture(scope="session")
+def zigzag_log(zigzag: SimulatedTrial) -> TrialLog:
+    return as_log(zigzag, "zigzag.mcap")
+
+
+@pytest.fixture(scope="session")
+def zigzag_analysis(zigzag_log: TrialLog) -> Analysis:
+    return analyse(zigzag_log)

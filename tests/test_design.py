@@ -1,0 +1,127 @@
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from analysis.design import (
+    butterworth_poles,
+    discrete_observer,
+    discretise,
+    observer_gain,
+    pseudo_input_matrices,
+    pseudo_inputs,
+)
+from shiplog import UsageError, Vessel
+from shiplog.ship import Coefficients, surge_acceleration, yaw_acceleration_rate
+
+# The paper's coefficients as printed, angles in degrees
+T1, T2, T3, C2, C3 = 150.0, 50.0, 0.5, 10.0, 20.0
+D = 1 / (T1 * T2)
+TABLE1 = Coefficients(
+    a=-(T1 + T2) * D, b1=-D, b2=-C2 * D, b3=-C3 * D, d=D, e=T3 * D,
+    f=-0.1, g=-0.0003, h=0.0004, alpha1=0.0171, alpha2=0.0015, alpha3=0.0654,
+)  # fmt: skip
+
+
+def derivative(x: np.ndarray, delta: float, rate: float, n: float, n_dot: float) -> np.ndarray:
+    A, B = pseudo_input_matrices(TABLE1, float(np.sign(x[0])))
+    return A @ x + B @ pseudo_inputs(x, delta, rate, n, n_dot, TABLE1.alpha3)
+
+
+def test_the_point_check_of_the_corrected_pseudo_inputs() -> None:
+    w, w_dot, v, delta, rate, n, n_dot = 0.3, 0.01, 9.0, 20.0, 2.5, 80.0, 0.5
+    w_ddot = yaw_acceleration_rate(TABLE1, w, w_dot, v, n, delta, rate)
+    v_dot = surge_acceleration(TABLE1, w, v, n)
+    x_dot = derivative(np.array([w, w_dot, w_ddot, v, v_dot]), delta, rate, n, n_dot)
+    assert x_dot == pytest.approx(
+        [0.01, 1.261186547187e-4, 5.474031503e-5, -1.3e-3, -3.9298e-4], rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_x_plus_b_u_is_the_derivative_of_the_equations_themselves(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    w, w_dot, v = rng.uniform([-0.6, -0.02, 3], [0.6, 0.02, 12])
+    delta, rate, n, n_dot = rng.uniform([-35, -2.5, 40, -1], [35, 2.5, 120, 1])
+
+    def accelerations(h: float) -> np.ndarray:
+        """w'' and v' a moment later, along the motion itself (delta'' = n'' = 0)."""
+        w2 = yaw_acceleration_rate(TABLE1, w, w_dot, v, n, delta, rate)
+        v1 = surge_acceleration(TABLE1, w, v, n)
+        w_h, w_dot_h = w + h * w_dot + h * h / 2 * w2, w_dot + h * w2
+        delta_h, n_h, v_h = delta + h * rate, n + h * n_dot, v + h * v1
+        return np.array(
+            [
+                yaw_acceleration_rate(TABLE1, w_h, w_dot_h, v_h, n_h, delta_h, rate),
+                surge_acceleration(TABLE1, w_h, v_h, n_h),
+            ]
+        )
+
+    w_ddot, v_dot = accelerations(0.0)
+    jerks = (accelerations(1e-4) - accelerations(-1e-4)) / 2e-4
+    x_dot = derivative(np.array([w, w_dot, w_ddot, v, v_dot]), delta, rate, n, n_dot)
+    assert x_dot[[1, 3]] == pytest.approx([w_ddot, v_dot], rel=1e-12)
+    assert x_dot[[2, 4]] == pytest.approx(jerks, rel=1e-5, abs=1e-9)
+
+
+def test_the_papers_printed_covariance_is_the_riccati_equations_at_378_s() -> None:
+    A, _ = pseudo_input_matrices(TABLE1, 1.0)
+    C = np.eye(5)[[0, 3]]
+
+    def rate(_: float, flat: np.ndarray) -> np.ndarray:
+        P = flat.reshape(5, 5)
+        return (A @ P + P @ A.T + 0.01 * np.eye(5) - P @ C.T @ C @ P / 400).ravel()
+
+    P = solve_ivp(rate, (0, 378), 10 * np.eye(5).ravel(), rtol=1e-10, atol=1e-12).y[:, -1]
+    P = P.reshape(5, 5)
+    printed = [30.27534702, 1.14074580, -0.00286807, 0.12079779, -0.00014146, 0.18750034]
+    assert [P[0, 0], P[0, 1], P[0, 2], P[1, 1], P[1, 2], P[2, 2]] == pytest.approx(
+        printed, abs=1e-6
+    )
+    assert [P[3, 3], P[4, 4]] == pytest.approx([2.06180082, 13.78], abs=1e-6)
+
+
+def test_discretised_noise_is_the_integral_it_stands_for(vessel: Vessel) -> None:
+    A, _ = pseudo_input_matrices(vessel.coefficients, 1.0)
+    Q, dt = np.diag([1.0, 0.3, 0.1, 2.0, 0.5]), 5.0
+    F, Qd = discretise(A, Q, dt)
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    times = (nodes + 1) * dt / 2
+    summed = sum(
+        w * dt / 2 * expm(A * t) @ Q @ expm(A * t).T for t, w in zip(times, weights, strict=True)
+    )
+    assert expm(A * dt) == pytest.approx(F)
+    assert Qd == pytest.approx(summed, rel=1e-10)
+
+
+def test_butterworth_poles_are_the_roots_of_their_polynomial() -> None:
+    assert np.poly(butterworth_poles(3, 0.05)) == pytest.approx([1, 0.1, 0.005, 0.000125])
+    assert np.poly(butterworth_poles(2, 2.0)) == pytest.approx([1, 2 * np.sqrt(2), 4])
+
+
+def test_the_roll_example_of_the_disturbance_observer() -> None:
+    inertia = 1000.0
+    A = np.array([[0, 1 / inertia, 0], [0, 0, 1], [0, 0, 0]])
+    L = observer_gain(A, np.array([[1.0, 0, 0]]), butterworth_poles(3, 0.05))
+    assert L[:, 0] == pytest.approx([0.1, 5, 0.125])
+
+
+def test_an_observer_of_what_cannot_be_seen_is_refused() -> None:
+    # a constant moment and a constant bias of the gyro that measures the rate
+    A = np.array([[-0.05, 1, 0], [0, 0, 0], [0, 0, 0]])
+    with pytest.raises(UsageError, match="cannot be seen"):
+        observer_gain(A, np.array([[1.0, 0, 1]]), butterworth_poles(3, 0.1))
+
+
+def test_a_discrete_observer_has_the_poles_asked_for_and_says_its_noise() -> None:
+    A = np.array([[0, 1, 0], [-1e-4, -0.03, 1], [0, 0, 0]])
+    C, poles, dt = np.array([[1.0, 0, 0]]), butterworth_poles(3, 0.05), 0.5
+    observer = discrete_observer(A, C, poles, dt)
+    F = expm(A * dt)
+    closed = (np.eye(3) - np.outer(observer.correction, C)) @ F
+    assert np.sort(np.linalg.eigvals(closed)) == pytest.approx(np.sort(np.exp(poles * dt)))
+    rng, error, errors = np.random.default_rng(0), np.zeros(3), []
+    for noise in rng.standard_normal(40_000):
+        error = closed @ error + observer.correction * noise
+        errors.append(error)
+    assert np.std(errors[200:], axis=0) == pytest.approx(observer.noise_gain, rel=0.06)

@@ -1,0 +1,616 @@
+import json
+import struct
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zstandard
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.opcode import Opcode
+from mcap.reader import McapReader, NonSeekingReader, make_reader
+from mcap.writer import CompressionType, IndexType, Writer
+
+from shiplog import Channel, LogError, LogWriter, TrialLog, read, write
+from shiplog.schema import GEOGRAPHIC, encode, schema_for
+
+CONFORMANCE = Path(__file__).parents[2] / "shared" / "data" / "mcap_conformance"
+START = 1_700_000_000_000_000_000
+EXTREMES = [0.0, -0.0, 1.0, -1e308, 5e-324, float("inf"), float("-inf"), float("nan")]
+UNIT = {"yaw_rate": "rad/s", "speed": "m/s", "rudder": "rad", "position": "m"}
+
+ANYWHERE = st.floats(0, 1, exclude_max=True)
+
+Samples = dict[str, list[tuple[int, int, bytes]]]  # topic: received, measured, the values' bytes
+
+
+def channel(name: str, count: int, seed: int = 0, source: str = "test") -> Channel:
+    rng = np.random.default_rng(seed)
+    measured = START + np.cumsum(rng.integers(1, 200_000_000, count))
+    received = np.sort(measured + rng.integers(0, 50_000_000, count))
+    values = np.where(rng.random(count) < 0.3, rng.choice(EXTREMES, count), rng.normal(size=count))
+    return Channel(name, source, UNIT.get(name, "1"), measured, received, values)
+
+
+def position(count: int, fields: tuple[str, ...]) -> Channel:
+    at = START + np.arange(count) * 1_000_000_000
+    values = np.random.default_rng(5).normal(size=(count, len(fields)))
+    return Channel("position", "x".join(fields), "m", at, at + 7, values, fields)
+
+
+def samples(log: TrialLog) -> Samples:
+    return {
+        c.topic: [
+            (received, measured, value.tobytes())
+            for received, measured, value in zip(
+                c.received_ns.tolist(), c.measured_ns.tolist(), c.values, strict=True
+            )
+        ]
+        for c in log
+    }
+
+
+def samples_by_mcap(path: Path, reader: Callable[..., McapReader] = make_reader) -> Samples:
+    """The samples by mcap's own reader and the file's own schemas: nothing of ours."""
+    found: Samples = defaultdict(list)
+    types: dict[int, Any] = {}
+    with path.open("rb") as stream:
+        for schema, topic, message in reader(stream, validate_crcs=True).iter_messages():
+            assert schema is not None
+            if schema.id not in types:
+                pool = descriptor_pool.DescriptorPool()
+                for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
+                    pool.Add(file)
+                types[schema.id] = message_factory.GetMessageClass(
+                    pool.FindMessageTypeByName(schema.name)
+                )
+            decoded = types[schema.id].FromString(message.data)
+            doubles = [
+                getattr(decoded, f.name)
+                for f in decoded.DESCRIPTOR.fields
+                if f.type == f.TYPE_DOUBLE and not f.is_repeated
+            ]
+            found[topic.topic].append(
+                (message.log_time, message.publish_time, struct.pack(f"<{len(doubles)}d", *doubles))
+            )
+    return dict(found)
+
+
+def written(path: Path, *channels: Channel, **options: Any) -> Path:  # noqa: ANN401 - mcap's own
+    """The channels in a file as another program would lay it out."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, **options)
+        writer.start()
+        messages = []
+        for c in channels:
+            schema = schema_for(c.fields)
+            schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+            channel_id = writer.register_channel(
+                c.topic, "protobuf", schema_id, {"unit": c.unit, **c.metadata}
+            )
+            times = zip(c.received_ns.tolist(), c.measured_ns.tolist(), encode(c), strict=True)
+            messages += [(received, channel_id, *rest) for received, *rest in times]
+        for received, channel_id, measured, data in sorted(messages, key=lambda m: m[0]):
+            writer.add_message(channel_id, received, data, measured)
+        writer.finish()
+    return path
+
+
+def foreign(
+    path: Path, messages: list[bytes], *, unit: str | None = "rad/s", topic: str = "/yaw_rate/imu"
+) -> Path:
+    """A file of another program whose scalar messages are these bytes, one a second."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = schema_for(())
+        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        metadata = {} if unit is None else {"unit": unit}
+        channel_id = writer.register_channel(topic, "protobuf", schema_id, metadata)
+        for second, data in enumerate(messages):
+            at = START + second * 1_000_000_000
+            writer.add_message(channel_id, at, data, at)
+        writer.finish()
+    return path
+
+
+def scalar(value: float, tag: int = 0x09) -> bytes:
+    return bytes([tag]) + struct.pack("<d", value)
+
+
+def top_level(data: bytes) -> list[tuple[int, int, int]]:
+    """Opcode, start and end of the file's records, their heads included."""
+    found, at = [], 8
+    while at + 9 <= len(data) - 8:
+        opcode, length = struct.unpack_from("<BQ", data, at)
+        found.append((opcode, at, at + 9 + length))
+        at += 9 + length
+    return found
+
+
+def chunks(data: bytes) -> list[tuple[int, int]]:
+    return [(start, end) for opcode, start, end in top_level(data) if opcode == Opcode.CHUNK]
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "trial.mcap"
+
+
+def flushed(path: Path, slabs: int = 5, count: int = 100) -> tuple[TrialLog, bytes]:
+    """A log written in flushed slabs, so in many chunks, and the bytes of its finished file."""
+    whole = [channel("yaw_rate", slabs * count, 1), channel("speed", slabs * count, 2)]
+    with LogWriter(path, metadata={"place": "Neva"}) as writer:
+        for at in range(0, slabs * count, count):
+            part = slice(at, at + count)
+            for c in whole:
+                writer.write(
+                    Channel(
+                        c.name,
+                        c.source,
+                        c.unit,
+                        c.measured_ns[part],
+                        c.received_ns[part],
+                        c.values[part],
+                    )
+                )
+            writer.flush()
+    return TrialLog("trial.mcap", tuple(whole)), path.read_bytes()
+
+
+# -- against a decoder that knows nothing of shiplog
+
+
+def test_we_read_what_mcap_reads_bit_for_bit(path: Path) -> None:
+    held = (
+        channel("yaw_rate", 30_000, 1),
+        channel("yaw_rate", 3000, 2, "imu"),
+        channel("torque", 500, 3),
+        position(100, ("north", "east")),
+        position(50, GEOGRAPHIC),
+    )
+    write(TrialLog("t", held), path)
+    assert len(chunks(path.read_bytes())) > 1
+    assert samples(read(path)) == samples_by_mcap(path) == samples(TrialLog("t", held))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"index_types": IndexType.NONE},
+        {"use_chunking": False},
+        {"compression": CompressionType.NONE},
+        {"compression": CompressionType.LZ4},
+        {"enable_crcs": False},
+        {"enable_data_crcs": True},
+        {"repeat_channels": False, "repeat_schemas": False},
+        {"use_statistics": False, "use_summary_offsets": False},
+        {"chunk_size": 100},
+    ],
+    ids=str,
+)
+def test_we_read_what_mcap_reads_however_the_file_is_laid_out(
+    path: Path, options: dict[str, Any]
+) -> None:
+    held = channel("yaw_rate", 3000, 1), channel("speed", 700, 2), position(30, GEOGRAPHIC)
+    written(path, *held, **{"chunk_size": 1 << 14, **options})
+    log = read(path)
+    by_mcap = samples_by_mcap(path, NonSeekingReader)
+    assert samples(log) == by_mcap == samples(TrialLog("t", held))
+    assert log.warnings == ()
+    assert not log.data_lost
+
+
+@given(st.lists(st.tuples(st.integers(0, 2), st.floats()), max_size=60), st.integers(1, 500))
+@settings(derandomize=True, deadline=None, max_examples=60)
+def test_we_read_what_mcap_reads_in_whatever_chunks(
+    tmp_path_factory: pytest.TempPathFactory, told: list[tuple[int, float]], chunk_size: int
+) -> None:
+    held = []
+    for source in range(3):
+        at = np.array([k for k, (of, _) in enumerate(told) if of == source], np.int64)
+        values = np.array([value for of, value in told if of == source])
+        held.append(Channel("yaw_rate", str(source), "rad/s", at, at, values))
+    path = written(tmp_path_factory.mktemp("any") / "t", *held, chunk_size=chunk_size)
+    assert {t: s for t, s in samples(read(path)).items() if s} == samples_by_mcap(path)
+
+
+def test_samples_are_in_the_order_in_which_they_were_received(path: Path) -> None:
+    received = START + np.array([5, 1, 3, 3, 2])
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = schema_for(())
+        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        channel_id = writer.register_channel("/speed/log", "protobuf", schema_id, {"unit": "m/s"})
+        for k, at in enumerate(received.tolist()):
+            writer.add_message(channel_id, at, scalar(k), k)
+        writer.finish()
+    log = read(path)
+    np.testing.assert_array_equal(log["speed"].values, [1, 4, 2, 3, 0])
+    np.testing.assert_array_equal(log["speed"].measured_ns, [1, 4, 2, 3, 0])
+    np.testing.assert_array_equal(log["speed"].received_ns, np.sort(received))
+
+
+# -- the files of others
+
+conformance = pytest.mark.skipif(
+    not CONFORMANCE.is_dir(), reason="the MCAP conformance files are not here"
+)
+
+
+def conforming() -> list[Path]:
+    return sorted(CONFORMANCE.glob("*.mcap"))
+
+
+@conformance
+def test_every_conformance_file_is_read_as_finished_and_undamaged() -> None:
+    assert len(conforming()) == 208
+    for file in conforming():
+        log = read(file)
+        assert all("not ours" in warning for warning in log.warnings), file.name
+        records = json.loads((CONFORMANCE / "expected" / f"{file.stem}.json").read_text())[
+            "records"
+        ]
+        topics = {dict(r["fields"])["topic"] for r in records if r["type"] == "Channel"}
+        assert log.channels == ()
+        assert bool(log.warnings) == bool(topics), file.name
+        assert all(topic in log.warnings[0] for topic in topics)
+
+
+@conformance
+@pytest.mark.parametrize("step", [1, 7])
+def test_a_conformance_file_cut_anywhere_is_read_as_unfinished(tmp_path: Path, step: int) -> None:
+    cut = tmp_path / "cut.mcap"
+    for file in conforming()[::40] if step == 1 else conforming()[::7]:
+        data = file.read_bytes()
+        for length in range(8, len(data) - 8, step):
+            cut.write_bytes(data[:length])
+            assert any("was not finished" in warning for warning in read(cut).warnings)
+
+
+@conformance
+def test_a_conformance_file_with_any_byte_changed_is_read_or_refused(tmp_path: Path) -> None:
+    changed = tmp_path / "changed.mcap"
+    for file in conforming()[::20]:
+        for at in range(8, file.stat().st_size, 3):
+            data = bytearray(file.read_bytes())
+            data[at] ^= 0xFF
+            changed.write_bytes(data)
+            _read_or_refused(changed)
+
+
+def _read_or_refused(path: Path) -> TrialLog | None:
+    try:
+        return read(path)
+    except LogError:
+        return None
+
+
+def test_foreign_topics_are_passed_over_with_a_warning(path: Path) -> None:
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        json_schema = writer.register_schema("Imu", "jsonschema", b"{}")
+        image = writer.register_schema("foxglove.Image", "protobuf", b"")
+        ids = [
+            writer.register_channel("/imu", "json", json_schema),
+            writer.register_channel("/camera", "protobuf", image),
+            writer.register_channel("/raw", "", 0),
+        ]
+        for channel_id in ids:
+            writer.add_message(channel_id, START, b'{"x": 1}', START)
+        writer.finish()
+    log = read(path)
+    assert log.channels == ()
+    assert log.warnings == ("passed over 3 topics not ours: /imu, /camera, /raw",)
+
+
+def test_a_channel_in_another_unit_is_converted(path: Path) -> None:
+    foreign(path, [scalar(180.0), scalar(-90.0)], unit="deg/s")
+    yaw_rate = read(path)["yaw_rate"]
+    assert yaw_rate.unit == "rad/s"
+    np.testing.assert_allclose(yaw_rate.values, [np.pi, -np.pi / 2], rtol=1e-15)
+
+
+def test_a_channel_that_is_not_in_the_catalogue_keeps_its_unit(path: Path) -> None:
+    foreign(path, [scalar(3.0)], unit="kN·m", topic="/torque/shaft")
+    torque = read(path)["torque"]
+    assert (torque.unit, torque.source, torque.values[0]) == ("kN·m", "shaft", 3.0)
+
+
+@pytest.mark.parametrize("unit", ["deg/sec", "m", None])
+def test_a_unit_nobody_can_convert_is_an_error_that_names_all(path: Path, unit: str | None) -> None:
+    foreign(path, [scalar(1.0)], unit=unit)
+    with pytest.raises(LogError) as caught:
+        read(path)
+    message = str(caught.value)
+    assert message.startswith("channel 'yaw_rate' should be in rad/s: ")
+    assert repr(unit or "1") in message
+    assert message.endswith(str(path))
+    assert unit != "deg/sec" or "did you mean 'deg/s'?" in message
+
+
+def test_a_message_without_its_value_is_not_measured(path: Path) -> None:
+    foreign(path, [scalar(1.0), b"", scalar(2.0)])
+    np.testing.assert_array_equal(read(path)["yaw_rate"].values, [1.0, np.nan, 2.0])
+
+
+def test_a_message_of_the_usual_length_with_another_field_is_not_taken_for_it(path: Path) -> None:
+    foreign(path, [scalar(1.0), scalar(9.0, tag=0x11)])
+    np.testing.assert_array_equal(read(path)["yaw_rate"].values, [1.0, np.nan])
+
+
+def test_a_message_that_is_none_is_an_error(path: Path) -> None:
+    foreign(path, [scalar(1.0), b"\x09\x00"])
+    with pytest.raises(LogError, match=r"'yaw_rate' holds messages that are no shiplog\.Scalar"):
+        read(path)
+
+
+def test_a_file_from_the_future_asks_for_a_newer_shiplog(path: Path) -> None:
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        writer.add_metadata("shiplog", {"format_version": "2"})
+        writer.finish()
+    with pytest.raises(LogError, match="format 2, this shiplog reads format 1; install a newer"):
+        read(path)
+
+
+def test_times_beyond_the_signed_range_do_not_crash(path: Path) -> None:
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = schema_for(())
+        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        for topic, data in (("/a/b", scalar(1.0)), ("/c/d", b"")):
+            channel_id = writer.register_channel(topic, "protobuf", schema_id)
+            writer.add_message(channel_id, 2**64 - 1, data, 2**63)
+        writer.finish()
+    assert [len(c) for c in read(path)] == [1, 1]
+
+
+# -- what is no log
+
+
+@pytest.mark.parametrize(
+    ("contents", "says"),
+    [
+        (b"", "the file is empty"),
+        (b"\x89MCA", "not an MCAP file"),
+        (b"time,yaw_rate\n0,1\n", "not an MCAP file; tables are read by `shiplog convert`"),
+    ],
+)
+def test_what_is_no_mcap_is_refused_by_name(path: Path, contents: bytes, says: str) -> None:
+    path.write_bytes(contents)
+    with pytest.raises(LogError, match=rf"{says}.*trial\.mcap"):
+        read(path)
+
+
+def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"no such file: .*nowhere"):
+        read(tmp_path / "nowhere")
+    with pytest.raises(LogError, match="a folder, not a log"):
+        read(tmp_path)
+
+
+def test_the_magic_alone_is_an_unfinished_log_of_nothing(path: Path) -> None:
+    path.write_bytes(b"\x89MCAP0\r\n")
+    log = read(path)
+    assert log.channels == ()
+    assert len(log.warnings) == 1
+    assert "was not finished" in log.warnings[0]
+
+
+# -- damage
+
+
+def test_an_unfinished_flushed_file_is_read_whole(path: Path) -> None:
+    held, data = flushed(path)
+    (end,) = (start for opcode, start, _ in top_level(data) if opcode == Opcode.DATA_END)
+    path.write_bytes(data[:end])
+    log = read(path)
+    assert samples(log) == samples(held)
+    assert log.metadata["place"] == "Neva"
+    assert len(log.warnings) == 1
+    assert "was not finished" in log.warnings[0]
+    assert "its 1000 whole samples were read" in log.warnings[0]
+    assert not log.data_lost
+
+
+def kept_at_least(data: bytes, cut: int, compression: str) -> int:
+    """How many whole messages a plain decompressor finds before the cut."""
+    whole = 0
+    for start, end in chunks(data):
+        body = start + 9 + 32 + len(compression) + 8
+        content = data[body : min(end, cut)] if cut > body else b""
+        if compression == "zstd":
+            content = zstandard.ZstdDecompressor().decompressobj().decompress(content)
+        at = 0
+        while at + 9 <= len(content):
+            opcode, length = struct.unpack_from("<BQ", content, at)
+            at += 9 + length
+            whole += opcode == Opcode.MESSAGE and at <= len(content)
+    return whole
+
+
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.NONE])
+def test_a_cut_anywhere_keeps_every_whole_message_before_it(
+    path: Path, compression: CompressionType
+) -> None:
+    # values of every length of zeros would blur where an uncompressed file really ends
+    values = np.random.default_rng(0).normal(size=12_000)
+    at = START + np.arange(12_000)
+    held = Channel("yaw_rate", "gyro", "rad/s", at, at, values)
+    data = written(path, held, compression=compression, chunk_size=1 << 18).read_bytes()
+    assert len(chunks(data)) >= 2
+    name = "zstd" if compression == CompressionType.ZSTD else ""
+    edges = [edge + d for pair in chunks(data) for edge in pair for d in (-1, 0, 1, 9, 41, 60)]
+    cuts = [*edges, *np.random.default_rng(1).integers(8, len(data), 60).tolist()]
+    for cut in sorted({c for c in cuts if 8 <= c < len(data)}):
+        path.write_bytes(data[:cut])
+        log = read(path)
+        yaw_rate = log.get("yaw_rate")
+        count = 0 if yaw_rate is None else len(yaw_rate)
+        assert count == kept_at_least(data, cut, name), cut
+        if yaw_rate is not None:
+            np.testing.assert_array_equal(yaw_rate.values, values[:count])
+            np.testing.assert_array_equal(yaw_rate.measured_ns, at[:count])
+        assert any("was not finished" in warning for warning in log.warnings)
+        assert log.data_lost == (cut not in {end for _, _, end in top_level(data)})
+
+
+@given(ANYWHERE, st.sampled_from([0, 1, 4096]))
+@settings(derandomize=True, deadline=None, max_examples=150)
+def test_zeros_from_any_point_on_lose_what_follows_and_invent_nothing(
+    damaged: tuple[TrialLog, bytes, Path], where: float, zeros: int
+) -> None:
+    held, whole, path = damaged
+    cut = within(where, 8, len(whole))
+    path.write_bytes(whole[:cut] + bytes(zeros or len(whole) - cut))
+    log = read(path)
+    assert is_part_of(log, held)
+    assert log.warnings
+    kept = sum(cut >= end for _, end in chunks(whole))
+    assert all(len(c) >= 100 * kept for c in log)
+    assert not kept or len(log.channels) == 2
+
+
+@pytest.fixture(scope="module")
+def damaged(tmp_path_factory: pytest.TempPathFactory) -> tuple[TrialLog, bytes, Path]:
+    path = tmp_path_factory.mktemp("damaged") / "trial.mcap"
+    return *flushed(path), path
+
+
+def is_part_of(log: TrialLog, held: TrialLog) -> bool:
+    """Whether a log holds nothing but samples of the other, each as often and in that order."""
+    told = samples(held)
+    for topic, found in samples(log).items():
+        rest = iter(told.get(topic, []))
+        if not all(sample in rest for sample in found):
+            return False
+    return True
+
+
+def within(fraction: float, low: int, high: int) -> int:
+    return low + int(fraction * (high - low))
+
+
+def flipped(data: bytes, bit: int) -> bytes:
+    changed = bytearray(data)
+    changed[bit // 8] ^= 1 << bit % 8
+    return bytes(changed)
+
+
+@given(ANYWHERE, ANYWHERE, st.booleans())
+@settings(derandomize=True, deadline=None, max_examples=250)
+def test_a_bit_flipped_anywhere_before_the_end_of_the_data_is_noticed_and_invents_nothing(
+    damaged: tuple[TrialLog, bytes, Path],
+    record: float,
+    where: float,
+    in_its_head: bool,
+) -> None:
+    held, whole, path = damaged
+    opcodes = [opcode for opcode, _, _ in top_level(whole)]
+    _, start, end = top_level(whole)[within(record, 0, opcodes.index(Opcode.DATA_END))]
+    if in_its_head:  # where the least is protected
+        end = min(end, start + 60)
+    path.write_bytes(flipped(whole, within(where, 8 * start, 8 * end)))
+    log = _read_or_refused(path)
+    if log is not None:
+        assert is_part_of(log, held)
+        assert log.warnings
+        assert log.data_lost
+
+
+def test_a_bit_flipped_in_a_message_costs_its_chunk_and_no_other(path: Path) -> None:
+    held, data = flushed(path)
+    start, end = chunks(data)[2]
+    path.write_bytes(flipped(data, 8 * (start + end) // 2))
+    log = read(path)
+    assert samples(log) == {t: told[:200] + told[300:] for t, told in samples(held).items()}
+    (warning,) = log.warnings
+    assert warning.startswith("lost what was received 2023-11-14T")
+    assert "damaged chunk" in warning
+
+
+def test_a_damaged_first_chunk_does_not_cost_the_others(path: Path) -> None:
+    held, data = flushed(path)
+    _, end = chunks(data)[0]
+    path.write_bytes(flipped(data, 8 * (end - 20)))
+    log = read(path)
+    assert samples(log) == {topic: told[100:] for topic, told in samples(held).items()}
+    assert len(log.warnings) == 1
+
+
+def test_samples_that_nothing_describes_any_more_are_counted(path: Path) -> None:
+    _, data = flushed(path)
+    _, end = chunks(data)[0]
+    (data_end,) = (begin for opcode, begin, _ in top_level(data) if opcode == Opcode.DATA_END)
+    path.write_bytes(flipped(data, 8 * (end - 20))[:data_end])
+    log = read(path)
+    assert log.channels == ()
+    assert "lost 800 samples: nothing describes their channel" in log.warnings[1]
+
+
+@given(ANYWHERE)
+@settings(derandomize=True, deadline=None, max_examples=120)
+def test_a_bit_flipped_in_the_summary_is_noticed_and_costs_no_sample(
+    damaged: tuple[TrialLog, bytes, Path], where: float
+) -> None:
+    held, whole, path = damaged
+    first = next(end for opcode, _, end in top_level(whole) if opcode == Opcode.DATA_END)
+    path.write_bytes(flipped(whole, within(where, 8 * first, 8 * len(whole))))
+    log = read(path)
+    assert [samples(TrialLog("t", (c,))) for c in log if len(c)] == [
+        samples(TrialLog("t", (c,))) for c in held
+    ]
+    assert log.warnings
+
+
+def test_an_index_that_names_a_message_twice_is_not_believed(path: Path) -> None:
+    held, data = flushed(path)
+    indexes = [r for r in top_level(data) if r[0] == Opcode.MESSAGE_INDEX]
+    _, start, _ = indexes[4]
+    entry = start + 9 + 6
+    changed = bytearray(data)
+    changed[entry + 8 : entry + 16] = changed[entry + 24 : entry + 32]
+    path.write_bytes(bytes(changed))
+    log = read(path)
+    assert samples(log) == samples(held)
+    assert any("checksum of its data is wrong" in warning for warning in log.warnings)
+
+
+def test_an_index_of_another_channel_is_not_believed(path: Path) -> None:
+    held, data = flushed(path)
+    indexes = [r for r in top_level(data) if r[0] == Opcode.MESSAGE_INDEX]
+    changed = bytearray(data)
+    for _, start, _ in indexes[4:6]:
+        changed[start + 9] ^= 3  # channels 1 and 2 change places
+    path.write_bytes(bytes(changed))
+    assert samples(read(path)) == samples(held)
+
+
+@pytest.mark.parametrize("noise", [bytes, lambda n: np.random.default_rng(0).bytes(n)])
+def test_whatever_follows_the_magic_is_read_or_refused(
+    path: Path, noise: Callable[[int], bytes]
+) -> None:
+    for opcode in range(256):
+        for length in (0, 4, 8, 40, 100):
+            for body in (noise(length), b"\xff" * length):
+                record = struct.pack("<BQ", opcode, length) + body
+                path.write_bytes(b"\x89MCAP0\r\n" + record + noise(20))
+                _read_or_refused(path)
+
+
+def test_reading_leaves_the_file_free_to_be_replaced_or_removed(path: Path) -> None:
+    write(TrialLog("t", (channel("speed", 1000),)), path)
+    log = read(path)
+    before = samples(log)
+    path.write_bytes(b"other")
+    path.unlink()
+    assert samples(log) == before

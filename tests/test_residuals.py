@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from analysis.residuals import judge, whiteness
+
+
+def noises(count: int = 300, length: int = 2000) -> np.ndarray:
+    return np.random.default_rng(1).standard_normal((count, length))
+
+
+def test_p_values_of_white_noise_are_evenly_spread() -> None:
+    p = [whiteness(noise) for noise in noises()]
+    assert kstest(p, "uniform").pvalue > 0.01
+
+
+def test_noise_whose_strength_changes_is_still_white() -> None:
+    strength = np.abs(np.sin(np.arange(2000) / 100))
+    p = np.array([whiteness(noise * strength) for noise in noises()])
+    assert kstest(p, "uniform").pvalue > 0.01
+
+
+def test_missing_samples_do_not_colour_white_noise() -> None:
+    gaps = noises()
+    gaps[:, 500:700] = np.nan
+    gaps[:, ::7] = np.nan
+    assert kstest([whiteness(noise) for noise in gaps], "uniform").pvalue > 0.01
+
+
+def test_a_slow_sine_far_below_the_noise_is_found() -> None:
+    sine = 0.4 * np.sin(np.arange(2000) / 100)
+    assert max(whiteness(noise + sine) for noise in noises(20)) < 0.01
+
+
+def test_a_first_order_process_is_not_white() -> None:
+    for noise in noises(20):
+        coloured = noise.copy()
+        for k in range(1, len(noise)):
+            coloured[k] += 0.2 * coloured[k - 1]
+        assert whiteness(coloured) < 0.01
+
+
+def test_too_few_samples_give_no_verdict() -> None:
+    assert np.isnan(whiteness(np.array([1.0, -1.0, 2.0])))
+
+
+def test_noise_larger_than_assumed_is_not_consistent() -> None:
+    noise = noises(1)[0]
+    right = judge("yaw_rate", "rad/s", noise, np.ones(2000))
+    assert right.consistent
+    assert right.normalised_squared == pytest.approx(np.mean(noise**2))
+    assert right.rms == pytest.approx(np.sqrt(np.mean(noise**2)))
+    assert not judge("yaw_rate", "rad/s", noise, np.full(2000, 0.9)).consistent
+    assert not judge("yaw_rate", "rad/s", noise, np.full(2000, 1.1)).consistent
+
+
+def test_only_what_was_measured_is_counted() -> None:
+    noise = noises(1)[0]
+    noise[::2] = np.nan
+    assert judge("speed", "m/s", noise, np.ones(2000)).count == 1000
