@@ -2,8 +2,10 @@
 
 import os
 from collections.abc import Callable
+from pathlib import Path
 
-from shiplog.files import replacing
+from shiplog.errors import ShiplogError
+from shiplog.files import cannot_write
 from shiplog.writer import LogWriter
 
 from .source import Source
@@ -17,20 +19,29 @@ def record(
 ) -> int:
     """Write all that `source` yields to `path`; return the number of samples.
 
-    `on_slab` is told the samples written so far. Ctrl-C ends the recording, not the log: what was
-    received until then is a finished file. After any other error nothing stands under `path`.
+    `on_slab` is told the samples written so far. While recording, the log grows beside its final
+    name with `.part` behind it, readable up to the last slab even if the process is killed. Ctrl-C
+    ends the recording, not the log. If the source fails, what was received stays in the `.part`
+    file, finished, and the error says so; `path` then is as it was before.
     """
+    final = Path(path)
+    part = final.with_name(final.name + ".part")
+    if final.is_dir():
+        raise cannot_write(final, IsADirectoryError())
     count = 0
-    with (
-        replacing(path) as part,
-        LogWriter(part, metadata=source.metadata, vessel_toml=source.vessel_toml) as writer,
-    ):
-        try:
+    try:
+        with LogWriter(part, metadata=source.metadata, vessel_toml=source.vessel_toml) as writer:
             for slab in source.slabs():
                 writer.write(*slab)
                 writer.flush()
                 count += sum(map(len, slab))
                 on_slab(count)
-        except KeyboardInterrupt:
-            pass
+    except KeyboardInterrupt:
+        pass
+    except ShiplogError as error:
+        if count:
+            raise ShiplogError(f"{error}; the {count} samples until then are in {part}") from error
+        part.unlink(missing_ok=True)
+        raise
+    part.replace(final)
     return count

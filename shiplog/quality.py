@@ -185,8 +185,9 @@ def rudder_sign_warning(log: TrialLog) -> str | None:
     if effect is None or effect[0] > -SIGNIFICANT * effect[1]:
         return None
     return (
-        f"a positive {rudder.topic} turns the bow to port, by {-effect[0] / effect[1]:.0f} "
-        f"standard errors; set the rudder's sign = -1 in the layout, or turn it in the recorder"
+        f"{rudder.topic}: its sign is contrary, positive turns the bow to port, "
+        f"by {-effect[0] / effect[1]:.0f} standard errors; "
+        "set the rudder's sign = -1 in the layout, or turn it in the recorder"
     )
 
 

@@ -59,23 +59,6 @@ def bias(name: str, offset: float) -> Fault:
     return _to(name, lambda channel: replace(channel, values=channel.values + offset))
 
 
-# each with the channel that a check must name first
-FAULTS: dict[str, tuple[Fault, str]] = {
-    "dropout of the gyro": (dropout("yaw_rate", 100.0, 5.0), "/yaw_rate/measured"),
-    "dropout of the log": (dropout("speed", 100.0, 5.0), "/speed/measured"),
-    "dropout of the rudder": (dropout("rudder", 100.0, 5.0), "/rudder/measured"),
-    "one lost sample": (dropout("yaw_rate", 100.0, 0.1), "/yaw_rate/measured"),
-    "frozen gyro": (freeze("yaw_rate", 100.0, 3.0), "/yaw_rate/measured"),
-    "frozen log": (freeze("speed", 100.0, 3.0), "/speed/measured"),
-    "spike of the gyro": (spike("yaw_rate", 150.0, radians(0.01)), "/yaw_rate/measured"),
-    "spike of the rpm": (spike("rpm", 150.0, 1.0), "/rpm/measured"),
-    "clock jump of the gyro": (clock_jump("yaw_rate", 200.0, 0.3), "/yaw_rate/measured"),
-    "clock jump of the rudder": (clock_jump("rudder", 200.0, 0.3), "/rudder/measured"),
-    "biased gyro": (bias("yaw_rate", radians(1e-4)), "/yaw_rate/measured"),
-    "biased rudder": (bias("rudder", radians(1e-4)), "/rudder/measured"),
-}
-
-
 def _to(name: str, change: Callable[[Channel], Channel]) -> Fault:
     def fault(log: TrialLog) -> TrialLog:
         changed = tuple(change(c) if c.name == name else c for c in log.channels)
@@ -95,3 +78,20 @@ def _kept(channel: Channel, kept: np.ndarray) -> Channel:
         received_ns=channel.received_ns[kept],
         values=channel.values[kept],
     )
+
+
+# each with the channel that a check must name first
+FAULTS: dict[str, tuple[Fault, str]] = {
+    "dropout of the gyro": (dropout("yaw_rate", 100.0, 5.0), "/yaw_rate/measured"),
+    "dropout of the log": (dropout("speed", 100.0, 5.0), "/speed/measured"),
+    "dropout of the rudder": (dropout("rudder", 100.0, 5.0), "/rudder/measured"),
+    "one lost sample": (dropout("yaw_rate", 100.0, 0.1), "/yaw_rate/measured"),
+    "frozen gyro": (freeze("yaw_rate", 100.0, 3.0), "/yaw_rate/measured"),
+    "frozen log": (freeze("speed", 100.0, 3.0), "/speed/measured"),
+    "spike of the gyro": (spike("yaw_rate", 150.0, radians(0.01)), "/yaw_rate/measured"),
+    "spike of the rpm": (spike("rpm", 150.0, 1.0), "/rpm/measured"),
+    "clock jump of the gyro": (clock_jump("yaw_rate", 200.0, 0.3), "/yaw_rate/measured"),
+    "clock jump of the rudder": (clock_jump("rudder", 200.0, 0.3), "/rudder/measured"),
+    "biased gyro": (bias("yaw_rate", radians(1e-4)), "/yaw_rate/measured"),
+    "biased rudder": (bias("rudder", radians(1e-4)), "/rudder/measured"),
+}

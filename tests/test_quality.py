@@ -244,7 +244,7 @@ def test_a_contrary_rudder_is_found_in_a_zigzag_and_the_right_one_is_not(seed: i
     assert rudder_sign_warning(log) is None
     warning = rudder_sign_warning(contrary(log))
     assert warning is not None
-    assert "a positive /rudder/a turns the bow to port" in warning
+    assert "/rudder/a: its sign is contrary, positive turns the bow to port" in warning
     assert "sign = -1" in warning
     assert "\n" not in warning
 

@@ -41,7 +41,18 @@ def test_ctrl_c_ends_the_recording_and_keeps_what_came(tmp_path: Path) -> None:
     assert not log.warnings
 
 
-def test_a_source_that_fails_leaves_nothing_under_the_final_name(tmp_path: Path) -> None:
-    with pytest.raises(ShiplogError, match="cable"):
+def test_a_source_that_fails_loses_nothing_and_leaves_the_final_name_alone(tmp_path: Path) -> None:
+    (tmp_path / "a.mcap").write_bytes(b"what stood there")
+    with pytest.raises(ShiplogError, match=r"cable is out; the 20 samples .* in .*a\.mcap\.part"):
         record(Sensor(ShiplogError("the cable is out")), tmp_path / "a.mcap")
+    assert (tmp_path / "a.mcap").read_bytes() == b"what stood there"
+    log = read(tmp_path / "a.mcap.part")
+    assert len(log["yaw_rate"]) == 20
+    assert not log.warnings
+
+
+@pytest.mark.parametrize("place", ["", "no/such/folder/a.mcap"])
+def test_a_place_that_cannot_be_written_is_said_and_left_clean(tmp_path: Path, place: str) -> None:
+    with pytest.raises(ShiplogError, match="cannot write"):
+        record(Sensor(), tmp_path / place)
     assert list(tmp_path.iterdir()) == []

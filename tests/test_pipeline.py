@@ -1,0 +1,182 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import as_log
+from faults import bias, dropout, freeze, spike
+
+from analysis.pipeline import NEEDED, STEPS, Analysis, analyse
+from recorders.sensors import suite
+from recorders.simulate import START_NS, SimulatedTrial, simulate
+from shiplog import LogError, TrialLog, Vessel, VesselError
+from shiplog.foreign import read_table
+from shiplog.layout import load_layout
+
+LAYOUTS = Path(__file__).parents[1] / "sample_data" / "layouts"
+
+
+def without(log: TrialLog, name: str) -> TrialLog:
+    return replace(log, channels=tuple(c for c in log.channels if c.name != name))
+
+
+def test_the_steps_are_told_in_their_order(zigzag_log: TrialLog) -> None:
+    told: list[str] = []
+    analyse(zigzag_log, on_step=told.append)
+    assert tuple(told) == STEPS
+
+
+def test_a_log_replays_alone_with_the_model_it_carries(
+    zigzag_analysis: Analysis, vessel: Vessel
+) -> None:
+    assert zigzag_analysis.model_origin == "carried by the log"
+    assert zigzag_analysis.vessel.coefficients == vessel.coefficients
+
+
+def test_a_vessel_given_goes_before_the_one_carried(zigzag_log: TrialLog, vessel: Vessel) -> None:
+    other = replace(vessel, name="another")
+    assert analyse(zigzag_log, other).vessel is other
+
+
+def test_without_a_model_a_first_one_is_fitted_and_said(zigzag_log: TrialLog) -> None:
+    found = analyse(replace(zigzag_log, vessel_toml=None))
+    assert "fitted to this log" in found.model_origin
+    assert found.noise.tuned
+    yaw = found.estimates.states[:, 0]
+    assert np.nanstd(found.signals["yaw_rate"] - yaw) < 1.3 * found.noise.measurement_std[0]
+
+
+@pytest.mark.parametrize("name", NEEDED)
+def test_a_missing_channel_is_named_with_those_there_are(zigzag_log: TrialLog, name: str) -> None:
+    with pytest.raises(LogError, match=rf"no channel '{name}' in zigzag\.mcap; it has"):
+        analyse(without(zigzag_log, name))
+
+
+@pytest.mark.parametrize("name", NEEDED)
+def test_a_channel_of_one_sample_is_named(zigzag_log: TrialLog, name: str) -> None:
+    cut = tuple(
+        replace(
+            c, measured_ns=c.measured_ns[:1], received_ns=c.received_ns[:1], values=c.values[:1]
+        )
+        if c.name == name
+        else c
+        for c in zigzag_log
+    )
+    with pytest.raises(LogError, match=f"'?{name}'?.*one sample"):
+        analyse(replace(zigzag_log, channels=cut))
+
+
+@pytest.mark.parametrize("fill", [np.inf, -np.inf])
+def test_an_infinite_value_is_named_with_its_place(zigzag_log: TrialLog, fill: float) -> None:
+    with pytest.raises(LogError, match=r"yaw_rate.*infin"):
+        analyse(spike("yaw_rate", 100.0, fill)(zigzag_log))
+
+
+def test_times_that_run_backwards_are_named_with_the_remedy(zigzag_log: TrialLog) -> None:
+    swapped = []
+    for c in zigzag_log:
+        measured = c.measured_ns.copy()
+        if c.name == "yaw_rate":
+            measured[[100, 200]] = measured[[200, 100]]
+        swapped.append(replace(c, measured_ns=measured))
+    with pytest.raises(LogError, match=r"yaw_rate.*backwards.*shiplog convert"):
+        analyse(replace(zigzag_log, channels=tuple(swapped)))
+
+
+def test_nan_is_not_measured_and_said(zigzag_log: TrialLog) -> None:
+    found = analyse(spike("yaw_rate", 100.0, np.nan)(zigzag_log))
+    assert np.isnan(found.estimates.innovations[1000, 0])
+    assert np.isfinite(found.estimates.states).all()
+    assert any("yaw_rate" in w and "not measured" in w for w in found.warnings)
+
+
+def test_a_channel_of_nothing_but_nan_is_refused(zigzag_log: TrialLog) -> None:
+    with pytest.raises(LogError, match="speed"):
+        analyse(bias("speed", np.nan)(zigzag_log))
+
+
+def test_a_dropout_is_predicted_through_and_said(
+    zigzag: SimulatedTrial, zigzag_log: TrialLog
+) -> None:
+    found = analyse(dropout("yaw_rate", 200.0, 30.0)(zigzag_log))
+    assert np.isnan(found.signals["yaw_rate"][2001:2299]).all()
+    truth = zigzag.trajectory.at(found.signals.time_secs)["yaw_rate"]
+    away = np.abs(found.estimates.states[:, 0] - truth)
+    assert np.all(away[2000:2300] < 4 * found.estimates.stds[2000:2300, 0])
+    assert any("yaw_rate" in w and "gap" in w for w in found.warnings)
+
+
+def test_a_silent_rudder_is_held_and_said(zigzag_log: TrialLog) -> None:
+    found = analyse(dropout("rudder", 200.0, 30.0)(zigzag_log))
+    assert np.isfinite(found.estimates.states).all()
+    assert any(w.startswith("rudder: not measured for") for w in found.warnings)
+
+
+def test_a_frozen_gyro_is_said(zigzag_log: TrialLog) -> None:
+    found = analyse(freeze("yaw_rate", 100.0, 60.0)(zigzag_log))
+    assert any("stuck" in w for w in found.warnings)
+
+
+def test_a_contrary_rudder_is_said(zigzag_log: TrialLog) -> None:
+    contrary = tuple(
+        replace(c, values=-c.values) if c.name == "rudder" else c for c in zigzag_log.channels
+    )
+    found = analyse(replace(zigzag_log, channels=contrary))
+    assert any("rudder" in w and "contrary" in w for w in found.warnings)
+
+
+def test_a_vessel_with_faults_in_the_log_is_refused_with_all_of_them(zigzag_log: TrialLog) -> None:
+    spoilt = replace(zigzag_log, vessel_toml="[yaw]\nT1 = -1\n[surge]\nf = nan\nq = 1\n")
+    with pytest.raises(VesselError, match=r"T1.*f must be finite.*surge\.q.*in zigzag\.mcap"):
+        analyse(spoilt)
+
+
+def test_a_model_that_runs_away_is_refused(zigzag_log: TrialLog, vessel: Vessel) -> None:
+    wild = replace(vessel, coefficients=vessel.coefficients._replace(b3=1e9, b1=10.0))
+    with pytest.raises(LogError, match="runs away"):
+        analyse(zigzag_log, wild)
+
+
+def test_channels_of_other_rates_and_jitter_replay_alike(vessel: Vessel) -> None:
+    settings = {
+        "yaw_rate.jitter_secs": 0.01,
+        "speed.rate_hz": 1.0,
+        "rudder.rate_hz": 25.0,
+        "rpm.rate_hz": 2.0,
+    }
+    trial = simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=suite("paper", settings))
+    found = analyse(as_log(trial), vessel)
+    offset = (found.signals.start_ns - START_NS) * 1e-9
+    truth = trial.trajectory.at(found.signals.time_secs + offset)
+    rms = np.sqrt(np.mean((found.estimates.states[:, 0] - truth["yaw_rate"]) ** 2))
+    assert rms < np.radians(0.0015)
+    assert np.isfinite(found.signals["speed"]).mean() == pytest.approx(0.1, abs=0.02)
+
+
+def test_the_order_of_the_channels_does_not_matter(
+    zigzag_log: TrialLog, zigzag_analysis: Analysis
+) -> None:
+    turned = analyse(replace(zigzag_log, channels=zigzag_log.channels[::-1]))
+    assert np.array_equal(turned.estimates.states, zigzag_analysis.estimates.states)
+
+
+KVLCC2 = Path(__file__).parents[2] / "shared" / "data" / "kvlcc2"
+RUNS = sorted(KVLCC2.glob("*/*.dat"))
+
+
+@pytest.mark.skipif(not RUNS, reason="the SIMMAN data are not in ../shared/data/kvlcc2")
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
+def test_every_real_run_of_the_kvlcc2_replays(run: Path) -> None:
+    layout = load_layout(LAYOUTS / f"simman_{run.parent.name}.toml")
+    found = analyse(read_table(run, layout))
+    assert "fitted to this log" in found.model_origin
+    # the filter follows what was measured, to a twentieth of the motion
+    for name, state in (("yaw_rate", 0), ("speed", 3)):
+        measured = found.signals[name]
+        away = np.nanstd(measured - found.estimates.states[:, state])
+        assert away < np.nanstd(measured) / 20
+    assert found.yaw.coefficients["a"].value < 0
+    assert found.yaw.coefficients["e"].value > 0
+    assert found.yaw.coefficients["e"].determined
+    assert found.surge.coefficients["f"].determined
+    assert not any("contrary" in w for w in found.warnings)

@@ -1,0 +1,52 @@
+"""The sample data: each replays as its reference says, and tells the truth that lies beside it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.check import compare, logs_in
+from analysis.pipeline import analyse
+from shiplog import load_vessel, read
+from shiplog.vessel import PRESETS
+
+SAMPLES = Path(__file__).parents[1] / "sample_data"
+LOGS = logs_in(SAMPLES)
+
+
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
+def test_every_sample_replays_as_its_reference(log: Path) -> None:
+    comparison = compare(log)
+    assert comparison.ok, str(comparison)
+
+
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
+def test_every_sample_is_filtered_nearer_to_its_truth(log: Path) -> None:
+    found, truth = analyse(read(log)), read(log.with_suffix(".truth.mcap"))
+    at = (truth["yaw_rate"].measured_ns - found.signals.start_ns) * 1e-9
+    inside = (at >= 0) & (at <= found.signals.time_secs[-1])
+    for name, state in (("yaw_rate", 0), ("speed", 3)):
+        times, values = found.signals.time_secs, found.estimates.states[:, state]
+        estimated = np.interp(at[inside], times, values) - truth[name].values[inside]
+        there = np.isfinite(found.signals[name])
+        true = np.interp(times[there], at, truth[name].values)
+        measured = found.signals[name][there] - true
+        better = 3 if "dropouts" not in log.name or name == "speed" else 1  # a bias stays
+        assert np.std(measured) / np.std(estimated) > better
+
+
+def test_the_samples_are_small_and_carry_all_that_is_promised() -> None:
+    names = {log.stem for log in LOGS}
+    assert {"turning_circle_35", "zigzag_20_20", "pseudo_random"} <= names
+    assert any(name.startswith("zigzag_10_10") for name in names)
+    for log in LOGS:
+        assert log.stat().st_size < 1_000_000
+        assert log.with_suffix(".ref.mcap").stat().st_size < 300_000
+        assert read(log).vessel_toml is not None
+
+
+def test_the_vessel_files_are_the_presets() -> None:
+    for name, text in PRESETS.items():
+        path = SAMPLES / "vessels" / f"{name}.toml"
+        assert path.read_text(encoding="utf-8") == text
+        assert load_vessel(path)[0].coefficients == load_vessel(name)[0].coefficients

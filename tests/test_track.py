@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+
+from analysis.track import EARTH_RADIUS, find_track
+from recorders.simulate import SimulatedTrial
+from shiplog import Channel, Signals, TrialLog, resample
+
+
+def test_recorded_positions_are_the_track(zigzag: SimulatedTrial, zigzag_log: TrialLog) -> None:
+    signals = resample(zigzag_log, channels=("yaw_rate", "heading"))
+    track = find_track(zigzag_log, signals, signals["yaw_rate"], signals["yaw_rate"])
+    assert track.origin == "positions recorded"
+    truth = zigzag.trajectory.at(np.arange(501.0))["position"]
+    assert np.column_stack((track.north, track.east)) == pytest.approx(truth, abs=1e-6)
+
+
+def test_without_positions_the_track_is_dead_reckoned(zigzag: SimulatedTrial) -> None:
+    channels = tuple(c for c in zigzag.channels if c.name != "position")
+    for left_out, origin in ((), "heading"), (("heading",), "yaw rate"):
+        log = TrialLog("x", tuple(c for c in channels if c.name not in left_out))
+        names = ("yaw_rate", "rudder", *(() if left_out else ("heading",)))
+        signals = resample(log, channels=names)
+        truth = zigzag.trajectory.at(signals.time_secs)
+        track = find_track(log, signals, truth["yaw_rate"], truth["speed"])
+        assert origin in track.origin
+        away = np.hypot(track.north - truth["position"][:, 0], track.east - truth["position"][:, 1])
+        assert away.max() < 5  # m, of four kilometres
+
+
+def test_positions_on_the_globe_become_metres() -> None:
+    stamps = np.arange(3) * 10**9
+    values = np.array([[60.0, 10.0, 0.0], [60.001, 10.0, 0.0], [60.001, 10.002, 0.0]])
+    fix = Channel(
+        "position", "gnss", "deg", stamps, stamps, values, ("latitude", "longitude", "altitude")
+    )
+    signals = Signals(0, 1.0, {"yaw_rate": np.zeros(3)})
+    track = find_track(TrialLog("x", (fix,)), signals, np.zeros(3), np.zeros(3))
+    metre = np.pi / 180 * EARTH_RADIUS
+    assert track.north == pytest.approx([0, 0.001 * metre, 0.001 * metre])
+    assert track.east == pytest.approx([0, 0, 0.001 * metre], rel=1e-3)
