@@ -108,7 +108,10 @@ def _solve(X: FloatArray, y: FloatArray, overlap: int) -> _Fit:
     values, stds = np.full(p, np.nan), np.full(p, np.nan)
     scale = np.linalg.norm(X, axis=0)
     kept = scale > 1e-12 * np.max(scale, initial=0.0)
-    if not kept.any() or len(y) <= 2 * p:
+    # rows overlap: what counts is how many of them could differ
+    independent = len(y) / (overlap * CORRELATED)
+    freedom = independent - int(kept.sum())
+    if not kept.any() or freedom <= 0 or len(y) < p:
         return _Fit(values, stds, np.inf)
     X = X[:, kept] / scale[kept]
     U, s, Vt = np.linalg.svd(X, full_matrices=False)
@@ -119,8 +122,6 @@ def _solve(X: FloatArray, y: FloatArray, overlap: int) -> _Fit:
     inverse = (Vt.T / s**2) @ Vt
     scores = _neighbours_sum(X * (y - X @ scaled)[:, None], overlap)
     covariance = inverse @ (scores.T @ scores / overlap) @ inverse
-    independent = max(len(y) / (overlap * CORRELATED), 1.0)
-    freedom = max(independent - int(kept.sum()), 0.5)
     values[kept] = scaled / scale[kept]
     stds[kept] = np.sqrt(np.diag(covariance) * independent / freedom) / scale[kept]
     return _Fit(values, stds, condition)

@@ -156,7 +156,8 @@ def sections(analysis: Analysis) -> tuple[Section, ...]:
 def markdown(analysis: Analysis) -> str:
     """The summary as a page of text."""
     blocks = [f"# {analysis.log.name}"]
-    for section in sections(analysis):
+    log, *found = sections(analysis)
+    for section in (*found, log):  # what was found first: a page is read from its top
         blocks += [f"## {section.title}", _markdown_table(section.columns, section.rows)]
         blocks += [f"*{remark}*" for remark in section.remarks]
     if analysis.warnings:
@@ -175,11 +176,13 @@ def _log_section(analysis: Analysis) -> Section:
     for channel in log:
         said = _channel(channel)
         rate = f"{said['rate_hz']:.3g} Hz" if said["rate_hz"] else ""
-        longest = f"longest {said['longest_gap_secs']:.1f} s" if said["gaps"] else ""
-        rows.append((channel.topic, f"{len(channel)}", rate, f"{said['gaps'] or ''}", longest))
+        gaps_said = "none"
+        if said["gaps"]:
+            gaps_said = f"{said['gaps']}, the longest {said['longest_gap_secs']:.1f} s"
+        rows.append((channel.topic, f"{len(channel)}", rate, gaps_said))
     start = np.datetime64(log.span_ns[0], "ns").astype("M8[s]")
     title = f"Log, {log.duration_secs:.0f} s from {start} UTC"
-    return Section(title, ("channel", "samples", "rate", "gaps", ""), tuple(rows))
+    return Section(title, ("channel", "samples", "rate", "gaps"), tuple(rows))
 
 
 def _filter_section(analysis: Analysis) -> Section:
@@ -217,15 +220,15 @@ def _disturbance_section(analysis: Analysis) -> Section:
     found = _disturbance(analysis)
     rows = []
     for label, key, scale, unit in (
-        ("yaw moment, as rudder", "yaw_as_rudder", degrees(1), "deg"),
-        ("yaw moment", "yaw", degrees(1) * 1e3, "0.001 deg/s³"),
-        ("surge force", "surge", 1e3, "mm/s²"),
+        ("yaw, as rudder", "yaw_as_rudder", degrees(1), "deg"),
+        ("yaw", "yaw", degrees(1) * 1e3, "0.001 deg/s³"),
+        ("surge", "surge", 1e3, "mm/s²"),
     ):
         course = found[key]
         values = [course[k] * scale for k in ("mean", "rms", "last", "sensor_noise_std")]
         rows.append((f"{label} [{unit}]", *(f"{value:.3g}" for value in values)))
-    columns = ("disturbance", "mean", "rms", "at the end", "std by sensor noise")
-    remark = "An error of the model counts as a disturbance."
+    columns = ("disturbance", "mean", "rms", "at the end", "std by noise")
+    remark = "An error of the model counts as a disturbance; the std is by sensor noise alone."
     return Section("Disturbance observed", columns, tuple(rows), (remark,))
 
 

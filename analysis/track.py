@@ -15,6 +15,7 @@ EARTH_RADIUS = 6_371_008.8  # m, mean
 class Track:
     """Positions in m from the first one."""
 
+    time_secs: FloatArray  # (k,) since the signals' start
     north: FloatArray  # (k,)
     east: FloatArray  # (k,)
     origin: str  # how it is known, in words
@@ -28,7 +29,7 @@ def find_track(log: TrialLog, signals: Signals, yaw_rate: FloatArray, speed: Flo
     """
     position = log.get("position")
     if position is not None and len(position) > 1:
-        return _recorded(position)
+        return _recorded(position, signals)
     if "heading" in signals and np.isfinite(signals["heading"]).sum() > 1:
         known = np.isfinite(signals["heading"])
         at = np.arange(len(signals))
@@ -39,13 +40,14 @@ def find_track(log: TrialLog, signals: Signals, yaw_rate: FloatArray, speed: Flo
         origin = "dead reckoning from yaw rate and speed ahead"
     north = np.cumsum(speed * np.cos(heading)) * signals.dt_secs
     east = np.cumsum(speed * np.sin(heading)) * signals.dt_secs
-    return Track(north - north[0], east - east[0], origin)
+    return Track(signals.time_secs, north - north[0], east - east[0], origin)
 
 
-def _recorded(position: Channel) -> Track:
+def _recorded(position: Channel, signals: Signals) -> Track:
     known = np.isfinite(position.values).all(axis=1)
     first, second = position.values[known, 0], position.values[known, 1]
     if position.fields == GEOGRAPHIC:
         second = np.radians(second) * EARTH_RADIUS * np.cos(np.radians(first[0]))
         first = np.radians(first) * EARTH_RADIUS
-    return Track(first - first[0], second - second[0], "positions recorded")
+    at = (position.measured_ns[known] - signals.start_ns) * 1e-9
+    return Track(at, first - first[0], second - second[0], "positions recorded")

@@ -14,7 +14,6 @@ from contextlib import contextmanager
 from importlib import import_module
 from math import radians
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from . import __version__
@@ -158,27 +157,31 @@ def _add_convert(verbs: Any) -> None:  # noqa: ANN401
 
 
 def _run_simulate(arguments: argparse.Namespace) -> int:
+    _require_ours("recorders")
+    from recorders.record import record
+    from recorders.sensors import suite
+    from recorders.simulate import simulate
+
     from .vessel import load_vessel
     from .writer import write
 
-    sensors, simulation = _sibling("recorders.sensors"), _sibling("recorders.simulate")
     vessel, text = load_vessel(arguments.vessel)
     with _progress() as tell:
         tell("sail and measure")
-        trial = simulation.simulate(
+        trial = simulate(
             vessel,
             arguments.manoeuvre,
             duration_secs=arguments.duration,
             seed=arguments.seed,
-            sensors=sensors.suite(
+            sensors=suite(
                 arguments.noise, _settings(arguments.sensor), angle_unit=vessel.angle_unit
             ),
-            gusts=tuple(_gust(text, simulation.Gust) for text in arguments.gust),
-            wave=_wave(arguments.wave, simulation.WaveMoment) if arguments.wave else None,
+            gusts=tuple(_gust(text) for text in arguments.gust),
+            wave=_wave(arguments.wave) if arguments.wave else None,
             vessel_toml=text,
         )
         tell("write")
-        count = _sibling("recorders.record").record(trial, arguments.output)
+        count = record(trial, arguments.output)
         if arguments.truth:
             write(trial.truth(), arguments.truth)
     print(f"{arguments.output}: {count} samples of {len(trial.channels)} channels")
@@ -207,52 +210,60 @@ def _run_info(arguments: argparse.Namespace) -> int:
 
 
 def _run_replay(arguments: argparse.Namespace) -> int:
+    _require_ours("analysis")
+    from analysis.pipeline import analyse
+    from analysis.summary import markdown, summarise
+
     from .reader import read
     from .vessel import load_vessel
 
-    pipeline, summary = _sibling("analysis.pipeline"), _sibling("analysis.summary")
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
     with _progress() as tell:
         tell("read")
         log = read(arguments.log)
-        analysis = pipeline.analyse(log, vessel, on_step=tell)
+        analysis = analyse(log, vessel, on_step=tell)
         tell("review")
-        view = _sibling("analysis.rerun_view")
-        view.write_review(analysis, output, text=summary.markdown(analysis))
+        from analysis.rerun_view import view_review, write_review
+
+        write_review(analysis, output, text=markdown(analysis))
     if arguments.json:
-        _write_json(summary.summarise(analysis), arguments.json)
+        _write_json(summarise(analysis), arguments.json)
     _print_tables(analysis, to_stderr=arguments.json == "-")
     _warn(analysis.warnings)
     print(f"review: {output} (open it with: rerun {output})", file=sys.stderr)
     if arguments.view:
-        view.view_review(analysis, text=summary.markdown(analysis))
+        view_review(analysis, text=markdown(analysis))
     return DATA_LOST if log.data_lost else FINE
 
 
 def _run_check(arguments: argparse.Namespace) -> int:
-    check = _sibling("analysis.check")
+    _require_ours("analysis")
+    from analysis.check import as_json, compare, logs_in, reference_path, update
+
     if arguments.update and os.environ.get("CI"):
         raise UsageError("references are not updated in CI; run it where somebody looks")
     comparisons = []
-    logs = check.logs_in(arguments.path)
+    logs = logs_in(arguments.path)
     with _progress() as tell:
         for log in logs:
             tell(log.name)
-            comparisons.append(check.compare(log))
+            comparisons.append(compare(log))
     for comparison in comparisons:
         print(comparison, file=sys.stderr if arguments.json == "-" else sys.stdout)
     if arguments.json:
-        _write_json([check.as_json(comparison) for comparison in comparisons], arguments.json)
+        _write_json([as_json(comparison) for comparison in comparisons], arguments.json)
     if arguments.update:
         for log in logs:
-            check.update(log)
-            print(f"updated: {check.reference_path(log)}", file=sys.stderr)
+            update(log)
+            print(f"updated: {reference_path(log)}", file=sys.stderr)
         return FINE
     for comparison in comparisons:
         if comparison.changed:
+            from analysis.check_view import write_overlay
+
             overlay = Path(f"{Path(comparison.name).stem}.check.rrd")
-            _sibling("analysis.check_view").write_overlay(comparison, overlay)
+            write_overlay(comparison, overlay)
             print(f"both, overlaid: {overlay}", file=sys.stderr)
     return FINE if all(comparison.ok for comparison in comparisons) else FAILURE
 
@@ -268,9 +279,8 @@ def _run_convert(arguments: argparse.Namespace) -> int:
     return DATA_LOST if log.data_lost else FINE
 
 
-def _sibling(name: str) -> ModuleType:
-    """A module of `recorders` or `analysis`: ours, not a folder of that name lying about."""
-    package = name.partition(".")[0]
+def _require_ours(package: str) -> None:
+    """Refuse a folder called `recorders` or `analysis` that hides shiplog's own."""
     home = Path(__file__).resolve().parents[1]
     found = import_module(package)
     where = Path(found.__file__ or next(iter(found.__path__))).resolve()
@@ -279,7 +289,6 @@ def _sibling(name: str) -> ModuleType:
             f"another package called {package!r} hides shiplog's own; "
             f"run from another folder or rename it: {where}"
         )
-    return import_module(name)
 
 
 @contextmanager
@@ -297,12 +306,15 @@ def _progress() -> Iterator["Callable[[str], None]"]:
 
 
 def _print_tables(analysis: "Analysis", *, to_stderr: bool) -> None:
+    from rich.box import SIMPLE
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(stderr=to_stderr, highlight=False)
-    for section in _sibling("analysis.summary").sections(analysis):
-        table = Table(title=section.title, title_justify="left", title_style="bold")
+    from analysis.summary import sections
+
+    console = Console(stderr=to_stderr, highlight=False, markup=False)  # [deg] is a unit
+    for section in sections(analysis):
+        table = Table(title=section.title, title_justify="left", title_style="bold", box=SIMPLE)
         for i, column in enumerate(section.columns):
             table.add_column(column, justify="left" if i == 0 else "right")
         for row in section.rows:
@@ -344,16 +356,20 @@ def _settings(texts: Sequence[str]) -> dict[str, float]:
 _NUMBER = r"([-+]?\d*\.?\d+(?:e[-+]?\d+)?)"
 
 
-def _gust(text: str, gust: "type[Gust]") -> "Gust":
+def _gust(text: str) -> "Gust":
+    from recorders.simulate import Gust
+
     match = re.fullmatch(rf"{_NUMBER}@{_NUMBER}(?:\+{_NUMBER})?", text)
     if not match:
         raise UsageError(f"--gust wants DEG@START[+LENGTH], such as 2@200+60, got {text!r}")
     angle, start, length = match.groups()
-    return gust(radians(float(angle)), float(start), *([float(length)] if length else []))
+    return Gust(radians(float(angle)), float(start), *([float(length)] if length else []))
 
 
-def _wave(text: str, wave: "type[WaveMoment]") -> "WaveMoment":
+def _wave(text: str) -> "WaveMoment":
+    from recorders.simulate import WaveMoment
+
     match = re.fullmatch(rf"{_NUMBER}@{_NUMBER}", text)
     if not match or float(match[2]) <= 0:
         raise UsageError(f"--wave wants DEG@PERIOD, such as 0.5@8, got {text!r}")
-    return wave(radians(float(match[1])), float(match[2]))
+    return WaveMoment(radians(float(match[1])), float(match[2]))

@@ -1,0 +1,326 @@
+"""The command line: each verb end to end, each bad input one line and its exit code."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from recorders.record import record
+from recorders.simulate import SimulatedTrial
+from shiplog import Channel, LogWriter, TrialLog, read, write
+from shiplog.cli import DATA_LOST, FAILURE, FINE, USAGE, main
+
+PROJECT = Path(__file__).parents[1]
+LAYOUTS = PROJECT / "sample_data" / "layouts"
+
+
+@pytest.fixture(autouse=True)
+def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def recorded(zigzag: SimulatedTrial, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recorded") / "zigzag.mcap"
+    record(zigzag, path)
+    return path
+
+
+def refusal(capsys: pytest.CaptureFixture[str], code: int, *arguments: object) -> str:
+    """The one line on stderr with which a verb refuses."""
+    before = set(Path.cwd().rglob("*"))
+    assert main([str(a) for a in arguments]) == code
+    said = capsys.readouterr()
+    assert said.out == ""
+    lines = said.err.strip().split("\n")
+    assert len(lines) == 1, said.err
+    assert lines[0].startswith("shiplog: ")
+    assert set(Path.cwd().rglob("*")) == before, "something half-written was left"
+    return lines[0]
+
+
+# ---- the verbs
+
+
+def test_simulate_replay_check_and_convert_end_to_end(capsys: pytest.CaptureFixture[str]) -> None:
+    simulate = "record simulate zigzag-10-10 --seed 5 --duration 200 -o trial.mcap --truth t.mcap"
+    assert main(simulate.split()) == FINE
+    assert "samples of 6 channels" in capsys.readouterr().out
+    assert main(["replay", "trial.mcap", "--json", "trial.json"]) == FINE
+    out = capsys.readouterr().out
+    assert "whiteness p" in out
+    assert "Disturbance observed" in out
+    assert "yaw_rate [deg/s]" in out
+    assert Path("trial.rrd").stat().st_size > 10_000
+    assert "coefficients" in json.loads(Path("trial.json").read_text())
+    assert main(["check", "trial.mcap"]) == FAILURE
+    assert main(["check", "trial.mcap", "--update"]) == FAILURE or Path("trial.ref.mcap").exists()
+    assert main(["check", "trial.mcap"]) == FINE
+    assert main(["convert", "trial.mcap", "trial.csv"]) == FINE
+    assert main(["convert", "trial.csv", "again.mcap"]) == FINE
+    first, again = read("trial.mcap"), read("again.mcap")
+    for one, other in zip(first, again, strict=True):
+        assert np.array_equal(one.values, other.values)
+        assert np.array_equal(one.measured_ns, other.measured_ns)
+        assert np.array_equal(one.received_ns, other.received_ns)
+    assert first.vessel_toml == again.vessel_toml
+
+
+def test_json_on_stdout_is_alone_there(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(recorded), "--json", "-", "-o", "z.rrd"]) == FINE
+    said = capsys.readouterr()
+    assert json.loads(said.out)["filter"]["speed"]["white"] is False
+    assert "NOT white" in said.err
+
+
+def test_a_changed_replay_is_red_and_laid_over_its_reference(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = read(recorded)
+    write(log, "z.mcap")
+    assert main(["check", "z.mcap", "--update"]) == FINE
+    changed = tuple(
+        Channel(c.name, c.source, c.unit, c.measured_ns, c.received_ns, c.values + 1e-6)
+        if c.name == "speed"
+        else c
+        for c in log
+    )
+    write(TrialLog("z", changed, {}, log.vessel_toml), "z.mcap")
+    capsys.readouterr()
+    assert main(["check", "z.mcap", "--json", "z.json"]) == FAILURE
+    said = capsys.readouterr().out.split("\n")
+    assert said[1].startswith("  /speed/measured: largest 1e-06")
+    assert Path("z.check.rrd").exists()
+    assert json.loads(Path("z.json").read_text())[0]["ok"] is False
+
+
+def test_ci_never_updates(
+    recorded: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CI", "true")
+    assert "not updated in CI" in refusal(capsys, USAGE, "check", recorded, "--update")
+
+
+def test_info_says_what_is_in_a_log(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(recorded)]) == FINE
+    out = capsys.readouterr().out
+    assert "/rudder/simulated" in out
+    assert "turns the bow to starboard" in out
+    assert "vessel.toml: attached" in out
+
+
+def test_a_gust_and_a_wave_are_put_into_the_simulation() -> None:
+    simulate = "record simulate turning-circle --duration 60 --noise none -o g.mcap --truth t.mcap"
+    assert main([*simulate.split(), "--gust=-2@20+10", "--wave=0.5@8"]) == FINE
+    moment = read("t.mcap")["yaw_disturbance"].values
+    assert moment[:160].mean() == pytest.approx(0, abs=2e-9)
+    assert moment[200:300].mean() < -1e-6
+    assert np.ptp(moment[400:]) > 2e-7
+
+
+def test_an_unfinished_log_replays_with_a_warning(
+    zigzag: SimulatedTrial, capsys: pytest.CaptureFixture[str]
+) -> None:
+    writer = LogWriter("cut.mcap", vessel_toml=zigzag.vessel_toml)
+    writer.write(*zigzag.channels)
+    writer.flush()
+    assert main(["replay", "cut.mcap"]) == FINE
+    assert "not finished" in capsys.readouterr().err
+    writer.close()
+
+
+def test_a_damaged_log_replays_but_says_that_data_were_lost(
+    zigzag: SimulatedTrial, capsys: pytest.CaptureFixture[str]
+) -> None:
+    writer = LogWriter("bad.mcap", vessel_toml=zigzag.vessel_toml)
+    for slab in zigzag.slabs():
+        for start in range(0, 5001, 1000):
+            cut = slice(start, start + 1000)
+            writer.write(
+                *(
+                    Channel(
+                        c.name, c.source, c.unit, c.measured_ns[cut], c.received_ns[cut],
+                        c.values[cut], c.fields,
+                    )
+                    for c in slab
+                )
+            )  # fmt: skip
+            writer.flush()
+    writer.close()
+    data = bytearray(Path("bad.mcap").read_bytes())
+    data[len(data) // 2] ^= 0x10
+    Path("bad.mcap").write_bytes(data)
+    assert main(["replay", "bad.mcap"]) == DATA_LOST
+    assert "damaged" in capsys.readouterr().err
+
+
+KVLCC2 = PROJECT.parent / "shared" / "data" / "kvlcc2"
+RUNS = sorted(KVLCC2.glob("*/*.dat"))
+
+
+@pytest.mark.skipif(not RUNS, reason="the SIMMAN data are not in ../shared/data/kvlcc2")
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
+def test_every_kvlcc2_run_is_converted_and_replayed_to_files_rerun_is_content_with(
+    run: Path,
+) -> None:
+    layout = LAYOUTS / f"simman_{run.parent.name}.toml"
+    assert main(["convert", str(run), "run.mcap", "--layout", str(layout)]) == FINE
+    assert main(["replay", "run.mcap", "-o", "run.rrd", "--json", "run.json"]) == FINE
+    rerun = Path(sys.executable).with_name("rerun")
+    for check in (["rrd", "verify", "run.rrd"], ["mcap", "check", "run.mcap"]):
+        done = subprocess.run([rerun, *check], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+    assert json.loads(Path("run.json").read_text())["model"]["origin"].startswith("a first model")
+
+
+# ---- bad input
+
+
+@pytest.mark.parametrize("verb", ["replay", "info", "check"])
+def test_what_is_no_log_is_refused_in_one_line(
+    verb: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("text.mcap").write_text("t,r\n0,1\n")
+    Path("empty.mcap").touch()
+    Path("folder.mcap").mkdir()
+    for name, said in (
+        ("text.mcap", "not an MCAP file"),
+        ("empty.mcap", "is empty"),
+        ("missing.mcap", "no such file"),
+    ):
+        if verb == "check":
+            assert main(["check", name]) == FAILURE
+            out = capsys.readouterr().out
+            assert said in out or "no reference" in out
+        else:
+            assert said in refusal(capsys, FAILURE, verb, name)
+
+
+def write_broken(name: str, broken: Channel | None, log: TrialLog) -> None:
+    channels = tuple(c for c in (broken if c.name == name else c for c in log) if c is not None)
+    write(TrialLog("x", channels, {}, log.vessel_toml), "x.mcap")
+
+
+def test_a_log_without_a_needed_channel_is_refused(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_broken("rudder", None, read(recorded))
+    line = refusal(capsys, FAILURE, "replay", "x.mcap")
+    assert "no channel 'rudder' in x.mcap; it has heading, position, rpm, speed, yaw_rate" in line
+
+
+def test_a_channel_of_one_sample_is_refused(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = read(recorded)
+    c = log["speed"]
+    one = Channel(c.name, c.source, c.unit, c.measured_ns[:1], c.received_ns[:1], c.values[:1])
+    write_broken("speed", one, log)
+    assert "one sample" in refusal(capsys, FAILURE, "replay", "x.mcap")
+
+
+def test_times_that_run_backwards_are_refused_and_the_remedy_works(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = read(recorded)
+    c = log["yaw_rate"]
+    back = Channel(c.name, c.source, c.unit, c.measured_ns[::-1], c.received_ns, c.values[::-1])
+    write_broken("yaw_rate", back, log)
+    line = refusal(capsys, FAILURE, "replay", "x.mcap")
+    assert "backwards" in line
+    assert "shiplog convert" in line
+    assert main(["convert", "x.mcap", "sorted.mcap"]) == FINE
+    assert main(["replay", "sorted.mcap"]) == FINE
+
+
+def test_infinity_is_refused(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = read(recorded)
+    c = log["yaw_rate"]
+    values = c.values.copy()
+    values[7] = np.inf
+    write_broken(
+        "yaw_rate", Channel(c.name, c.source, c.unit, c.measured_ns, c.received_ns, values), log
+    )
+    assert "infinit" in refusal(capsys, FAILURE, "replay", "x.mcap")
+
+
+def test_a_unit_nobody_knows_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("run.txt").write_text("0 1\n1 2\n")
+    Path("layout.toml").write_text(
+        'delimiter = "whitespace"\n[time]\ncolumn = 1\nunit = "s"\n'
+        '[speed]\ncolumn = 2\nunit = "knot"\n'
+    )
+    line = refusal(capsys, FAILURE, "convert", "run.txt", "o.mcap", "--layout", "layout.toml")
+    assert "'knot'" in line
+
+
+def test_a_vessel_file_with_three_faults_is_refused_with_all_three(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (PROJECT / "sample_data" / "vessels" / "table1.toml").read_text()
+    text = text.replace("T1 = 150.0", "T1 = -150.0").replace("alpha1", "alfa1")
+    Path("bad.toml").write_text(text.replace("h = 0.0004", "h = nan"))
+    for arguments in (
+        ["replay", recorded, "--vessel", "bad.toml"],
+        ["record", "simulate", "spiral", "--vessel", "bad.toml", "-o", "x.mcap"],
+    ):
+        line = refusal(capsys, FAILURE, *arguments)
+        for fault in ("T1 must be positive", "alfa1", "h must be finite"):
+            assert fault in line
+
+
+@pytest.mark.parametrize("output", ["missing/z.rrd", "."])
+def test_an_unwritable_output_is_refused(
+    recorded: Path, capsys: pytest.CaptureFixture[str], output: str
+) -> None:
+    assert "cannot write" in refusal(capsys, FAILURE, "replay", recorded, "-o", output)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "record simulate zigzg-20-20 -o x.mcap",
+        "record simulate spiral --duration -5 -o x.mcap",
+        "record simulate spiral --noise pink -o x.mcap",
+        "record simulate spiral --sensor yaw_rate.bias -o x.mcap",
+        "record simulate spiral --sensor yawrate.bias=1 -o x.mcap",
+        "record simulate spiral --gust much -o x.mcap",
+        "record simulate spiral --wave 1@0 -o x.mcap",
+        "convert x.mcap x.xlsx",
+    ],
+)
+def test_a_wrong_request_is_a_usage_error_in_one_line(
+    capsys: pytest.CaptureFixture[str], arguments: str
+) -> None:
+    refusal(capsys, USAGE, *arguments.split())
+
+
+def test_heavy_libraries_wait_for_the_verb_that_needs_them(recorded: Path) -> None:
+    code = (
+        "import sys; from shiplog.cli import main\n"
+        "try: main(sys.argv[1:])\n"
+        "except SystemExit: pass\n"
+        "print({'rerun', 'control', 'pandas', 'numba', 'scipy'} & set(sys.modules))"
+    )
+    for arguments in (["--help"], ["info", str(recorded)], ["replay", "--help"]):
+        done = subprocess.run(
+            [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True
+        )
+        assert done.stdout.strip().endswith("set()"), done.stdout
+
+
+def test_a_folder_that_hides_our_package_is_named(recorded: Path) -> None:
+    Path("analysis").mkdir()
+    Path("analysis/__init__.py").touch()
+    done = subprocess.run(
+        [sys.executable, "-m", "shiplog", "replay", str(recorded)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == FAILURE
+    assert "another package called 'analysis' hides shiplog's own" in done.stderr
+    assert "Traceback" not in done.stderr

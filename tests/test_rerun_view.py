@@ -1,0 +1,366 @@
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from itertools import pairwise
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+import shiplog
+from analysis.chart import draw_track
+from analysis.panels import (
+    POINTS,
+    Line,
+    Series,
+    coefficient_panels,
+    decimated,
+    equation_panels,
+    limits,
+    without_blanks,
+)
+from analysis.pipeline import Analysis, analyse
+from analysis.rerun_view import view_review, write_review
+from analysis.sliding import History
+from recorders.sensors import suite
+from recorders.simulate import simulate
+from shiplog.errors import ShiplogError
+from shiplog.vessel import load_vessel
+
+RERUN = shutil.which("rerun", path=str(Path(sys.executable).parent))
+GREY, BLUE = (140, 140, 140, 255), (66, 150, 245, 255)
+
+
+def replayed(**sensors: float) -> Analysis:
+    vessel, text = load_vessel("table1")
+    settings = {key.replace("__", "."): value for key, value in sensors.items()}
+    trial = simulate(
+        vessel,
+        "zigzag-20-20",
+        duration_secs=400,
+        seed=1,
+        sensors=suite("paper", settings),
+        vessel_toml=text,
+    )
+    return analyse(shiplog.TrialLog("zigzag_20_20.mcap", trial.channels, {}, text))
+
+
+@pytest.fixture(scope="module")
+def analysis() -> Analysis:
+    return replayed()
+
+
+@pytest.fixture(scope="module")
+def gappy() -> Analysis:
+    return replayed(yaw_rate__dropout=0.1, yaw_rate__dropout_secs=20)
+
+
+@pytest.fixture(scope="module")
+def review(analysis: Analysis, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("review") / "trial.rrd"
+    write_review(analysis, path, text="# What was found")
+    return path
+
+
+def columns(path: Path, entity: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Seconds, stamps and values, (n, k), of an entity."""
+    batches = [
+        chunk.to_record_batch()
+        for chunk in RrdReader(path).stream()
+        if chunk.entity_path == f"/{entity}" and not chunk.is_static
+    ]
+    assert batches, f"no entity {entity}"
+    at, stamps, values = (
+        np.concatenate([np.array(batch[name].to_pylist(), float) for batch in batches])
+        if name == "Scalars:scalars"
+        else np.concatenate([batch[name].to_numpy(zero_copy_only=False) for batch in batches])
+        for name in ("time", "stamp", "Scalars:scalars")
+    )
+    order = np.argsort(at, kind="stable")
+    return at[order].astype(np.int64) * 1e-9, stamps[order].astype(np.int64), values[order]
+
+
+def static(path: Path, entity: str, component: str) -> list[Any]:
+    for chunk in RrdReader(path).stream():
+        if chunk.entity_path == f"/{entity}" and chunk.is_static:
+            batch = chunk.to_record_batch()
+            if component in batch.schema.names:
+                return list(batch[component].to_pylist()[0])
+    pytest.fail(f"no {component} in {entity}")
+
+
+def layout(path: Path, component: str) -> list[Any]:
+    """What the blueprint says under one component, in no order."""
+    reader = RrdReader(path)
+    batches = (c.to_record_batch() for c in reader.stream(store=reader.blueprints()[0]))
+    return [row[0] for b in batches if component in b.schema.names for row in b[component].tolist()]
+
+
+def test_outputs_are_drawn_in_degrees_and_knots(review: Path, analysis: Analysis) -> None:
+    for name, state, scale in (("yaw_rate", 0, 180 / pi), ("speed", 3, 3600 / 1852)):
+        at, _, measured = columns(review, f"{name}/measured")
+        np.testing.assert_allclose(at, analysis.signals.time_secs, atol=1e-9)
+        np.testing.assert_allclose(measured[:, 0], analysis.signals[name] * scale, rtol=1e-12)
+        _, _, drawn = columns(review, f"{name}/state")
+        value, std = analysis.estimates.states[:, state], analysis.estimates.stds[:, state]
+        expected = np.column_stack((value + 2 * std, value - 2 * std, value)) * scale
+        np.testing.assert_allclose(drawn, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_inputs_disturbances_and_residuals(review: Path, analysis: Analysis) -> None:
+    _, _, rudder = columns(review, "rudder/measured")
+    np.testing.assert_allclose(rudder[:, 0], np.degrees(analysis.signals["rudder"]), rtol=1e-12)
+    _, _, rpm = columns(review, "rpm/measured")
+    np.testing.assert_array_equal(rpm[:, 0], analysis.signals["rpm"])
+    found = analysis.disturbance
+    _, _, yaw = columns(review, "disturbance_yaw/observed")
+    np.testing.assert_allclose(yaw[:, 0], np.degrees(found.yaw) * 1000, rtol=1e-12)
+    _, _, surge = columns(review, "disturbance_surge/observed")
+    np.testing.assert_allclose(surge[:, 0], found.surge * 1000, rtol=1e-12)
+    _, _, band = columns(review, "disturbance_surge/bounds")
+    np.testing.assert_allclose(band[0], np.array([2, -2]) * found.surge_std * 1000, rtol=1e-12)
+    _, _, residual = columns(review, "residual_speed/normalised")
+    expected = analysis.estimates.innovations[:, 1] / analysis.estimates.innovation_stds[:, 1]
+    np.testing.assert_allclose(residual[:, 0], expected, rtol=1e-12)
+
+
+def test_coefficients_stand_beside_the_model(review: Path, analysis: Analysis) -> None:
+    at, _, drawn = columns(review, "coefficient_d/window")
+    history = analysis.yaw.history
+    column = history.names.index("d")
+    shown = np.isfinite(drawn[:, 2])
+    value, std = history.values[shown, column], history.stds[shown, column]
+    np.testing.assert_allclose(at, history.time_secs, atol=1e-9)
+    assert shown.mean() > 0.5
+    np.testing.assert_allclose(drawn[shown, 2], value * 1e6, rtol=1e-9)
+    np.testing.assert_allclose(drawn[shown, 0] - drawn[shown, 2], 2 * std * 1e6, rtol=1e-6)
+    ends, _, model = columns(review, "coefficient_d/model")
+    np.testing.assert_allclose(model[:, 0], analysis.vessel.coefficients.d * 1e6)
+    np.testing.assert_allclose(ends, [0, analysis.signals.time_secs[-1]])
+
+
+def test_both_timelines_tell_the_same_instants(review: Path, analysis: Analysis) -> None:
+    at, stamps, _ = columns(review, "yaw_rate/state")
+    np.testing.assert_array_equal(stamps, analysis.signals.stamps_ns)
+    np.testing.assert_allclose((stamps - stamps[0]) * 1e-9, at, atol=1e-9)
+
+
+def test_measured_is_drawn_under_the_estimate(review: Path) -> None:
+    entities = {c.entity_path for c in RrdReader(review).stream() if c.entity_path.count("/") == 2}
+    drawn = sorted(entity for entity in entities if entity.startswith("/yaw_rate/"))
+    assert drawn == ["/yaw_rate/measured", "/yaw_rate/state"]  # Rerun's order: the last on top
+    assert static(review, "yaw_rate/state", "SeriesLines:names") == ["±2σ", "±2σ", "estimate"]
+    assert len(static(review, "yaw_rate/state", "SeriesLines:widths")) == 3
+
+
+def test_the_blueprint_holds_every_view(review: Path) -> None:
+    names = layout(review, "ViewBlueprint:display_name")
+    for expected in (
+        "yaw rate [deg/s]", "speed [kn]", "rudder [deg]", "rpm", "yaw disturbance [0.001 deg/s³]",
+        "surge disturbance [mm/s²]", "yaw rate residual [expected std]",
+        "speed residual [expected std]", "track, north up: positions recorded", "summary",
+    ):  # fmt: skip
+        assert expected in names
+    coefficients = sorted(name.split()[0] for name in names if "±" in name)
+    assert coefficients == ["a", "b1", "b2", "b3", "d", "e", "f", "g", "h"]
+    assert len(names) == 10 + 9
+    assert layout(review, "TimePanelBlueprint:timeline") == ["time"]
+
+
+def test_the_text_is_on_the_page(review: Path) -> None:
+    (page,) = static(review, "summary", "TextDocument:text")
+    assert page.endswith("# What was found")
+    assert static(review, "summary", "TextDocument:media_type") == ["text/markdown"]
+
+
+def test_name_and_properties(review: Path, analysis: Analysis) -> None:
+    assert static(review, "__properties", "RecordingInfo:name") == ["zigzag_20_20.mcap"]
+    start = static(review, "__properties", "RecordingInfo:start_time")
+    assert start == [analysis.signals.start_ns]
+    assert static(review, "__properties/trial", "vessel") == [analysis.vessel.name]
+
+
+def test_the_same_analysis_has_the_same_names(
+    review: Path, analysis: Analysis, gappy: Analysis, tmp_path: Path
+) -> None:
+    write_review(analysis, tmp_path / "again.rrd", text="")
+    write_review(gappy, tmp_path / "other.rrd", text="")
+    (first,), (again,), (other,) = (
+        RrdReader(path).recordings()
+        for path in (review, tmp_path / "again.rrd", tmp_path / "other.rrd")
+    )
+    assert (first.recording_id, first.application_id) == (again.recording_id, again.application_id)
+    assert other.recording_id != first.recording_id
+
+
+def test_rerun_finds_no_fault_with_the_file(review: Path) -> None:
+    assert RERUN
+    done = subprocess.run(
+        [RERUN, "rrd", "verify", str(review)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_gap_is_not_drawn(gappy: Analysis, tmp_path: Path) -> None:
+    path = tmp_path / "gappy.rrd"
+    write_review(gappy, path, text="")
+    known = np.isfinite(gappy.signals["yaw_rate"])
+    for entity in ("yaw_rate/measured", "residual_yaw_rate/normalised"):
+        at, _, values = columns(path, entity)
+        drawn = np.isfinite(values[:, 0])
+        np.testing.assert_allclose(at[drawn], gappy.signals.time_secs[known], atol=1e-9)
+        gaps = [
+            (a, b) for a, b in pairwise(gappy.signals.time_secs[known].tolist()) if b - a > 1.001
+        ]
+        assert gaps
+        for start, end in gaps:  # Rerun breaks a line at NaN
+            inside = (at > start + 1e-6) & (at < end - 1e-6)
+            assert inside.any()
+            assert not drawn[inside].any()
+
+
+def test_a_slow_sensor_is_one_line() -> None:
+    at = np.arange(100) * 0.1
+    values = np.full(100, np.nan)
+    values[::10] = 1.0
+    values[40:70] = np.nan
+    times, seen = without_blanks(at, values, 0.1)
+    assert np.isnan(seen).sum() == 0  # three seconds are four periods of this sensor
+    np.testing.assert_allclose(times, [0, 1, 2, 3, 7, 8, 9])
+    values[30:90] = np.nan
+    times, seen = without_blanks(at, values, 0.1)
+    assert np.isnan(seen).sum() == 1
+    assert 2 < times[np.isnan(seen)][0] < 9
+
+
+def test_nothing_measured_is_nothing_drawn() -> None:
+    times, seen = without_blanks(np.arange(5.0), np.full(5, np.nan), 1.0)
+    assert len(times) == len(seen) == 0
+
+
+def test_decimation_keeps_extremes_gaps_and_ends() -> None:
+    rng = np.random.default_rng(1)
+    count, points = 100_003, 2000
+    at = np.arange(count) * 0.1
+    first, second = rng.standard_normal((2, count))
+    first[12_345], second[67_890] = 50.0, -60.0
+    first[40_000:40_020] = np.nan  # shorter than a bucket
+    second[50_000:60_000] = np.nan
+    series = Series("s", at, (Line("first", first, GREY), Line("second", second, BLUE)))
+    thin = decimated(series, points)
+    assert len(thin.time_secs) <= points + 6
+    for line, whole in zip(thin.lines, (first, second), strict=True):
+        rows = np.round(thin.time_secs / 0.1).astype(int)
+        np.testing.assert_array_equal(line.values, whole[rows])
+        size = -(-count // (points // 4))
+        for start in range(0, count, size):
+            bucket = whole[start : start + size]
+            kept = line.values[(rows >= start) & (rows < start + size)]
+            if np.isfinite(bucket).any():
+                assert np.nanmax(kept) == np.nanmax(bucket)
+                assert np.nanmin(kept) == np.nanmin(bucket)
+            assert np.isnan(kept).any() == np.isnan(bucket).any()
+    assert (thin.time_secs[0], thin.time_secs[-1]) == (at[0], at[-1])
+
+
+def test_a_short_series_is_drawn_whole() -> None:
+    series = Series("s", np.arange(POINTS * 1.0), (Line("x", np.zeros(POINTS), GREY),))
+    assert decimated(series) is series
+
+
+def test_wild_values_do_not_squeeze_an_axis() -> None:
+    values = np.sin(np.arange(1000) / 50)
+    values[3] = 1e6
+    low, high = limits(values)
+    assert -1.1 < low <= -1
+    assert 1 <= high < 3
+    assert limits(np.full(3, np.nan)) == (-1.0, 1.0)
+    low, high = limits(np.full(3, 80.0))
+    assert low < 80 < high
+
+
+def test_wild_windows_do_not_squeeze_a_coefficient(analysis: Analysis) -> None:
+    history = analysis.yaw.history
+    values, stds = history.values.copy(), history.stds.copy()
+    values[:40] *= -1e4
+    stds[:40] *= 1e4
+    wild = replace(analysis.yaw, history=replace(history, values=values, stds=stds))
+    usual, drawn = (coefficient_panels(a)[0] for a in (analysis, replace(analysis, yaw=wild)))
+    assert np.diff(drawn.limits) < 3 * np.diff(usual.limits)
+
+
+def test_a_single_window_is_a_line_all_the_same(analysis: Analysis) -> None:
+    history = analysis.yaw.history
+    only = History(
+        history.names,
+        history.time_secs[:1],
+        history.values[:1],
+        history.stds[:1],
+        history.conditions[:1],
+    )
+    single = replace(analysis, yaw=replace(analysis.yaw, history=only))
+    for panel in coefficient_panels(single)[:6]:
+        _, window = panel.series
+        assert window.time_secs.tolist() == [0.0, analysis.signals.time_secs[-1]]
+        assert all(len(line.values) == 2 for line in window.lines)
+
+
+def test_what_no_window_can_tell_is_left_out(analysis: Analysis, tmp_path: Path) -> None:
+    history = analysis.yaw.history
+    values = history.values.copy()
+    values[:, 1] = np.nan
+    empty = History(("f", "g", "h"), *(np.empty(s) for s in (0, (0, 3), (0, 3), 0)))
+    some = replace(
+        analysis,
+        yaw=replace(analysis.yaw, history=replace(history, values=values)),
+        surge=replace(analysis.surge, history=empty),
+    )
+    names = [panel.name for panel in coefficient_panels(some)]
+    assert names == [f"coefficient_{name}" for name in ("a", "b2", "b3", "d", "e")]
+    write_review(some, tmp_path / "some.rrd", text="")
+    none = replace(some, yaw=replace(analysis.yaw, history=replace(empty, names=("a",))))
+    write_review(none, tmp_path / "none.rrd", text="")
+    assert len(layout(tmp_path / "none.rrd", "ViewBlueprint:display_name")) == 10
+
+
+def test_the_chart_has_east_right_and_north_up(review: Path, analysis: Analysis) -> None:
+    (line,) = static(review, "track/line", "LineStrips2D:strips")
+    expected = np.column_stack((analysis.track.east, -analysis.track.north))
+    np.testing.assert_allclose(line, expected, rtol=1e-5, atol=1e-3)
+    assert static(review, "track/ends", "Points2D:labels") == ["start", "end"]
+    drawn = draw_track(analysis)
+    assert drawn is not None
+    bow, stern = drawn.ships[0][0], drawn.ships[0][2:4].mean(axis=0)
+    assert bow[1] < stern[1]  # headed north at first, and y points down
+    length, unit = drawn.scale_label.split()
+    assert drawn.scale[1, 0] - drawn.scale[0, 0] == float(length) * {"m": 1, "km": 1000}[unit]
+    nowhere = replace(analysis.track, north=np.empty(0), east=np.empty(0))
+    log = shiplog.TrialLog("x", tuple(c for c in analysis.log if c.name != "position"))
+    assert draw_track(replace(analysis, track=nowhere, log=log)) is None
+
+
+def test_left_and_right_panels_belong_together(analysis: Analysis) -> None:
+    yaw, surge = equation_panels(analysis)
+    assert len(yaw) == len(surge)
+
+
+@pytest.mark.parametrize("name", ["missing/trial.rrd", "folder"])
+def test_an_unwritable_path_leaves_nothing(name: str, analysis: Analysis, tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(ShiplogError, match="cannot write"):
+        write_review(analysis, tmp_path / name, text="")
+    assert [path.name for path in tmp_path.rglob("*")] == ["folder"]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a screen cannot be taken away")
+def test_without_a_screen_the_viewer_says_so(
+    analysis: Analysis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(ShiplogError, match="viewer cannot start here"):
+        view_review(analysis, text="")
