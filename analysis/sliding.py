@@ -5,10 +5,12 @@ its integral form (`weak_form`). Columns are scaled to unit length before anythi
 any condition number is told.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from shiplog.compiled import compiled
 from shiplog.ship import COEFFICIENT_UNITS
 from shiplog.types import FloatArray
 
@@ -54,10 +56,12 @@ class Identification:
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
-    values: FloatArray  # (p,), NaN for a column that is zero throughout
+class Fit:
+    """Least squares over some rows."""
+
+    values: FloatArray  # (p,), NaN for a column that is zero throughout, or if nothing can be told
     stds: FloatArray  # (p,)
-    condition: float
+    condition: float  # of the column-scaled regressors
 
 
 def identify(
@@ -80,61 +84,110 @@ def identify(
     )
 
 
-def fit(rows: Rows) -> _Fit:
-    """Column-scaled least squares with errors that allow for overlapping, coloured residuals."""
-    known = np.isfinite(rows.target) & np.isfinite(rows.regressors).all(axis=1)
-    return _solve(rows.regressors[known], rows.target[known], rows.overlap)
+def fit(rows: Rows) -> Fit:
+    """Column-scaled least squares with errors that allow for overlapping, coloured residuals.
+
+    The covariance is Newey and West's (1987) over the rows that share data, enlarged for the
+    freedom that the coefficients take of the rows that could differ.
+    """
+    values, stds, conditions = _fits(rows, len(rows.target))
+    return Fit(values[0], stds[0], float(conditions[0]))
 
 
 def _history(rows: Rows, window_secs: float) -> History:
     count = len(rows.centres_secs)
     length = max(1, min(count, round((window_secs - rows.bump_secs) / rows.stride_secs) + 1))
-    fits, ends = [], []
-    for start in range(count - length + 1):
-        cut = slice(start, start + length)
-        fits.append(fit(replace(rows, target=rows.target[cut], regressors=rows.regressors[cut])))
-        ends.append(rows.centres_secs[start + length - 1] + rows.bump_secs / 2)
-    return History(
-        rows.names,
-        np.array(ends),
-        np.array([f.values for f in fits]).reshape(-1, len(rows.names)),
-        np.array([f.stds for f in fits]).reshape(-1, len(rows.names)),
-        np.array([f.condition for f in fits]),
-    )
+    values, stds, conditions = _fits(rows, length)
+    ends = rows.centres_secs[length - 1 :] + rows.bump_secs / 2
+    return History(rows.names, ends[: len(values)], values, stds, conditions)
 
 
-def _solve(X: FloatArray, y: FloatArray, overlap: int) -> _Fit:
-    p = X.shape[1]
-    values, stds = np.full(p, np.nan), np.full(p, np.nan)
-    scale = np.linalg.norm(X, axis=0)
-    kept = scale > 1e-12 * np.max(scale, initial=0.0)
-    # rows overlap: what counts is how many of them could differ
-    independent = len(y) / (overlap * CORRELATED)
-    freedom = independent - int(kept.sum())
-    if not kept.any() or freedom <= 0 or len(y) < p:
-        return _Fit(values, stds, np.inf)
-    X = X[:, kept] / scale[kept]
-    U, s, Vt = np.linalg.svd(X, full_matrices=False)
-    condition = float(s[0] / s[-1]) if s[-1] > 0 else np.inf
-    if condition > WORST_CONDITION:
-        return _Fit(values, stds, condition)
-    scaled = Vt.T @ ((U.T @ y) / s)
-    inverse = (Vt.T / s**2) @ Vt
-    scores = _neighbours_sum(X * (y - X @ scaled)[:, None], overlap)
-    covariance = inverse @ (scores.T @ scores / overlap) @ inverse
-    values[kept] = scaled / scale[kept]
-    stds[kept] = np.sqrt(np.diag(covariance) * independent / freedom) / scale[kept]
-    return _Fit(values, stds, condition)
+def _fits(rows: Rows, length: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Values (k, p), standard deviations (k, p) and condition (k,) of each run of rows."""
+    X, y = np.ascontiguousarray(rows.regressors), np.ascontiguousarray(rows.target)
+    count, p = max(len(y) - length + 1, 1), X.shape[1]
+    values, stds = np.full((count, p), np.nan), np.full((count, p), np.nan)
+    conditions = np.full(count, np.inf)
+    known = np.isfinite(y) & np.isfinite(X).all(axis=1)
+    _slide(X, y, known, length, rows.overlap, values, stds, conditions)
+    return values, stds, conditions
 
 
-def _neighbours_sum(scores: FloatArray, overlap: int) -> FloatArray:
-    """Sums over every run of `overlap` rows, those reaching over the ends too.
+@compiled
+def _slide(
+    X: FloatArray,
+    y: FloatArray,
+    known: NDArray[np.bool_],
+    length: int,
+    overlap: int,
+    values: FloatArray,
+    stds: FloatArray,
+    conditions: FloatArray,
+) -> None:
+    for k in range(len(values)):
+        rows = k + np.flatnonzero(known[k : k + length])
+        scale = np.sqrt((X[rows] ** 2).sum(axis=0))
+        kept = np.flatnonzero(scale > 0)
+        # rows overlap: what counts is how many of them could differ
+        independent = len(rows) / (overlap * CORRELATED)
+        freedom = independent - len(kept)
+        if len(kept) == 0 or freedom <= 0 or len(rows) < len(kept):
+            continue
+        A = X[rows][:, kept] / scale[kept]
+        R, projected = _triangular(A, y[rows])
+        singular = np.linalg.svd(R)[1]
+        conditions[k] = singular[0] / singular[-1] if singular[-1] > 0 else np.inf
+        if conditions[k] > WORST_CONDITION:
+            continue
+        inverse = np.linalg.inv(R)
+        scaled = inverse @ projected
+        S = _neighbours_products(A, y[rows] - A @ scaled, overlap)
+        inverse = inverse @ inverse.T  # of A'A
+        covariance = inverse @ S @ inverse
+        for i in range(len(kept)):
+            values[k, kept[i]] = scaled[i] / scale[kept[i]]
+            spread = np.sqrt(covariance[i, i] * independent / freedom)
+            stds[k, kept[i]] = spread / scale[kept[i]]
 
-    Their products, summed, are Newey and West's estimate: autocovariances under Bartlett weights.
+
+@compiled
+def _triangular(A: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """R of A = Q R, and Q'y, by Householder's reflections."""
+    m, p = A.shape
+    W = np.column_stack((A, y))
+    for j in range(p):
+        norm = np.sqrt((W[j:, j] ** 2).sum())
+        if norm == 0:
+            continue
+        pivot = -norm if W[j, j] > 0 else norm
+        W[j, j] -= pivot
+        for k in range(j + 1, p + 1):
+            along = 0.0
+            for i in range(j, m):
+                along += W[i, j] * W[i, k]
+            along /= pivot * W[j, j]
+            for i in range(j, m):
+                W[i, k] += along * W[i, j]
+        W[j, j] = pivot
+    return np.triu(W[:p, :p]), W[:p, p].copy()
+
+
+@compiled
+def _neighbours_products(A: FloatArray, residual: FloatArray, overlap: int) -> FloatArray:
+    """Newey and West's sum of autocovariances of the scores under Bartlett's weights, (p, p).
+
+    It is the sum of the products of the scores' sums over every run of `overlap` rows, those
+    reaching over the ends too, over `overlap`.
     """
-    n = len(scores)
-    total = np.vstack((np.zeros(scores.shape[1]), np.cumsum(scores, axis=0)))
-    last = np.clip(np.arange(1, n + overlap), 0, n)
-    first = np.clip(np.arange(1 - overlap, n), 0, n)
-    sums: FloatArray = total[last] - total[first]
-    return sums
+    n, p = A.shape
+    run, products = np.zeros(p), np.zeros((p, p))
+    for end in range(n + overlap - 1):
+        for i in range(p):
+            if end < n:
+                run[i] += A[end, i] * residual[end]
+            if end >= overlap:
+                run[i] -= A[end - overlap, i] * residual[end - overlap]
+        for i in range(p):
+            for j in range(p):
+                products[i, j] += run[i] * run[j]
+    return products / overlap
