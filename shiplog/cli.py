@@ -166,7 +166,7 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
     from .writer import write
 
     vessel, text = load_vessel(arguments.vessel)
-    with _progress() as tell:
+    with _progress("recorders") as tell:
         tell("sail and measure")
         trial = simulate(
             vessel,
@@ -219,7 +219,7 @@ def _run_replay(arguments: argparse.Namespace) -> int:
 
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
-    with _progress() as tell:
+    with _progress("analysis") as tell:
         tell("read")
         log = read(arguments.log)
         analysis = analyse(log, vessel, on_step=tell)
@@ -245,7 +245,7 @@ def _run_check(arguments: argparse.Namespace) -> int:
         raise UsageError("references are not updated in CI; run it where somebody looks")
     comparisons = []
     logs = logs_in(arguments.path)
-    with _progress() as tell:
+    with _progress("analysis") as tell:
         for log in logs:
             tell(log.name)
             comparisons.append(compare(log))
@@ -292,17 +292,24 @@ def _require_ours(package: str) -> None:
 
 
 @contextmanager
-def _progress() -> Iterator["Callable[[str], None]"]:
-    """Show on a terminal what is being done; the callable names the next step."""
+def _progress(package: str | None = None) -> Iterator["Callable[[str], None]"]:
+    """Show on a terminal what is being done; the callable names the next step.
+
+    Where the loops of `package` were never compiled on this computer, it says so.
+    """
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+    console, note = Console(stderr=True), ""
+    if package:
+        from .compiled import is_compiled
+
+        note = "" if is_compiled(package) else " (first run: compiling the loops, once)"
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    console = Console(stderr=True)
     shown = console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
         task = progress.add_task("")
-        yield lambda step: progress.update(task, description=step)
+        yield lambda step: progress.update(task, description=f"{step}{note}")
 
 
 def _print_tables(analysis: "Analysis", *, to_stderr: bool) -> None:

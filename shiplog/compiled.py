@@ -20,3 +20,10 @@ F = TypeVar("F", bound=Callable[..., object])
 def compiled(function: F) -> F:
     """Compile `function` on its first call, and keep the machine code for later runs."""
     return cast("F", numba.njit(cache=True, error_model="numpy")(function))
+
+
+def is_compiled(package: str) -> bool:
+    """Whether machine code of a package of ours is kept from an earlier run."""
+    kept = os.environ.get("NUMBA_CACHE_DIR")
+    place = Path(kept) if kept else Path(__file__).parents[1] / package
+    return next(place.rglob("*.nbi"), None) is not None
