@@ -9,7 +9,7 @@ from math import floor, log10
 
 import numpy as np
 
-from shiplog.clock import GAP_PERIODS, GAP_SECS
+from shiplog.clock import longest_step_secs, usual_interval_secs
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, factor
 
@@ -244,12 +244,9 @@ def without_blanks(
     """
     known = np.isfinite(values)
     at = np.flatnonzero(known)
-    steps = np.diff(at)
-    if not len(steps):
-        return time_secs[known], values[known]
-    longest = max(GAP_PERIODS * float(np.median(steps)), GAP_SECS / dt_secs)
+    longest = longest_step_secs(usual_interval_secs(values, dt_secs)) / dt_secs
     kept = known.copy()
-    kept[at[:-1][steps > longest] + 1] = True
+    kept[at[:-1][np.diff(at) > longest] + 1] = True
     return time_secs[kept], values[kept]
 
 

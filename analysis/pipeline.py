@@ -1,13 +1,16 @@
 """From a log to what it says: the order of the steps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 
 from shiplog import LogError, Signals, TrialLog, Vessel, resample
-from shiplog.quality import examine, rudder_sign_warning
-from shiplog.vessel import parse_vessel
+from shiplog.clock import gap_threshold_secs, usual_period_secs
+from shiplog.quality import examine
+from shiplog.rudder_sign import rudder_sign_warning
+from shiplog.vessel import FilterSettings, parse_vessel
 
 from .disturbance import Disturbance, observe_disturbance
 from .first_model import fit_first_model
@@ -18,6 +21,7 @@ from .track import Track, find_track
 from .weak_form import weak_form
 
 INPUTS = ("rudder", "rpm")
+FEWEST = 4  # samples of an output: their third difference shows its noise
 NEEDED = (*OUTPUTS, *INPUTS)
 STEPS = ("check", "one clock", "model", "filter", "disturbance", "coefficients")
 
@@ -51,20 +55,19 @@ def analyse(
     """
     on_step("check")
     warnings = [*log.warnings, *examine(log, NEEDED)]
-    sign = rudder_sign_warning(log)
-    warnings += [sign] if sign else []
 
     on_step("one clock")
-    signals = resample(log, channels=(*NEEDED, *(n for n in ("heading",) if n in log)))
+    signals = resample(log, channels=NEEDED, optional=("heading",))
+    _require_outputs(log, signals)
     known, unknown = _hold_inputs(signals)
-    warnings += unknown
+    warnings += [*_doubtful(log), *_silent_ends(log, signals), *unknown]
 
     on_step("model")
     vessel, origin = _model(log, vessel, signals)
     model = vessel.coefficients
 
     on_step("filter")
-    noise = noise_of(known, model, vessel.filter)
+    noise = noise_of(known, model, _averaged(vessel.filter, log, signals.dt_secs))
     estimates = filter_states(known, model, noise)
     if not np.all(np.isfinite(estimates.states)):
         raise LogError(
@@ -95,6 +98,62 @@ def _model(log: TrialLog, given: Vessel | None, signals: Signals) -> tuple[Vesse
     if log.vessel_toml is not None:
         return parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}"), "carried by the log"
     return fit_first_model(signals, log.name), "a first model, fitted to this log"
+
+
+def _doubtful(log: TrialLog) -> Iterator[str]:
+    """What in a log may not be what it seems."""
+    for name in NEEDED:
+        sources = [channel.source for channel in log if channel.name == name]
+        if len(sources) > 1:
+            yield (
+                f"{name}: {len(sources)} sources ({', '.join(sources)}), {sources[0]} is used; "
+                f"choose another with --source {name}={sources[1]}"
+            )
+    for name in OUTPUTS:
+        if np.nanmin(log[name].values) == np.nanmax(log[name].values):
+            yield f"{log[name].topic}: never changes; if the sensor was dead, choose another"
+    if np.nanmin(log["speed"].values) < 0 or np.nanmin(log["rpm"].values) < 0:
+        yield "the ship goes astern in places, where the model does not hold"
+    sign = rudder_sign_warning(log)
+    if sign:
+        yield sign
+
+
+def _require_outputs(log: TrialLog, signals: Signals) -> None:
+    for name in OUTPUTS:
+        count = int(np.isfinite(signals[name]).sum())
+        if count < FEWEST:
+            raise LogError(
+                f"channel {name!r} has {count} samples while the others are there too, "
+                f"and {FEWEST} are needed; check the recorder or choose another log: {log.name}"
+            )
+
+
+def _silent_ends(log: TrialLog, signals: Signals) -> Iterator[str]:
+    """Parts of the log that are not replayed, or only predicted, for want of a channel."""
+    first, last = signals.start_ns, int(signals.stamps_ns[-1])
+    spans = {name: log[name].measured_ns[np.isfinite(log[name].values)] for name in NEEDED}
+    begun = max(spans, key=lambda name: int(spans[name].min()))
+    late = (first - min(int(times.min()) for times in spans.values())) * 1e-9
+    if late > gap_threshold_secs(log[begun]):
+        yield f"{begun}: sets in {late:.1f} s after the others; the replay begins there"
+    ceased = min(INPUTS, key=lambda name: int(spans[name].max()))
+    early = (max(int(times.max()) for times in spans.values()) - last) * 1e-9
+    if early > gap_threshold_secs(log[ceased]):
+        yield f"{ceased}: ends {early:.1f} s before the others; the replay ends there"
+    for name in OUTPUTS:
+        silent = (last - int(spans[name].max())) * 1e-9
+        if silent > gap_threshold_secs(log[name]):
+            yield f"{name}: silent for the last {silent:.1f} s, which are only predicted"
+
+
+def _averaged(settings: FilterSettings, log: TrialLog, dt_secs: float) -> FilterSettings:
+    """The noise stated for one sample, as it is in the mean of those that share an instant."""
+    stds = []
+    for name, std in zip(OUTPUTS, (settings.yaw_rate_std, settings.speed_std), strict=True):
+        together = max(1.0, dt_secs / usual_period_secs(log[name]))
+        stds.append(None if std is None else std / sqrt(together))
+    return replace(settings, yaw_rate_std=stds[0], speed_std=stds[1])
 
 
 def _hold_inputs(signals: Signals) -> tuple[Signals, list[str]]:

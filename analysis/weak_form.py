@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import upfirdn
 
-from shiplog.clock import GAP_SECS
+from shiplog.clock import longest_step_secs, usual_interval_secs
 from shiplog.ship import Coefficients
 from shiplog.types import FloatArray, Signals
 
@@ -128,8 +128,7 @@ def _bridged(values: FloatArray, dt: float) -> FloatArray:
     at = np.flatnonzero(np.isfinite(values))
     if len(at) < 2:
         return np.full(len(values), np.nan)
-    usual = float(np.median(np.diff(at)))
-    longest = max(5 * usual, GAP_SECS / dt)
+    longest = longest_step_secs(usual_interval_secs(values, dt)) / dt
     filled = np.interp(np.arange(len(values)), at, values[at])
     for i in np.flatnonzero(np.diff(at) > longest):
         filled[at[i] + 1 : at[i + 1]] = np.nan

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from shiplog.errors import ShiplogError
-from shiplog.files import cannot_write
+from shiplog.files import cannot_write, is_device
 from shiplog.writer import LogWriter
 
 from .source import Source
@@ -25,7 +25,7 @@ def record(
     file, finished, and the error says so; `path` then is as it was before.
     """
     final = Path(path)
-    part = final.with_name(final.name + ".part")
+    part = final if is_device(final) else final.with_name(final.name + ".part")
     if final.is_dir():
         raise cannot_write(final, IsADirectoryError())
     count = 0
@@ -43,5 +43,6 @@ def record(
             raise ShiplogError(f"{error}; the {count} samples until then are in {part}") from error
         part.unlink(missing_ok=True)
         raise
-    part.replace(final)
+    if part != final:
+        part.replace(final)
     return count

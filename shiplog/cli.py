@@ -123,6 +123,13 @@ def _add_replay(verbs: Any) -> None:  # noqa: ANN401
     replay.add_argument("log", metavar="LOG")
     replay.add_argument("--vessel", help="a preset or a vessel.toml, instead of the log's own")
     replay.add_argument(
+        "--source",
+        action="append",
+        default=[],
+        metavar="CHANNEL=SOURCE",
+        help="which of several sources of a channel to use",
+    )
+    replay.add_argument(
         "-o", "--output", metavar="FILE", help="the review (default: LOG's name with .rrd, here)"
     )
     replay.add_argument("--json", metavar="FILE", help="the summary as JSON, - for stdout")
@@ -221,7 +228,7 @@ def _run_replay(arguments: argparse.Namespace) -> int:
     output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
     with _progress("analysis") as tell:
         tell("read")
-        log = read(arguments.log)
+        log = read(arguments.log).preferring(_sources(arguments.source))
         analysis = analyse(log, vessel, on_step=tell)
         tell("review")
         from analysis.rerun_view import view_review, write_review
@@ -358,6 +365,14 @@ def _settings(texts: Sequence[str]) -> dict[str, float]:
                 f"--sensor wants CHANNEL.SETTING=VALUE, such as yaw_rate.bias=1e-4, got {text!r}"
             ) from None
     return settings
+
+
+def _sources(texts: Sequence[str]) -> dict[str, str]:
+    """`speed=doppler` as a name and a source."""
+    for text in texts:
+        if not re.fullmatch(r"[^=]+=[^=]+", text):
+            raise UsageError(f"--source wants CHANNEL=SOURCE, such as speed=doppler, got {text!r}")
+    return dict(text.split("=") for text in texts)
 
 
 _NUMBER = r"([-+]?\d*\.?\d+(?:e[-+]?\d+)?)"

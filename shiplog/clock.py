@@ -19,12 +19,16 @@ MAX_SAMPLES = 20_000_000  # of a grid: beyond it the times are wrong, not the tr
 
 
 def resample(
-    log: TrialLog, dt_secs: float | None = None, channels: tuple[str, ...] | None = None
+    log: TrialLog,
+    dt_secs: float | None = None,
+    channels: tuple[str, ...] | None = None,
+    optional: tuple[str, ...] = (),
 ) -> Signals:
     """Put a log's channels on one clock.
 
-    `dt_secs` defaults to the usual period of the first of the channels. The clock runs over the
-    span in which every commanded channel among them is known.
+    `dt_secs` defaults to the usual period of the first of the channels, on whose samples the
+    clock falls. It starts where all of them are known, and ends with the commanded ones, or else
+    with the last of the others. `optional` channels are placed on it where the log has them.
 
     Raises `LogError` where a channel is missing or has fewer than two samples, or where the
     channels have no time in common.
@@ -45,8 +49,8 @@ def resample(
             f"its times span {(end_ns - start_ns) / 8.64e13:.4g} days, too many steps of {dt:g} s; "
             f"correct the clock of one of {', '.join(names)}: {log.name}"
         )
-    count = int(steps) + 1
-    grid = np.arange(count) * dt
+    grid = np.arange(int(steps) + 1) * dt
+    used |= {name: log[name] for name in optional if name in log}
     values = {}
     for name, channel in used.items():
         at = (channel.measured_ns - start_ns) * 1e-9
@@ -65,7 +69,18 @@ def usual_period_secs(channel: Channel) -> float:
 
 def gap_threshold_secs(channel: Channel) -> float:
     """The silence beyond which a channel was not measured, rather than between two samples."""
-    return max(GAP_PERIODS * usual_period_secs(channel), GAP_SECS)
+    return longest_step_secs(usual_period_secs(channel))
+
+
+def longest_step_secs(usual_secs: float) -> float:
+    """How far apart two samples of a sensor of that usual period may stand without a gap."""
+    return max(GAP_PERIODS * usual_secs, GAP_SECS)
+
+
+def usual_interval_secs(values: FloatArray, dt_secs: float) -> float:
+    """The median time between two measurements of a channel on a clock; NaN is none."""
+    steps = np.diff(np.flatnonzero(np.isfinite(values)))
+    return float(np.median(steps)) * dt_secs if len(steps) else dt_secs
 
 
 def gaps(channel: Channel) -> list[tuple[float, float]]:
@@ -94,18 +109,27 @@ def _require_samples(log: TrialLog, name: str, channel: Channel) -> None:
 
 
 def _common_span(log: TrialLog, channels: list[Channel]) -> tuple[int, int]:
-    commanded = [c for c in channels if c.name in CATALOGUE and CATALOGUE[c.name].commanded]
-    bounding = commanded or channels
-    start = max(int(c.measured_ns.min()) for c in bounding)
-    end = min(int(c.measured_ns.max()) for c in bounding)
-    others = [c for c in channels if c not in commanded]
-    if others:
-        start = max(start, min(int(c.measured_ns.min()) for c in others))
-        end = min(end, max(int(c.measured_ns.max()) for c in others))
+    """From where all are known, on a sample of the first, to where the inputs cease."""
+    begun = max(_known_span(channel)[0] for channel in channels)
+    inputs: list[int] = []
+    others: list[int] = []
+    for channel in channels:
+        commanded = channel.name in CATALOGUE and CATALOGUE[channel.name].commanded
+        (inputs if commanded else others).append(_known_span(channel)[1])
+    end = min([max(others or inputs), *inputs])
+    leader = channels[0].measured_ns[np.isfinite(channels[0].values)]
+    on_sample = leader[leader >= begun]
+    start = int(on_sample.min()) if len(on_sample) else begun
     if end <= start:
         names = ", ".join(c.name for c in channels)
         raise LogError(f"{names} were never recorded at the same time: {log.name}")
     return start, end
+
+
+def _known_span(channel: Channel) -> tuple[int, int]:
+    """The first and the last instant at which something was measured."""
+    times = channel.measured_ns[np.isfinite(channel.values)]
+    return int(times.min()), int(times.max())
 
 
 def _binned(at: FloatArray, channel: Channel, grid: FloatArray, dt: float) -> FloatArray:

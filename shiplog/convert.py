@@ -9,6 +9,7 @@ from .errors import LogError, UsageError
 from .foreign import read_table
 from .layout import load_layout
 from .reader import read
+from .rudder_sign import rudder_sign_warning
 from .table import CSV_MARK, read_csv, read_parquet, write_csv, write_parquet
 from .types import TrialLog
 from .writer import write
@@ -37,6 +38,9 @@ def convert(source: Path, target: Path, layout: Path | None = None) -> tuple[Tri
     if source.suffix.lower() == target.suffix.lower() == ".mcap":
         log, notes = sorted_by_time(log)
         warnings += notes
+    if layout is not None:
+        contrary = rudder_sign_warning(log)
+        warnings += [contrary] if contrary else []
     writers = {".mcap": write, ".csv": write_csv, ".parquet": write_parquet}
     writers[target.suffix.lower()](log, target)
     return log, warnings

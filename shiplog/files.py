@@ -15,7 +15,10 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises `ShiplogError` where the place cannot be written to. After an error the partial file
     is gone and whatever stood under the final name stands there still.
     """
-    final = Path(path)
+    final = Path(os.path.realpath(path))  # a link stays a link
+    if is_device(final):
+        yield final
+        return
     if final.is_dir():
         raise cannot_write(final, IsADirectoryError())
     part = final.with_name(f".{final.name}.{os.getpid()}.part")
@@ -30,6 +33,11 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise cannot_write(final, error) from error
     finally:
         part.unlink(missing_ok=True)
+
+
+def is_device(path: Path) -> bool:
+    """Whether it is a device or a pipe: written to as it is, for it holds nothing to be spoilt."""
+    return path.exists() and not (path.is_file() or path.is_dir())
 
 
 def cannot_write(path: Path, error: OSError) -> ShiplogError:

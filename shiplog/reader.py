@@ -2,6 +2,7 @@
 
 import mmap
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -73,6 +74,7 @@ def _trial_log(path: Path, contents: Contents) -> TrialLog:
             foreign.append(record.topic)
         else:
             channels.append(_channel(path, record, schema, contents, channel_id))
+    channels = _merged(channels)
     warnings = list(contents.damage)
     if not contents.finished:
         warnings.append(
@@ -89,6 +91,25 @@ def _trial_log(path: Path, contents: Contents) -> TrialLog:
         tuple(warnings),
         data_lost=contents.cut or bool(contents.damage),
     )
+
+
+def _merged(channels: list[Channel]) -> list[Channel]:
+    """One channel a topic: a recorder that was started again describes its topics once more."""
+    merged: dict[tuple[str, tuple[str, ...]], Channel] = {}
+    for channel in channels:
+        key = (channel.topic, channel.fields)
+        if key in merged:
+            first = merged[key]
+            received = np.concatenate((first.received_ns, channel.received_ns))
+            order = np.argsort(received, kind="stable")
+            channel = replace(  # noqa: PLW2901 - the same channel, whole
+                first,
+                received_ns=received[order],
+                measured_ns=np.concatenate((first.measured_ns, channel.measured_ns))[order],
+                values=np.concatenate((first.values, channel.values))[order],
+            )
+        merged[key] = channel
+    return list(merged.values())
 
 
 def _channel(

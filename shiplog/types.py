@@ -1,7 +1,7 @@
 """What a trial is: channels of samples, and the same on one clock."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -80,6 +80,12 @@ class TrialLog:
     warnings: tuple[str, ...] = ()  # what reading it met: an unfinished file, foreign topics
     data_lost: bool = False  # whether a part of the file could not be read
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
+        topics = [(channel.topic, channel.fields) for channel in self.channels]
+        if len(set(topics)) < len(topics):
+            raise ValueError(f"{self.name}: two channels of one topic; merge them: {topics}")
+
     def __getitem__(self, key: str) -> Channel:
         """The channel of that name, or of that name and source; `LogError` where there is none."""
         found = self.get(key)
@@ -106,6 +112,15 @@ class TrialLog:
     def __iter__(self) -> Iterator[Channel]:
         """The channels in the order of the file."""
         return iter(self.channels)
+
+    def preferring(self, sources: Mapping[str, str]) -> "TrialLog":
+        """The same log, in which `log[name]` is the source given for that name.
+
+        Raises `LogError` where there is no such channel.
+        """
+        preferred = [self[f"{name}/{source}"] for name, source in sources.items()]
+        others = [channel for channel in self.channels if channel not in preferred]
+        return replace(self, channels=(*preferred, *others))
 
     @property
     def span_ns(self) -> tuple[int, int]:
