@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shiplog.clock import usual_interval_secs
 from shiplog.compiled import compiled
 from shiplog.ship import Coefficients, rudder_effect, surge_acceleration, yaw_acceleration_rate
 from shiplog.types import FloatArray, Signals
@@ -26,17 +27,19 @@ SETTLING = 5.0  # over the frequency: the paper's transient time
 class Disturbance:
     """Specific disturbances on the signals' clock: what they add to the equations of motion.
 
-    The standard deviations are what sensor noise leaves once the observer has settled; an error
-    of the model counts as a disturbance.
+    The standard deviations are what sensor noise leaves once an observer has settled, the ship
+    turning as she usually did; an error of the model counts as a disturbance. Before the settling
+    time what is seen is the observer's own transient.
     """
 
     yaw: FloatArray  # (n,) rad/s^3, added to w''
     yaw_std: float
     surge: FloatArray  # (n,) m/s^2, added to v'
     surge_std: float
-    rudder: FloatArray  # (n,) rad: the rudder that would do what `yaw` does
-    rudder_std: float
-    settling_secs: float  # before which the yaw disturbance is the transient of the observer
+    rudder: FloatArray  # (n,) rad: the rudder that would do, at the speed then, what `yaw` does
+    rudder_std: float  # NaN where no rudder would
+    yaw_settling_secs: float = SETTLING / YAW_FREQUENCY
+    surge_settling_secs: float = SETTLING / SURGE_FREQUENCY
 
 
 def observe_disturbance(signals: Signals, model: Coefficients, noise: Noise) -> Disturbance:
@@ -46,31 +49,40 @@ def observe_disturbance(signals: Signals, model: Coefficients, noise: Noise) -> 
     """
     w, v = signals["yaw_rate"], signals["speed"]
     dt = signals.dt_secs
-    yaw = _yaw_observer(model, _interval(w, dt))
-    surge = _surge_observer(model, float(np.nanmedian(v)), _interval(v, dt))
+    turning = _stiffness(model, float(np.sqrt(np.nanmean(w**2))))
+    interval = usual_interval_secs(w, dt)
+    yaw = _yaw_observer(model, turning, interval)
+    surge = _surge_observer(model, float(np.nanmedian(v)), usual_interval_secs(v, dt))
     rows = _observe(
-        model, w, v, signals["rudder"], signals["rpm"], dt, yaw.correction, surge.correction
-    )
+        model, w, v, signals["rudder"], signals["rpm"], dt, yaw.correction, surge.correction,
+        turning, interval,
+    )  # fmt: skip
     # a rudder of 0 at no speed does nothing: the equivalent is then not a number
     steering = model.d * _rudder_effects(model, rows[:, 2], signals["rpm"])
     with np.errstate(divide="ignore", invalid="ignore"):
         rudder = np.where(np.abs(steering) > 0, rows[:, 1] / steering, np.nan)
     std_w, std_v = noise.measurement_std
     yaw_std = float(yaw.noise_gain[2] * std_w)
+    usual = float(np.median(np.abs(steering)))
     return Disturbance(
         yaw=rows[:, 1],
         yaw_std=yaw_std,
         surge=rows[:, 3],
         surge_std=float(surge.noise_gain[1] * std_v),
         rudder=rudder,
-        rudder_std=yaw_std / float(np.nanmedian(np.abs(steering))),
-        settling_secs=SETTLING / YAW_FREQUENCY,
+        rudder_std=yaw_std / usual if usual > 0 else np.nan,
     )
 
 
-def _yaw_observer(c: Coefficients, interval: float) -> Observer:
+@compiled
+def _stiffness(c: Coefficients, w: float) -> float:
+    """d w'' / dw at a yaw rate: b1 and what the nonlinear terms add to it, 1/s^2."""
+    return c.b1 + 2 * c.b2 * abs(w) + 3 * c.b3 * w * w
+
+
+def _yaw_observer(c: Coefficients, stiffness: float, interval: float) -> Observer:
     """Of (w, w', m): the yaw moment m constant, the rate measured."""
-    A = np.array([[0.0, 1.0, 0.0], [c.b1, c.a, 1.0], [0.0, 0.0, 0.0]])
+    A = np.array([[0.0, 1.0, 0.0], [stiffness, c.a, 1.0], [0.0, 0.0, 0.0]])
     C = np.array([[1.0, 0.0, 0.0]])
     return discrete_observer(A, C, butterworth_poles(3, YAW_FREQUENCY), interval)
 
@@ -80,12 +92,6 @@ def _surge_observer(c: Coefficients, speed: float, interval: float) -> Observer:
     A = np.array([[2 * c.g * speed, 1.0], [0.0, 0.0]])
     C = np.array([[1.0, 0.0]])
     return discrete_observer(A, C, butterworth_poles(2, SURGE_FREQUENCY), interval)
-
-
-def _interval(values: FloatArray, dt: float) -> float:
-    """The usual time between two measurements: a slow sensor corrects seldom, and then more."""
-    at = np.flatnonzero(np.isfinite(values))
-    return float(np.median(np.diff(at))) * dt if len(at) > 1 else dt
 
 
 @compiled
@@ -98,8 +104,14 @@ def _observe(
     dt: float,
     yaw: FloatArray,
     surge: FloatArray,
+    turning: float,
+    interval: float,
 ) -> FloatArray:
-    """Rows of w, yaw disturbance, v, surge disturbance, (n, 4)."""
+    """Rows of w, yaw disturbance, v, surge disturbance, (n, 4).
+
+    The yaw correction was designed for the stiffness `turning`; what w' is given follows the
+    stiffness of the moment, so that the poles stay where they were placed.
+    """
     count = len(delta)
     rows = np.empty((count, 4))
     w, w_dot, moment = w_measured[np.isfinite(w_measured)][0], 0.0, 0.0
@@ -107,7 +119,9 @@ def _observe(
     for k in range(count):
         if np.isfinite(w_measured[k]):
             error = w_measured[k] - w
-            w, w_dot, moment = w + yaw[0] * error, w_dot + yaw[1] * error, moment + yaw[2] * error
+            stiffer = (_stiffness(c, w) - turning) * interval
+            w_dot = w_dot + (yaw[1] + stiffer) * error
+            w, moment = w + yaw[0] * error, moment + yaw[2] * error
         if np.isfinite(v_measured[k]):
             error = v_measured[k] - v
             v, force = v + surge[0] * error, force + surge[1] * error

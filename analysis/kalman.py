@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from shiplog.clock import usual_interval_secs
 from shiplog.compiled import compiled
 from shiplog.errors import LogError
 from shiplog.ship import (
@@ -32,8 +33,8 @@ class Noise:
 
     measurement_std: FloatArray  # (2,) of one sample of yaw rate, rad/s, and speed, m/s
     process_ratio: FloatArray  # (2,) of yaw and surge: process over measurement intensity, 1/s^2
-    measured: bool  # whether the measurement noise was taken from the log
-    tuned: bool  # whether the ratio was
+    measured: tuple[bool, bool] = (False, False)  # whether the former was taken from the log
+    tuned: bool = False  # whether the latter was
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,7 @@ class Estimates:
     innovation_stds: FloatArray  # (n, 2), as the filter expects them
 
 
-class State(NamedTuple):
+class FilterState(NamedTuple):
     """x of the paper's five-state model."""
 
     w: float
@@ -67,7 +68,8 @@ def filter_states(signals: Signals, model: Coefficients, noise: Noise) -> Estima
     measured = np.column_stack([signals[name] for name in OUTPUTS])
     A, _ = pseudo_input_matrices(model, 1.0)
     r = noise.measurement_std**2
-    per_state = np.repeat(noise.process_ratio * r * signals.dt_secs, (3, 2))
+    intervals = [usual_interval_secs(signals[name], signals.dt_secs) for name in OUTPUTS]
+    per_state = np.repeat(noise.process_ratio * r * intervals, (3, 2))
     F, Q = map(np.ascontiguousarray, discretise(A, np.diag(per_state), signals.dt_secs))
     start, P = _start(model, measured, signals)
     rows = _filter(
@@ -89,9 +91,9 @@ def noise_of(signals: Signals, model: Coefficients, settings: FilterSettings) ->
             for name, std in zip(OUTPUTS, given, strict=True)
         ]
     )
-    measured = None in given
+    measured = (given[0] is None, given[1] is None)
     if settings.process_ratio is not None:
-        return Noise(stds, np.full(2, settings.process_ratio), measured, tuned=False)
+        return Noise(stds, np.full(2, settings.process_ratio), measured)
     head = _head(signals, TUNING_SAMPLES)
     ratio = np.full(2, PAPER_RATIO)
     for output in range(2):
@@ -124,7 +126,7 @@ def _likeliest_ratio(
     def unlikelihood(log_ratio: float) -> float:
         trial = ratio.copy()
         trial[output] = 10.0**log_ratio
-        estimates = filter_states(signals, model, Noise(stds, trial, measured=True, tuned=True))
+        estimates = filter_states(signals, model, Noise(stds, trial))
         e, s = estimates.innovations[:, output], estimates.innovation_stds[:, output]
         score = float(np.nansum((e / s) ** 2 + 2 * np.log(s)))
         return score if np.isfinite(score) else 1e300
@@ -142,12 +144,14 @@ def _head(signals: Signals, count: int) -> Signals:
     return Signals(signals.start_ns, signals.dt_secs, head)
 
 
-def _start(c: Coefficients, measured: FloatArray, signals: Signals) -> tuple[State, FloatArray]:
+def _start(
+    c: Coefficients, measured: FloatArray, signals: Signals
+) -> tuple[FilterState, FloatArray]:
     """The first values measured, their rates from the model at rest; as unsure as they vary."""
     w, v = (column[np.isfinite(column)][0] for column in measured.T)
     n = signals["rpm"][0]
     w_ddot = yaw_acceleration_rate(c, w, 0.0, v, n, signals["rudder"][0], 0.0)
-    start = State(w, 0.0, w_ddot, v, surge_acceleration(c, w, v, n))
+    start = FilterState(w, 0.0, w_ddot, v, surge_acceleration(c, w, v, n))
     dw, dv = np.nanstd(measured, axis=0) + 1e-9
     rate = abs(c.a) + 1e-3
     spread = np.array([dw, rate * dw, rate**2 * dw, dv, 1e-2 * dv])
@@ -157,7 +161,7 @@ def _start(c: Coefficients, measured: FloatArray, signals: Signals) -> tuple[Sta
 @compiled
 def _filter(
     c: Coefficients,
-    x: State,
+    x: FilterState,
     P: FloatArray,
     F: FloatArray,
     Q: FloatArray,
@@ -177,7 +181,7 @@ def _filter(
         delta_dot, n_dot = (delta[ahead] - delta[k]) / dt, (n[ahead] - n[k]) / dt
         # a rudder that starts or stops makes w'' jump
         jump = rudder_effect(c, x.v, n[k]) * c.e * (delta_dot - last_rate)
-        x = State(x.w, x.w_dot, x.w_ddot + jump, x.v, x.v_dot)
+        x = FilterState(x.w, x.w_dot, x.w_ddot + jump, x.v, x.v_dot)
         last_rate = delta_dot
         for output, state in ((0, 0), (1, 3)):
             S = P[state, state] + r[output]
@@ -197,14 +201,20 @@ def _filter(
 
 
 @compiled
-def _corrected(x: State, K: FloatArray, innovation: float) -> State:
-    return _moved(x, State(K[0], K[1], K[2], K[3], K[4]), innovation)
+def _corrected(x: FilterState, K: FloatArray, innovation: float) -> FilterState:
+    return _moved(x, FilterState(K[0], K[1], K[2], K[3], K[4]), innovation)
 
 
 @compiled
 def _predicted(
-    c: Coefficients, x: State, delta: float, delta_dot: float, n: float, n_dot: float, dt: float
-) -> State:
+    c: Coefficients,
+    x: FilterState,
+    delta: float,
+    delta_dot: float,
+    n: float,
+    n_dot: float,
+    dt: float,
+) -> FilterState:
     """One Runge-Kutta step of x' = A x + B u, the rudder and the revolutions moving evenly."""
     middle, end = dt / 2, dt
     k1 = _motion(c, x, delta, delta_dot, n, n_dot)
@@ -221,14 +231,14 @@ def _predicted(
 
 @compiled
 def _motion(
-    c: Coefficients, x: State, delta: float, delta_dot: float, n: float, n_dot: float
-) -> State:
+    c: Coefficients, x: FilterState, delta: float, delta_dot: float, n: float, n_dot: float
+) -> FilterState:
     """A x + B u, row by row, with the pseudo-inputs written out."""
     ks = rudder_effect(c, x.v, n)
     ks_dot = rudder_effect_rate(c, x.v, x.v_dot, n, n_dot)
     damping = c.b1 + 2 * c.b2 * abs(x.w) + 3 * c.b3 * x.w * x.w
     steering = c.d * delta + c.e * delta_dot
-    return State(
+    return FilterState(
         x.w_dot,
         yaw_acceleration_rate(c, x.w, x.w_dot, x.v, n, delta, delta_dot),
         c.a * x.w_ddot + damping * x.w_dot + ks_dot * steering + ks * c.d * delta_dot,
@@ -238,8 +248,8 @@ def _motion(
 
 
 @compiled
-def _moved(x: State, rate: State, h: float) -> State:
-    return State(
+def _moved(x: FilterState, rate: FilterState, h: float) -> FilterState:
+    return FilterState(
         x.w + h * rate.w,
         x.w_dot + h * rate.w_dot,
         x.w_ddot + h * rate.w_ddot,

@@ -116,8 +116,8 @@ def _input(analysis: Analysis, name: str) -> Panel:
 
 
 def _disturbance(analysis: Analysis, name: str, unit: str, values: FloatArray, std: float) -> Panel:
-    at = analysis.signals.time_secs
-    settled = at >= analysis.disturbance.settling_secs
+    at, found = analysis.signals.time_secs, analysis.disturbance
+    settled = at >= (found.yaw_settling_secs if name == "yaw" else found.surge_settling_secs)
     kept = values[settled] if settled.mean() > 0.5 else values
     guides = _guides(analysis, "±2σ of sensor noise", GUIDE * std)
     line = Line("disturbance", values, RED, 1.5)

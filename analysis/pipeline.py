@@ -75,7 +75,13 @@ def analyse(
             f"give the ship's own with --vessel: {log.name}"
         )
     residuals = tuple(
-        judge(name, log[name].unit, estimates.innovations[:, i], estimates.innovation_stds[:, i])
+        judge(
+            name,
+            log[name].unit,
+            estimates.innovations[:, i],
+            estimates.innovation_stds[:, i],
+            noise_measured=noise.measured[i],
+        )
         for i, name in enumerate(OUTPUTS)
     )
 

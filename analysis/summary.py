@@ -79,7 +79,9 @@ def _residuals(analysis: Analysis, output: int) -> Summary:
         "whiteness_p": residuals.whiteness_p,
         "white": residuals.white,
         "measurement_std": float(analysis.noise.measurement_std[output]),
-        "measurement_std_origin": "the log" if analysis.noise.measured else "the vessel file",
+        "measurement_std_origin": "the log"
+        if analysis.noise.measured[output]
+        else "the vessel file",
         "process_ratio": float(analysis.noise.process_ratio[output]),
         "process_ratio_origin": (
             "likeliest for the log" if analysis.noise.tuned else "the vessel file"
@@ -88,19 +90,24 @@ def _residuals(analysis: Analysis, output: int) -> Summary:
 
 
 def _disturbance(analysis: Analysis) -> Summary:
-    found = analysis.disturbance
-    settling = int(found.settling_secs / analysis.signals.dt_secs)
+    found, dt = analysis.disturbance, analysis.signals.dt_secs
+    yaw, surge = found.yaw_settling_secs, found.surge_settling_secs
     return {
-        "settling_secs": found.settling_secs,
-        "yaw": _course(found.yaw, found.yaw_std, "rad/s³", settling),
-        "yaw_as_rudder": _course(found.rudder, found.rudder_std, "rad", settling),
-        "surge": _course(found.surge, found.surge_std, "m/s²", settling),
+        "yaw": _course(found.yaw, found.yaw_std, "rad/s³", yaw, dt),
+        "yaw_as_rudder": _course(found.rudder, found.rudder_std, "rad", yaw, dt),
+        "surge": _course(found.surge, found.surge_std, "m/s²", surge, dt),
     }
 
 
-def _course(values: FloatArray, std: float, unit: str, settling: int) -> Summary:
+def _course(values: FloatArray, std: float, unit: str, settling_secs: float, dt: float) -> Summary:
     """A disturbance over the trial, its first transient left out; `last` is a mean at the end."""
+    settling = int(settling_secs / dt)
+    values = np.where(np.isfinite(values), values, np.nan)
     settled = values[settling:] if len(values) > 2 * settling else values
+    if np.isnan(settled).all():
+        return dict.fromkeys(("mean", "rms", "lowest", "highest", "last")) | {
+            "sensor_noise_std": std, "settling_secs": settling_secs, "unit": unit
+        }  # fmt: skip
     return {
         "mean": float(np.nanmean(settled)),
         "rms": float(np.sqrt(np.nanmean(settled**2))),
@@ -108,6 +115,7 @@ def _course(values: FloatArray, std: float, unit: str, settling: int) -> Summary
         "highest": float(np.nanmax(settled)),
         "last": float(np.nanmean(values[-max(settling, 1) :])),
         "sensor_noise_std": std,
+        "settling_secs": settling_secs,
         "unit": unit,
     }
 
@@ -208,6 +216,8 @@ def _verdict(residuals: OutputResiduals) -> str:
     if not residuals.consistent:
         larger = residuals.normalised_squared > residuals.expected[1]
         size = f"; they are {'larger' if larger else 'smaller'} than the noise assumed"
+    if residuals.white is None:
+        return f"{residuals.name}: too few measurements to tell whether innovations are white."
     if residuals.white:
         return f"{residuals.name}: innovations are white (test at 1 %){size}."
     return (
@@ -225,8 +235,10 @@ def _disturbance_section(analysis: Analysis) -> Section:
         ("surge", "surge", 1e3, "mm/s²"),
     ):
         course = found[key]
-        values = [course[k] * scale for k in ("mean", "rms", "last", "sensor_noise_std")]
-        rows.append((f"{label} [{unit}]", *(f"{value:.3g}" for value in values)))
+        values = [course[k] for k in ("mean", "rms", "last", "sensor_noise_std")]
+        rows.append(
+            (f"{label} [{unit}]", *("" if v is None else f"{v * scale:.3g}" for v in values))
+        )
     columns = ("disturbance", "mean", "rms", "at the end", "std by noise")
     remark = "An error of the model counts as a disturbance; the std is by sensor noise alone."
     return Section("Disturbance observed", columns, tuple(rows), (remark,))
