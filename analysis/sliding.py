@@ -17,7 +17,9 @@ from shiplog.types import FloatArray
 from .weak_form import Rows, with_constant
 
 WINDOW_SECS = 200.0
-WORST_CONDITION = 1e4  # beyond it a window cannot tell its coefficients apart
+RICHEST = 400.0  # condition of a window beyond which it is blank: in a steady turn it is so
+WORST_CONDITION = 1e4  # the same of a whole trial, of which each coefficient is judged by itself:
+WORST_INFLATION = 150.0  # how much less sure than alone, for what the others can do in its place
 CORRELATED = 1 / 3  # of a bump's width: over this its curvature keeps its sign
 
 
@@ -88,28 +90,38 @@ def fit(rows: Rows) -> Fit:
     """Column-scaled least squares with errors that allow for overlapping, coloured residuals.
 
     The covariance is Newey and West's (1987) over the rows that share data, enlarged for the
-    freedom that the coefficients take of the rows that could differ.
+    freedom that the coefficients take of the rows that could differ, and for the few rows beside
+    their overlap, so that two standard deviations are a 95 % interval (Kiefer and Vogelsang,
+    "A new asymptotic theory for heteroskedasticity-autocorrelation robust tests", 2005). What the
+    rows cannot tell is NaN: where nothing moved, or where other coefficients can do what
+    one does.
     """
-    values, stds, conditions = _fits(rows, len(rows.target))
+    values, stds, conditions = _fits(rows, len(rows.target), WORST_CONDITION)
     return Fit(values[0], stds[0], float(conditions[0]))
 
 
 def _history(rows: Rows, window_secs: float) -> History:
     count = len(rows.centres_secs)
     length = max(1, min(count, round((window_secs - rows.bump_secs) / rows.stride_secs) + 1))
-    values, stds, conditions = _fits(rows, length)
+    values, stds, conditions = _fits(rows, length, RICHEST)
     ends = rows.centres_secs[length - 1 :] + rows.bump_secs / 2
     return History(rows.names, ends[: len(values)], values, stds, conditions)
 
 
-def _fits(rows: Rows, length: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _fits(
+    rows: Rows, length: int, worst_condition: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Values (k, p), standard deviations (k, p) and condition (k,) of each run of rows."""
     X, y = np.ascontiguousarray(rows.regressors), np.ascontiguousarray(rows.target)
     count, p = max(len(y) - length + 1, 1), X.shape[1]
     values, stds = np.full((count, p), np.nan), np.full((count, p), np.nan)
     conditions = np.full(count, np.inf)
     known = np.isfinite(y) & np.isfinite(X).all(axis=1)
-    _slide(X, y, known, length, rows.overlap, values, stds, conditions)
+    excitation = np.ascontiguousarray(rows.excitation)
+    _slide(
+        X, y, excitation, rows.least_excitation, known, length, rows.overlap, worst_condition,
+        values, stds, conditions,
+    )  # fmt: skip
     return values, stds, conditions
 
 
@@ -117,9 +129,12 @@ def _fits(rows: Rows, length: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _slide(
     X: FloatArray,
     y: FloatArray,
+    excitation: FloatArray,
+    least: float,
     known: NDArray[np.bool_],
     length: int,
     overlap: int,
+    worst_condition: float,
     values: FloatArray,
     stds: FloatArray,
     conditions: FloatArray,
@@ -133,21 +148,31 @@ def _slide(
         freedom = independent - len(kept)
         if len(kept) == 0 or freedom <= 0 or len(rows) < len(kept):
             continue
+        if np.max(excitation[rows]) - np.min(excitation[rows]) < least:
+            continue
         A = X[rows][:, kept] / scale[kept]
         R, projected = _triangular(A, y[rows])
         singular = np.linalg.svd(R)[1]
         conditions[k] = singular[0] / singular[-1] if singular[-1] > 0 else np.inf
-        if conditions[k] > WORST_CONDITION:
+        if conditions[k] > worst_condition:
             continue
         inverse = np.linalg.inv(R)
         scaled = inverse @ projected
         S = _neighbours_products(A, y[rows] - A @ scaled, overlap)
         inverse = inverse @ inverse.T  # of A'A
-        covariance = inverse @ S @ inverse
+        covariance = inverse @ S @ inverse * (independent / freedom)
+        few = _few_rows(overlap / len(rows))
         for i in range(len(kept)):
-            values[k, kept[i]] = scaled[i] / scale[kept[i]]
-            spread = np.sqrt(covariance[i, i] * independent / freedom)
-            stds[k, kept[i]] = spread / scale[kept[i]]
+            if inverse[i, i] <= WORST_INFLATION**2:
+                values[k, kept[i]] = scaled[i] / scale[kept[i]]
+                stds[k, kept[i]] = few * np.sqrt(covariance[i, i]) / scale[kept[i]]
+
+
+@compiled
+def _few_rows(b: float) -> float:
+    """The 95 % point of Kiefer and Vogelsang over the Gaussian's, b the overlap over the rows."""
+    b = min(b, 1.0)
+    return (1.96 + 2.9694 * b + 0.4160 * b**2 - 0.5324 * b**3) / 1.96
 
 
 @compiled

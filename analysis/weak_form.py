@@ -23,6 +23,8 @@ from shiplog.types import FloatArray, Signals
 
 BUMP_SECS = 60.0  # long against the noise, short against the ship's turning
 STRIDE_SECS = 1.0
+LEAST_RUDDER = np.radians(2.0)  # a rudder that moves less tells nothing of yaw,
+LEAST_SPEED = 0.02  # nor does a speed that changes by a smaller share of itself tell of surge
 BUMP_POWER = 4  # (1 - s^2)^4: three derivatives vanish at the ends
 
 
@@ -36,6 +38,8 @@ class Rows:
     regressors: FloatArray  # (m, p)
     stride_secs: float  # from one bump to the next
     bump_secs: float  # the length of one
+    excitation: FloatArray  # (m,) what must move for the rows to tell anything
+    least_excitation: float  # by how much, at the least
 
     @property
     def overlap(self) -> int:
@@ -75,11 +79,16 @@ def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
         ("h", integral(n, bump)),
     )
     rows = []
-    for columns, target in ((yaw, integral(w, curvature)), (surge, -integral(v, slope))):
+    for columns, target, moved, least in (
+        (yaw, integral(w, curvature), integral(delta, bump), LEAST_RUDDER),
+        (surge, -integral(v, slope), integral(v, bump), LEAST_SPEED * float(np.nanmax(np.abs(v)))),
+    ):
         names, values = zip(*columns, strict=True)
         centres = (half + stride * np.arange(len(target))) * dt
         regressors = np.column_stack(values)
-        rows.append(Rows(names, centres, target, regressors, stride * dt, 2 * half * dt))
+        rows.append(
+            Rows(names, centres, target, regressors, stride * dt, 2 * half * dt, moved, least)
+        )
     return rows[0], rows[1]
 
 

@@ -59,7 +59,7 @@ def test_nothing_of_the_assumed_model_comes_back(vessel: Vessel) -> None:
 
 
 def test_a_window_is_the_same_regression_as_numpys_on_its_rows(vessel: Vessel) -> None:
-    yaw, _ = rows_of(vessel, noise="paper")
+    yaw, _ = rows_of(vessel, "pseudo-random", noise="paper")
     history = identify(yaw).history
     k = 120
     inside = (yaw.centres_secs + 30 <= history.time_secs[k] + 1e-6) & (
@@ -119,7 +119,7 @@ def test_errors_allow_for_overlapping_rows() -> None:
     for _ in range(300):
         noise = np.convolve(rng.standard_normal(n + overlap - 1), np.ones(overlap), "valid")
         y = x @ [2.0, -1.0] + noise
-        rows = Rows(("a", "d"), np.arange(float(n)), y, x, 1.0, float(overlap))
+        rows = Rows(("a", "d"), np.arange(float(n)), y, x, 1.0, float(overlap), x[:, 0], 0.1)
         found = fit(rows)
         slopes.append(found.values[0])
         claimed.append(found.stds[0])
@@ -127,6 +127,47 @@ def test_errors_allow_for_overlapping_rows() -> None:
         naive.append(np.sqrt(left @ left / (n - 2) * np.linalg.inv(x.T @ x)[0, 0]))
     assert np.mean(claimed) == pytest.approx(np.std(slopes), rel=0.25)
     assert np.mean(naive) < 0.4 * np.std(slopes)
+
+
+@pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "turning-circle", "pull-out"])
+def test_two_standard_deviations_hold_the_truth_as_often_as_they_say(
+    vessel: Vessel, manoeuvre: str
+) -> None:
+    """Over seeds and noises, of whole trials and of their windows."""
+    inside: dict[str, list[bool]] = {"whole": [], "windows": []}
+    for seed in range(8):
+        for noise in ("white", "paper"):
+            sensors = suite(noise)
+            trial = simulate(vessel, manoeuvre, duration_secs=500.0, seed=seed, sensors=sensors)
+            signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
+            yaw, surge = weak_form(signals, vessel.coefficients)
+            for found in (identify(yaw, constant=True), identify(surge)):
+                true = np.array([getattr(vessel.coefficients, n) for n in found.history.names])
+                for name, c in found.coefficients.items():
+                    if np.isfinite(c.std):
+                        away = c.value - getattr(vessel.coefficients, name)
+                        inside["whole"].append(abs(away) < 2 * c.std)
+                known = np.isfinite(found.history.stds)
+                held = np.abs(found.history.values - true) < 2 * found.history.stds
+                inside["windows"] += held[known].tolist()
+    assert np.mean(inside["whole"]) > 0.9
+    assert np.mean(inside["windows"]) > 0.9
+
+
+def test_in_a_steady_turn_windows_are_blank_and_b1_b2_are_not_told(vessel: Vessel) -> None:
+    yaw, _ = rows_of(vessel, "turning-circle", "paper")
+    found = identify(yaw, constant=True)
+    assert np.isnan(found.history.values).all()
+    assert not found.coefficients["b1"].determined
+    assert not found.coefficients["b2"].determined
+    assert found.coefficients["a"].determined
+
+
+def test_a_straight_run_tells_nothing_of_yaw(vessel: Vessel) -> None:
+    still = simulate(vessel, "turning-circle", duration_secs=10.0, sensors=suite("paper"))
+    signals = resample(TrialLog("still", still.channels), channels=NAMES)
+    yaw, _ = weak_form(signals, vessel.coefficients)
+    assert not any(c.determined for c in identify(yaw).coefficients.values())
 
 
 def test_a_coefficient_is_determined_two_standard_deviations_from_zero() -> None:
