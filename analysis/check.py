@@ -1,12 +1,12 @@
 """A replay against its reference: the regression check.
 
 The reference of `zigzag.mcap` is `zigzag.ref.mcap` beside it: a log of what the replay found,
-in blocks of two seconds and in the order in which it is found, so that the first channel that
+in blocks of four seconds and in the order in which it is found, so that the first channel that
 differs is where to look. Each carries its own tolerance, in its own unit.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -18,23 +18,31 @@ from shiplog.ship import COEFFICIENT_UNITS
 from shiplog.types import FloatArray, TimeArray
 
 from .kalman import OUTPUTS, STATES
-from .pipeline import NEEDED, Analysis, analyse
+from .pipeline import Analysis, analyse
 from .sliding import Identification
 
 SUFFIX = ".ref.mcap"
 NOT_LOGS = (SUFFIX, ".truth.mcap")
-BLOCK_SECS = 2.0
+BLOCK_SECS = 4.0
+MOST_ROWS = 200  # of a history or a track, evenly: a change lasts longer than their distance
 
 # How far a channel may stray, as a share of its largest value when the reference was made: what
 # another processor's rounding may do to it, amplified by the condition of what is solved.
 _SHARES = {
     "measured": 1e-12,
+    "moment": 1e-12,
+    "share": 1e-12,
     "model": 1e-12,
+    "assumed": 1e-6,
     "estimate": 1e-9,
     "std": 1e-9,
     "innovation": 1e-9,
+    "verdict": 1e-6,
     "whole": 1e-8,
+    "whole_std": 1e-7,
     "history": 1e-7,
+    "history_std": 1e-6,
+    "track": 1e-9,
 }
 _UNITS = {
     "yaw_acceleration": "rad/s²",
@@ -46,6 +54,10 @@ _UNITS = {
     "speed": "m/s",
     "rudder": "rad",
     "rpm": "rpm",
+    "heading": "rad",
+    "rudder_disturbance": "rad",
+    "north": "m",
+    "east": "m",
     **COEFFICIENT_UNITS,
 }
 
@@ -186,57 +198,108 @@ def update(log: Path) -> None:
 
 
 def make_reference(analysis: Analysis) -> TrialLog:
-    """What a replay found, as a log: means over short blocks, so that nothing slips between."""
-    signals, estimates, found = analysis.signals, analysis.estimates, analysis.disturbance
-    channels = [_blocks(analysis, name, "measured", signals[name]) for name in NEEDED]
-    channels += [
-        _single(analysis, name, "model", value)
-        for name, value in analysis.vessel.coefficients._asdict().items()
+    """What a replay found, as a log: short blocks, in which nothing slips between."""
+    channels = [
+        *_measured(analysis),
+        *_assumed(analysis),
+        *_estimated(analysis),
+        *_identified(analysis, analysis.yaw),
+        *_identified(analysis, analysis.surge),
+        *_tracked(analysis),
     ]
-    for i, name in enumerate(STATES):
-        channels.append(_blocks(analysis, name, "estimate", estimates.states[:, i]))
-        channels.append(_blocks(analysis, name, "std", estimates.stds[:, i]))
-    for i, name in enumerate(OUTPUTS):
-        channels.append(_blocks(analysis, name, "innovation", estimates.innovations[:, i]))
-    channels.append(_blocks(analysis, "yaw_disturbance", "estimate", found.yaw))
-    channels.append(_blocks(analysis, "surge_disturbance", "estimate", found.surge))
-    for identification in (analysis.yaw, analysis.surge):
-        channels += _identified(analysis, identification)
     metadata = {"reference_of": analysis.log.name, "model": analysis.model_origin}
     return TrialLog(analysis.log.name, tuple(channels), metadata)
 
 
-def _identified(analysis: Analysis, found: Identification) -> list[Channel]:
-    channels = []
-    stamps = analysis.signals.start_ns + np.round(found.history.time_secs * 1e9).astype(np.int64)
+def _measured(analysis: Analysis) -> Iterator[Channel]:
+    """The mean of each block, a mean that minds the order, and the share that was measured."""
+    for name, values in analysis.signals.values.items():
+        place = np.arange(len(values)) % 97 / 97
+        yield _blocks(analysis, name, "measured", values)
+        yield _blocks(analysis, name, "moment", values * place)
+        yield _blocks(analysis, f"{name}_known", "share", np.isfinite(values).astype(float))
+
+
+def _assumed(analysis: Analysis) -> Iterator[Channel]:
+    for name, value in analysis.vessel.coefficients._asdict().items():
+        yield _single(analysis, name, "model", value)
+    noise = analysis.noise
+    for i, name in enumerate(OUTPUTS):
+        assumed = np.array([noise.measurement_std[i], noise.process_ratio[i]])
+        yield _row(analysis, f"{name}_noise", "assumed", assumed)
+
+
+def _estimated(analysis: Analysis) -> Iterator[Channel]:
+    estimates, found = analysis.estimates, analysis.disturbance
+    for i, name in enumerate(STATES):
+        yield _blocks(analysis, name, "estimate", estimates.states[:, i])
+        yield _blocks(analysis, name, "std", estimates.stds[:, i])
+    for i, name in enumerate(OUTPUTS):
+        yield _blocks(analysis, name, "innovation", estimates.innovations[:, i])
+        judged = analysis.residuals[i]
+        verdict = [judged.rms, judged.normalised_squared, *judged.expected, judged.whiteness_p]
+        yield _row(analysis, f"{name}_residuals", "verdict", np.array(verdict))
+    for name, values, std in (
+        ("yaw_disturbance", found.yaw, found.yaw_std),
+        ("rudder_disturbance", found.rudder, found.rudder_std),
+        ("surge_disturbance", found.surge, found.surge_std),
+    ):
+        yield _blocks(analysis, name, "estimate", values)
+        yield _single(analysis, name, "std", std)
+
+
+def _identified(analysis: Analysis, found: Identification) -> Iterator[Channel]:
+    history = found.history
+    rows = _evenly(len(history.time_secs))
+    stamps = _stamps(analysis, history.time_secs[rows])
     for i, (name, whole) in enumerate(found.coefficients.items()):
-        channels.append(_single(analysis, name, "whole", whole.value))
-        channels.append(_channel(name, "history", stamps, found.history.values[:, i]))
-    return channels
+        yield _single(analysis, name, "whole", whole.value)
+        yield _single(analysis, name, "whole_std", whole.std)
+        yield _channel(name, "history", stamps, history.values[rows, i])
+        yield _channel(name, "history_std", stamps, history.stds[rows, i])
+
+
+def _tracked(analysis: Analysis) -> Iterator[Channel]:
+    track = analysis.track
+    rows = _evenly(len(track.time_secs))
+    stamps = _stamps(analysis, track.time_secs[rows])
+    yield _channel("north", "track", stamps, track.north[rows])
+    yield _channel("east", "track", stamps, track.east[rows])
+
+
+def _evenly(count: int) -> TimeArray:
+    return np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(np.int64))
+
+
+def _stamps(analysis: Analysis, time_secs: FloatArray) -> TimeArray:
+    return analysis.signals.start_ns + np.round(time_secs * 1e9).astype(np.int64)
 
 
 def _blocks(analysis: Analysis, name: str, kind: str, values: FloatArray) -> Channel:
     """The means of what was there in each block; NaN where there was nothing."""
-    signals = analysis.signals
-    block = (signals.time_secs // BLOCK_SECS).astype(np.int64)
+    block = (analysis.signals.time_secs // BLOCK_SECS).astype(np.int64)
     there = np.isfinite(values)
     count = np.bincount(block[there], minlength=int(block[-1]) + 1)
     total = np.bincount(block[there], weights=values[there], minlength=len(count))
     with np.errstate(invalid="ignore"):
         means = total / count
-    starts = np.arange(len(count)) * BLOCK_SECS
-    stamps = signals.start_ns + np.round(starts * 1e9).astype(np.int64)
-    return _channel(name, kind, stamps, means)
+    return _channel(name, kind, _stamps(analysis, np.arange(len(count)) * BLOCK_SECS), means)
 
 
 def _single(analysis: Analysis, name: str, kind: str, value: float) -> Channel:
-    return _channel(name, kind, np.array([analysis.signals.start_ns]), np.array([value]))
+    return _row(analysis, name, kind, np.array([value]))
+
+
+def _row(analysis: Analysis, name: str, kind: str, values: FloatArray) -> Channel:
+    """Values that are of the whole trial, one after the other."""
+    return _channel(name, kind, np.full(len(values), analysis.signals.start_ns), values)
 
 
 def _channel(name: str, kind: str, stamps: TimeArray, values: FloatArray) -> Channel:
     largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
     tolerance = {"tolerance": repr(_SHARES[kind] * largest)}
-    return Channel(name, kind, _UNITS[name], stamps, stamps, values, metadata=tolerance)
+    unit = _UNITS.get(name, "1")
+    return Channel(name, kind, unit, stamps, stamps, values, metadata=tolerance)
 
 
 def _differences(replay: TrialLog, reference: TrialLog) -> tuple[Difference, ...]:

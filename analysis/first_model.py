@@ -19,25 +19,38 @@ _BARE = Coefficients(
     alpha1=1.0, alpha2=0.0, alpha3=0.0,
 )  # fmt: skip
 
+YAW_FORMS = (("a", "b1", "b2", "d", "e"), ("a", "b1", "d", "e"), ("a", "d", "e"))
+SURGE_FORMS = (SURGE_COEFFICIENTS, ("f", "h"))
+
 
 def fit_first_model(signals: Signals, name: str) -> Vessel:
     """A vessel whose coefficients are those of the whole log, by least squares in weak form.
 
-    b3 is left out: on a real ship it cannot be told from b2. A constant takes up the rudder's
-    zero and the gyro's bias. Raises `LogError` where the log is too short or too quiet to tell.
+    b3 is left out, for on a real ship it cannot be told from b2; and b2 and b1 where the log
+    cannot tell them either. A constant takes up the rudder's zero. Raises `LogError` where the
+    log is too short or too quiet to tell even so much.
     """
     yaw, surge = weak_form(signals, _BARE)
-    yaw_names = ("a", "b1", "b2", "d", "e")
-    found = dict(zip(yaw_names, fit(with_constant(_only(yaw, yaw_names))).values, strict=False))
-    found |= dict(zip(SURGE_COEFFICIENTS, fit(surge).values, strict=True))
-    if not np.all(np.isfinite(list(found.values()))):
+    found = _richest(yaw, YAW_FORMS, constant=True) | _richest(surge, SURGE_FORMS, constant=False)
+    unknown = [part for part, key in (("yaw", "a"), ("surge", "f")) if key not in found]
+    if unknown:
         raise LogError(
-            "the log carries no model, and is too short or too quiet to fit one; "
-            f"give the ship's with --vessel: {name}"
+            f"the log carries no model, and too little moves in it to fit one of "
+            f"{' and '.join(unknown)}; give the ship's with --vessel: {name}"
         )
-    coefficients = _BARE._replace(**{key: float(value) for key, value in found.items()})
+    coefficients = _BARE._replace(**found)
     rpm = float(np.nanmedian(signals["rpm"]))
     return Vessel(f"fitted to {name}", coefficients, approach_rpm=rpm)
+
+
+def _richest(rows: Rows, forms: tuple[tuple[str, ...], ...], *, constant: bool) -> dict[str, float]:
+    """The coefficients of the first of the forms that the rows can tell; none if they cannot."""
+    for names in forms:
+        chosen = _only(rows, names)
+        values = fit(with_constant(chosen) if constant else chosen).values[: len(names)]
+        if np.isfinite(values).all():
+            return dict(zip(names, values.tolist(), strict=True))
+    return {}
 
 
 def _only(rows: Rows, names: tuple[str, ...]) -> Rows:

@@ -21,6 +21,7 @@ from .track import Track, find_track
 from .weak_form import weak_form
 
 INPUTS = ("rudder", "rpm")
+FITTED = "a first model, fitted to this log"
 FEWEST = 4  # samples of an output: their third difference shows its noise
 NEEDED = (*OUTPUTS, *INPUTS)
 STEPS = ("check", "one clock", "model", "filter", "disturbance", "coefficients")
@@ -65,6 +66,8 @@ def analyse(
     on_step("model")
     vessel, origin = _model(log, vessel, signals)
     model = vessel.coefficients
+    if origin == FITTED and not (model.a < 0 and model.g <= 0 and model.h >= 0):
+        warnings.append("the model fitted to this log is no ship's: too little moves in it to tell")
 
     on_step("filter")
     noise = noise_of(known, model, _averaged(vessel.filter, log, signals.dt_secs))
@@ -103,7 +106,7 @@ def _model(log: TrialLog, given: Vessel | None, signals: Signals) -> tuple[Vesse
         return given, "given"
     if log.vessel_toml is not None:
         return parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}"), "carried by the log"
-    return fit_first_model(signals, log.name), "a first model, fitted to this log"
+    return fit_first_model(signals, log.name), FITTED
 
 
 def _doubtful(log: TrialLog) -> Iterator[str]:

@@ -42,5 +42,5 @@ def test_a_log_that_cannot_tell_is_refused(vessel: Vessel, manoeuvre: str, durat
 
 def test_a_ship_at_rest_tells_nothing() -> None:
     still = {name: np.zeros(4000) for name in NAMES}
-    with pytest.raises(LogError, match="too short or too quiet"):
+    with pytest.raises(LogError, match="too little moves in it to fit one of yaw and surge"):
         fit_first_model(Signals(0, 0.1, still), "quiet.mcap")
