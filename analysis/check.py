@@ -149,13 +149,19 @@ def describe(difference: Difference) -> str:
 def logs_in(path: Path) -> list[Path]:
     """The log itself, or the logs of a folder without references and truths.
 
-    Raises `ShiplogError` where there is none.
+    Raises `ShiplogError` where there is none, or a reference without its log.
     """
+    if not path.exists():
+        raise ShiplogError(f"no such file or folder: {path}")
     if not path.is_dir():
         return [path]
     logs = sorted(p for p in path.glob("*.mcap") if not p.name.endswith(NOT_LOGS))
     if not logs:
         raise ShiplogError(f"no logs (*.mcap) in the folder; name one that has some: {path}")
+    orphans = set(path.glob(f"*{SUFFIX}")) - {reference_path(log) for log in logs}
+    if orphans:
+        names = ", ".join(sorted(ref.name for ref in orphans))
+        raise ShiplogError(f"references whose logs are gone ({names}); delete them: {path}")
     return logs
 
 
@@ -177,19 +183,26 @@ def compare(
     """
     name = log.name if isinstance(log, TrialLog) else Path(log).name
     try:
+        trial = log if isinstance(log, TrialLog) else read(log)
         if reference is None:
-            if isinstance(log, TrialLog):
-                raise ShiplogError("a log that is no file needs its reference given")
-            reference = reference_path(Path(log))
-            if not reference.exists():
-                raise ShiplogError(
-                    "has no reference; look at its replay, then run `shiplog check --update`"
-                )
+            reference = _beside(log)
         known = reference if isinstance(reference, TrialLog) else read(reference)
-        replay = make_reference(analyse(log if isinstance(log, TrialLog) else read(log), vessel))
+        replay = make_reference(analyse(trial, vessel))
     except ShiplogError as error:
         return Comparison(name, (), str(error))
     return Comparison(name, _differences(replay, known), "", replay, known)
+
+
+def _beside(log: str | os.PathLike[str] | TrialLog) -> Path:
+    """The reference beside a log; `ShiplogError` where there is none."""
+    if isinstance(log, TrialLog):
+        raise ShiplogError("a log that is no file needs its reference given")
+    path = reference_path(Path(log))
+    if not path.exists():
+        raise ShiplogError(
+            f"has no reference; look at its replay, then run `shiplog check {log} --update`"
+        )
+    return path
 
 
 def update(log: Path) -> None:

@@ -57,10 +57,11 @@ def observe_disturbance(signals: Signals, model: Coefficients, noise: Noise) -> 
         model, w, v, signals["rudder"], signals["rpm"], dt, yaw.correction, surge.correction,
         turning, interval,
     )  # fmt: skip
-    # a rudder of 0 at no speed does nothing: the equivalent is then not a number
+    # a ship without way has a rudder that does nothing: the equivalent is then not a number
     steering = model.d * _rudder_effects(model, rows[:, 2], signals["rpm"])
     with np.errstate(divide="ignore", invalid="ignore"):
-        rudder = np.where(np.abs(steering) > 0, rows[:, 1] / steering, np.nan)
+        works = np.abs(steering) > 1e-3 * np.max(np.abs(steering))
+        rudder = np.where(works, rows[:, 1] / steering, np.nan)
     std_w, std_v = noise.measurement_std
     yaw_std = float(yaw.noise_gain[2] * std_w)
     usual = float(np.median(np.abs(steering)))

@@ -10,6 +10,7 @@ from shiplog import LogError, Signals, TrialLog, Vessel, resample
 from shiplog.clock import gap_threshold_secs, usual_period_secs
 from shiplog.quality import examine
 from shiplog.rudder_sign import rudder_sign_warning
+from shiplog.units import CATALOGUE
 from shiplog.vessel import FilterSettings, parse_vessel
 
 from .disturbance import Disturbance, observe_disturbance
@@ -58,10 +59,11 @@ def analyse(
     warnings = [*log.warnings, *examine(log, NEEDED)]
 
     on_step("one clock")
-    signals = resample(log, channels=NEEDED, optional=("heading",))
+    possible = _possible(log)
+    signals = resample(possible, channels=NEEDED, optional=("heading",))
     _require_outputs(log, signals)
     known, unknown = _hold_inputs(signals)
-    warnings += [*_doubtful(log), *_silent_ends(log, signals), *unknown]
+    warnings += [*_doubtful(possible), *_silent_ends(possible, signals), *unknown]
 
     on_step("model")
     vessel, origin = _model(log, vessel, signals)
@@ -107,6 +109,18 @@ def _model(log: TrialLog, given: Vessel | None, signals: Signals) -> tuple[Vesse
     if log.vessel_toml is not None:
         return parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}"), "carried by the log"
     return fit_first_model(signals, log.name), FITTED
+
+
+def _possible(log: TrialLog) -> TrialLog:
+    """The log with what no ship does as not measured; `examine` has said where."""
+    channels = []
+    for channel in log:
+        kind = CATALOGUE.get(channel.name)
+        if kind is not None and not channel.fields:
+            possible = (channel.values >= kind.lowest) & (channel.values <= kind.highest)
+            channel = replace(channel, values=np.where(possible, channel.values, np.nan))  # noqa: PLW2901
+        channels.append(channel)
+    return replace(log, channels=tuple(channels))
 
 
 def _doubtful(log: TrialLog) -> Iterator[str]:

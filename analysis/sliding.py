@@ -71,9 +71,10 @@ def identify(
 ) -> Identification:
     """The coefficients of one equation over the whole trial and over each window.
 
-    With `constant`, a constant disturbance is estimated beside those of the whole trial (a gyro's
-    bias, the rudder's zero); within one window it cannot be told from the rest. A trial shorter
-    than the window is one window.
+    With `constant`, a constant is estimated beside those of the whole trial: a steady moment, or
+    the rudder's zero. A gyro's bias it takes up in part only, for that stands in w|w| and w^3 too.
+    Within one window no constant can be told from the rest. A trial shorter than the window is
+    one window.
     """
     whole = fit(with_constant(rows) if constant else rows)
     return Identification(

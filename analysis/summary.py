@@ -14,7 +14,7 @@ from shiplog.ship import COEFFICIENT_UNITS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, factor
 
-from .pipeline import Analysis
+from .pipeline import FITTED, Analysis
 from .residuals import OutputResiduals
 from .sliding import Identification
 
@@ -50,6 +50,7 @@ def summarise(analysis: Analysis) -> Summary:
         },
         "disturbance": _disturbance(analysis),
         "coefficients": _coefficients(analysis.yaw) | _coefficients(analysis.surge),
+        "windows": {"yaw": _windows(analysis.yaw), "surge": _windows(analysis.surge)},
         "track": analysis.track.origin,
         "warnings": list(analysis.warnings),
     }
@@ -133,6 +134,20 @@ def _coefficients(found: Identification) -> Summary:
     }
 
 
+def _windows(found: Identification) -> Summary:
+    """How well the sliding windows could tell: their condition numbers, and how many are blank."""
+    conditions = found.history.conditions
+    known = conditions[np.isfinite(conditions)]
+    return {
+        "count": len(conditions),
+        "blank": int(np.isnan(found.history.values).all(axis=1).sum()),
+        "condition_median": float(np.median(known)) if len(known) else None,
+        "condition_worst": float(np.max(known)) if len(known) else None,
+        "conditions": conditions.tolist(),
+        "time_secs": found.history.time_secs.tolist(),
+    }
+
+
 def _without_nan(value: Any) -> Any:  # noqa: ANN401 - walks a tree of JSON
     if isinstance(value, dict):
         return {key: _without_nan(inner) for key, inner in value.items()}
@@ -194,7 +209,9 @@ def _log_section(analysis: Analysis) -> Section:
 
 
 def _filter_section(analysis: Analysis) -> Section:
-    rows, remarks = [], [f"Model: {analysis.vessel.name} ({analysis.model_origin})."]
+    fitted = analysis.model_origin == FITTED
+    model = FITTED if fitted else f"{analysis.vessel.name} ({analysis.model_origin})"
+    rows, remarks = [], [f"Model: {model}."]
     for residuals in analysis.residuals:
         unit = CATALOGUE[residuals.name].display_unit
         rms = residuals.rms * factor(residuals.unit, unit)
@@ -240,8 +257,14 @@ def _disturbance_section(analysis: Analysis) -> Section:
             (f"{label} [{unit}]", *("" if v is None else f"{v * scale:.3g}" for v in values))
         )
     columns = ("disturbance", "mean", "rms", "at the end", "std by noise")
-    remark = "An error of the model counts as a disturbance; the std is by sensor noise alone."
-    return Section("Disturbance observed", columns, tuple(rows), (remark,))
+    caution = (
+        "As rudder: the angle that would do the same at the speed then. "
+        "The std is by sensor noise alone; an error of the model counts as a disturbance."
+    )
+    remarks = [caution]
+    if analysis.model_origin == FITTED:
+        remarks.append("The model was fitted to this log: this is what it leaves unexplained.")
+    return Section("Disturbance observed", columns, tuple(rows), tuple(remarks))
 
 
 def _coefficient_section(analysis: Analysis) -> Section:
@@ -252,10 +275,13 @@ def _coefficient_section(analysis: Analysis) -> Section:
             if not coefficient.determined:
                 value, std = "not determined", f"{coefficient.std:.2g}" if std != "nan" else ""
             rows.append((name, value, std, coefficient.unit, f"{model[name]:.4g}"))
+    if analysis.model_origin == FITTED:  # beside itself it would only seem confirmed
+        rows = [(*row[:-1], "") for row in rows]
     remark = (
         f"Condition of the scaled regressors: yaw {analysis.yaw.condition:.0f}, "
         f"surge {analysis.surge.condition:.0f}. "
-        "Not determined: less than two standard deviations from zero."
+        "Not determined: the log cannot tell it from the others, or not even its sign. "
+        "Two standard deviations are a 95 % interval. A gyro's bias goes into b1, b2, b3 and e."
     )
     columns = ("coefficient", "from this log", "std", "unit", "in the model")
     return Section("Coefficients", columns, tuple(rows), (remark,))

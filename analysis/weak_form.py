@@ -93,7 +93,7 @@ def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
 
 
 def with_constant(rows: Rows) -> Rows:
-    """The same with one more regressor: a disturbance or a sensor's bias that never changes."""
+    """The same with one more regressor: a disturbance that never changes."""
     ones = np.ones((len(rows.target), 1))
     return replace(
         rows, names=(*rows.names, "constant"), regressors=np.hstack((rows.regressors, ones))

@@ -87,7 +87,7 @@ class _Setting:
     def angle(self, usual_deg: float) -> float:
         """The angle named, or the usual one, on the side asked for; 0 < angle <= 90°."""
         angle = self.angles[0] if self.angles else usual_deg * DEG
-        if not 0 < angle <= 90 * DEG:
+        if not 0 < angle <= 45 * DEG:
             raise UsageError(f"a rudder angle of {angle / DEG:g}° cannot be ordered")
         return self.side * angle
 
@@ -99,6 +99,8 @@ def _turning_circle(name: str, setting: _Setting) -> Manoeuvre:
 
 def _zigzag(name: str, setting: _Setting) -> Manoeuvre:
     rudder, heading = setting.angle(20.0), setting.angles[1]
+    if not 0 < heading <= 90 * DEG:
+        raise UsageError(f"a zig-zag cannot turn at {heading / DEG:g}° of heading")
     orders = (Order(0.0, 0.0, setting.rpm),)
     return Manoeuvre(name, orders, ZigZag(APPROACH_SECS, rudder, heading))
 

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from shiplog.errors import ShiplogError
 from shiplog.files import cannot_write, is_device
@@ -11,13 +12,20 @@ from shiplog.writer import LogWriter
 from .source import Source
 
 
+class Recorded(NamedTuple):
+    """What came of a recording."""
+
+    samples: int
+    interrupted: bool  # by Ctrl-C
+
+
 def record(
     source: Source,
     path: str | os.PathLike[str],
     *,
     on_slab: Callable[[int], None] = lambda _: None,
-) -> int:
-    """Write all that `source` yields to `path`; return the number of samples.
+) -> Recorded:
+    """Write all that `source` yields to `path`.
 
     `on_slab` is told the samples written so far. While recording, the log grows beside its final
     name with `.part` behind it, readable up to the last slab even if the process is killed. Ctrl-C
@@ -28,21 +36,22 @@ def record(
     part = final if is_device(final) else final.with_name(final.name + ".part")
     if final.is_dir():
         raise cannot_write(final, IsADirectoryError())
-    count = 0
+    interrupted = False
+    writer = LogWriter(part, metadata=source.metadata, vessel_toml=source.vessel_toml)
     try:
-        with LogWriter(part, metadata=source.metadata, vessel_toml=source.vessel_toml) as writer:
+        with writer:
             for slab in source.slabs():
                 writer.write(*slab)
                 writer.flush()
-                count += sum(map(len, slab))
-                on_slab(count)
+                on_slab(writer.samples)
     except KeyboardInterrupt:
-        pass
+        interrupted = True
     except ShiplogError as error:
-        if count:
-            raise ShiplogError(f"{error}; the {count} samples until then are in {part}") from error
+        if writer.samples:
+            message = f"{error}; the {writer.samples} samples until then are in {part}"
+            raise ShiplogError(message) from error
         part.unlink(missing_ok=True)
         raise
     if part != final:
         part.replace(final)
-    return count
+    return Recorded(writer.samples, interrupted)

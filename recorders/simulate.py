@@ -22,6 +22,7 @@ from .sensors import Suite, corrupt, delays, sample_times, suite
 
 GRID_SECS = 0.1  # the longest step; Runge-Kutta's error is then below 1e-10
 SLAB_SECS = 600.0
+MOST_SAMPLES = 50_000_000  # of one sensor
 START_NS = 1_767_225_600 * 10**9  # 2026-01-01 00:00 UTC: a fixed instant, so that runs repeat
 
 # one row of a trajectory: the time, the state, and the forcing from there on
@@ -120,9 +121,8 @@ def simulate(
 
     Raises `UsageError` for an unknown manoeuvre or a duration that is not positive.
     """
-    if not (isfinite(duration_secs) and duration_secs > 0):
-        raise UsageError(f"the duration must be positive, got {duration_secs:g} s")
     sensors = suite("paper") if sensors is None else sensors
+    _require_sensible(duration_secs, seed, sensors, gusts)
     orders_seed, *sensor_seeds = np.random.SeedSequence(seed).spawn(1 + len(CATALOGUE))
     ordered = manoeuvre(
         manoeuvre_name, duration_secs, vessel.approach_rpm, np.random.default_rng(orders_seed)
@@ -138,6 +138,27 @@ def simulate(
             channels.append(_channel(name, "simulated", _stamps(times), _stamps(received), values))
     metadata = {"source": "simulation", "manoeuvre": ordered.name, "seed": str(seed)}
     return SimulatedTrial(tuple(channels), trajectory, duration_secs, vessel_toml, metadata)
+
+
+def _require_sensible(
+    duration_secs: float, seed: int, sensors: Suite, gusts: tuple[Gust, ...]
+) -> None:
+    if not (isfinite(duration_secs) and duration_secs > 0):
+        raise UsageError(f"the duration must be positive, got {duration_secs:g} s")
+    if seed < 0:
+        raise UsageError(f"the seed must not be negative, got {seed}")
+    for name, sensor in sensors.items():
+        if duration_secs * sensor.rate_hz > MOST_SAMPLES:
+            raise UsageError(
+                f"{name} at {sensor.rate_hz:g} Hz for {duration_secs:g} s is over "
+                f"{MOST_SAMPLES:,} samples; shorten the trial or slow the sensor"
+            )
+    for gust in gusts:
+        if not (0 <= gust.start_secs < duration_secs and gust.duration_secs > 0):
+            raise UsageError(
+                f"a gust must begin within the trial and last: it begins at {gust.start_secs:g} s "
+                f"of {duration_secs:g} s, for {gust.duration_secs:g} s"
+            )
 
 
 def sail(

@@ -31,18 +31,26 @@ FINE, FAILURE, USAGE, DATA_LOST = 0, 1, 2, 3
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; the exit code says how it went."""
+    parser = _parser()
+    parsed = parser.parse_args(arguments)
+    if "run" not in parsed:
+        parser.print_help(sys.stderr)
+        return USAGE
     try:
-        parsed = _parser().parse_args(arguments)
-        return int(parsed.run(parsed))
+        code = int(parsed.run(parsed))
+        sys.stdout.flush()
     except UsageError as error:
-        return _fail(error, USAGE)
+        code = _fail(error, USAGE)
     except ShiplogError as error:
-        return _fail(error, FAILURE)
+        code = _fail(error, FAILURE)
     except BrokenPipeError:  # the reader of our output has gone: no matter
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return FINE
+        code = FINE
+    except OSError as error:
+        code = _fail(f"cannot write the output: {error.strerror or error}", FAILURE)
     except KeyboardInterrupt:
-        return _fail("interrupted; nothing was written", FAILURE)
+        code = _fail("interrupted; nothing was written", FAILURE)
+    return code
 
 
 def _fail(error: object, code: int) -> int:
@@ -53,7 +61,7 @@ def _fail(error: object, code: int) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="shiplog", description=__doc__.split("\n", 1)[0])
     parser.add_argument("--version", action="version", version=f"shiplog {__version__}")
-    verbs = parser.add_subparsers(metavar="VERB", required=True)
+    verbs = parser.add_subparsers(metavar="VERB")
     _add_record(verbs)
     _add_info(verbs)
     _add_replay(verbs)
@@ -71,7 +79,8 @@ def _add_record(verbs: Any) -> None:  # noqa: ANN401 - argparse keeps that type 
         description="Sail a manoeuvre with a model ship and record what its sensors say.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="""manoeuvres:
-  turning-circle[-ANGLE][-port]  zigzag-RUDDER-HEADING[-port]  pull-out[-ANGLE]
+  turning-circle[-ANGLE][-port] (35 degrees)  zigzag-RUDDER-HEADING[-port]
+  pull-out[-ANGLE] (20)
   spiral  pseudo-random  paper
 sensors, each setting in SI:
   --sensor yaw_rate.bias=1e-4 --sensor speed.rate_hz=2 --sensor rudder.dropout=0.02
@@ -97,7 +106,7 @@ sensors, each setting in SI:
         action="append",
         default=[],
         metavar="DEG@START[+LENGTH]",
-        help="a yaw moment worth DEG of rudder, from START s on, for LENGTH s",
+        help="a yaw moment worth DEG of rudder at the approach speed (to port: --gust=-2@100)",
     )
     simulate.add_argument(
         "--wave", metavar="DEG@PERIOD", help="a sinusoidal yaw moment worth DEG of rudder"
@@ -108,7 +117,8 @@ sensors, each setting in SI:
 
 
 def _add_info(verbs: Any) -> None:  # noqa: ANN401
-    info = verbs.add_parser("info", help="what is in a log, without reading it all")
+    said = "what is in a log, without reading it all"
+    info = verbs.add_parser("info", help=said, description=f"Tell {said}.")
     info.add_argument("log", metavar="LOG")
     info.add_argument("--json", metavar="FILE", help="as JSON, - for stdout")
     info.set_defaults(run=_run_info)
@@ -172,6 +182,7 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
     from .vessel import load_vessel
     from .writer import write
 
+    _require_distinct(arguments.output, arguments.truth)
     vessel, text = load_vessel(arguments.vessel)
     with _progress("recorders") as tell:
         tell("sail and measure")
@@ -188,16 +199,19 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
             vessel_toml=text,
         )
         tell("write")
-        count = record(trial, arguments.output)
-        if arguments.truth:
+        recorded = record(trial, arguments.output)
+        if arguments.truth and not recorded.interrupted:
             write(trial.truth(), arguments.truth)
-    print(f"{arguments.output}: {count} samples of {len(trial.channels)} channels")
+    print(f"{arguments.output}: {recorded.samples} samples of {len(trial.channels)} channels")
+    if recorded.interrupted:
+        print("interrupted: the log ends there", file=sys.stderr)
     return FINE
 
 
 def _run_info(arguments: argparse.Namespace) -> int:
     from .info import info
 
+    _require_distinct(arguments.log, arguments.json)
     found = info(arguments.log)
     if arguments.json:
         _write_json(found.as_json(), arguments.json)
@@ -226,9 +240,12 @@ def _run_replay(arguments: argparse.Namespace) -> int:
 
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
+    _require_distinct(arguments.log, output, arguments.json, arguments.vessel)
+    sources = _sources(arguments.source)
     with _progress("analysis") as tell:
         tell("read")
-        log = read(arguments.log).preferring(_sources(arguments.source))
+        log = read(arguments.log).preferring(sources)
+        _warn(log.warnings)  # now: they may explain why the replay fails
         analysis = analyse(log, vessel, on_step=tell)
         tell("review")
         from analysis.rerun_view import view_review, write_review
@@ -237,7 +254,7 @@ def _run_replay(arguments: argparse.Namespace) -> int:
     if arguments.json:
         _write_json(summarise(analysis), arguments.json)
     _print_tables(analysis, to_stderr=arguments.json == "-")
-    _warn(analysis.warnings)
+    _warn(analysis.warnings[len(log.warnings) :])
     print(f"review: {output} (open it with: rerun {output})", file=sys.stderr)
     if arguments.view:
         view_review(analysis, text=markdown(analysis))
@@ -256,6 +273,7 @@ def _run_check(arguments: argparse.Namespace) -> int:
         for log in logs:
             tell(log.name)
             comparisons.append(compare(log))
+    _require_distinct(arguments.json, *logs, *map(reference_path, logs))
     for comparison in comparisons:
         print(comparison, file=sys.stderr if arguments.json == "-" else sys.stdout)
     if arguments.json:
@@ -284,6 +302,14 @@ def _run_convert(arguments: argparse.Namespace) -> int:
     _warn(warnings)
     print(f"{arguments.target}: {sum(map(len, log))} samples of {len(log.channels)} channels")
     return DATA_LOST if log.data_lost else FINE
+
+
+def _require_distinct(*paths: str | Path | None) -> None:
+    """Refuse to write over what is read, or over another output."""
+    named = [Path(path).resolve() for path in paths if path and str(path) != "-"]
+    for path in named:
+        if named.count(path) > 1:
+            raise UsageError(f"the same file is named twice; name another for the output: {path}")
 
 
 def _require_ours(package: str) -> None:
@@ -330,7 +356,7 @@ def _print_tables(analysis: "Analysis", *, to_stderr: bool) -> None:
     for section in sections(analysis):
         table = Table(title=section.title, title_justify="left", title_style="bold", box=SIMPLE)
         for i, column in enumerate(section.columns):
-            table.add_column(column, justify="left" if i == 0 else "right")
+            table.add_column(column, justify="left" if i == 0 else "right", overflow="fold")
         for row in section.rows:
             table.add_row(*row)
         console.print(table)

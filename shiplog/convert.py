@@ -47,7 +47,7 @@ def convert(source: Path, target: Path, layout: Path | None = None) -> tuple[Tri
 
 
 def _read_any(source: Path, layout: Path | None) -> TrialLog:
-    suffix = source.suffix.lower()
+    suffix = Path(source.name.removesuffix(".part")).suffix.lower()  # a recording not finished
     ours = {".mcap": read, ".parquet": read_parquet}
     if layout is not None:
         if suffix in ours or (suffix == ".csv" and _is_ours(source)):

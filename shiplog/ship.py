@@ -9,7 +9,8 @@ estimator", eqs (1)-(4): a second-order nonlinear Nomoto model of yaw, coupled w
 
 w is the yaw rate in rad/s, v the speed ahead in m/s, delta the rudder in rad, n the propeller's
 revolutions in rpm. `ks` has no unit where the paper's time constants and gains are used: its
-alpha1 is in s/m, its alpha2 in 1/rpm and its alpha3 in s/m.
+alpha1 is in s/m, its alpha2 in 1/rpm and its alpha3 in s/m. The model is one of a ship going ahead:
+g v^2 has no sign, so that astern it drives her on.
 """
 
 from math import cos, exp, sin, sqrt

@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # only verbs that need pandas shall wait for it
     import pandas as pd
 
 CSV_MARK = "# shiplog csv 1"
+CSV_END = "# end"  # without it the file was cut
 COLUMNS = ("topic", "field", "measured_ns", "received_ns", "value")
 HEADER_KEY = "shiplog"  # of a frame's attrs and of a Parquet file's metadata
 
@@ -83,6 +84,7 @@ def write_csv(log: TrialLog, path: str | os.PathLike[str]) -> None:
             for measured, received in stamps:
                 for head in heads:
                     stream.write(f"{head},{measured},{received},{next(texts)}\n")
+        stream.write(f"{CSV_END}\n")
 
 
 def read_csv(path: str | os.PathLike[str]) -> TrialLog:
@@ -124,15 +126,19 @@ def _csv_rows(path: Path, stream: IO[str], before: int) -> tuple[Any, ...]:
     """The five columns of the samples; `before` is the number of lines above them."""
     rows: tuple[list[Any], ...] = ([], [], [], [], [])
     topics, fields, measured, received, values = rows
-    reader = csv.reader(stream)
+    reader, ended = csv.reader(stream), False
     try:
         for cells in reader:
+            if ended := cells == [CSV_END]:
+                break
             topic, field, measured_text, received_text, text = cells
             topics.append(topic)
             fields.append(field)
             measured.append(int(measured_text))
             received.append(int(received_text))
-            values.append(float(text))
+            values.append(float(text or "nan"))
+        if not ended:
+            raise LogError(f"it was cut, its last line is not {CSV_END!r}; copy it again: {path}")
         return (topics, fields, *(np.array(c, np.int64) for c in rows[2:4]), np.array(values))
     except OverflowError:
         raise LogError(f"a time needs more than 64 bits; convert the log again: {path}") from None

@@ -86,7 +86,7 @@ _TIME_CONSTANTS = {"T1": (1e-3, 1e6), "T2": (1e-3, 1e6), "T3": (-inf, inf)}
 _NONLINEAR = {"c2": (-inf, inf), "c3": (-inf, inf)}
 _PRODUCTS = dict.fromkeys(("a", "b1", "b2", "b3", "d", "e"), (-inf, inf))
 _KEYS: dict[str, dict[str, tuple[float, float]]] = {
-    "": {"length": (0.0, 1000.0), "approach_rpm": (-3000.0, 3000.0)},
+    "": {"length": (0.0, 1000.0), "approach_rpm": (0.0, 3000.0)},
     "yaw": _TIME_CONSTANTS | _NONLINEAR | _PRODUCTS,
     "rudder": {
         "alpha1": (-inf, inf),
@@ -99,7 +99,17 @@ _KEYS: dict[str, dict[str, tuple[float, float]]] = {
     "filter": {"process_ratio": (0.0, inf), "yaw_rate_std": (0.0, inf), "speed_std": (0.0, inf)},
 }
 _TEXTS = ("name", "angle_unit")
-_POSITIVE = {"T1", "T2", "length", "max", "rate", "process_ratio", "yaw_rate_std", "speed_std"}
+_POSITIVE = {
+    "T1",
+    "T2",
+    "approach_rpm",
+    "length",
+    "max",
+    "rate",
+    "process_ratio",
+    "yaw_rate_std",
+    "speed_std",
+}
 
 
 def load_vessel(preset_or_path: str | os.PathLike[str]) -> tuple[Vessel, str]:
@@ -140,6 +150,11 @@ def parse_vessel(text: str, where: str) -> Vessel:
     angle_unit = table.get("angle_unit", "rad")
     if angle_unit not in ("deg", "rad"):
         faults.append(f"angle_unit must be 'deg' or 'rad', got {angle_unit!r}")
+    rudder_max = numbers["rudder"].get("max", 0.0)
+    if angle_unit == "rad" and rudder_max > pi / 2:
+        faults.append(
+            f"rudder.max = {rudder_max:g} rad is no rudder's; is angle_unit = 'deg' meant?"
+        )
     if faults:
         count = f"{len(faults)} faults" if len(faults) > 1 else "one fault"
         raise VesselError(f"{count} in the vessel file: {'; '.join(faults)}: {where}")

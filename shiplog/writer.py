@@ -89,6 +89,11 @@ class LogWriter:
         for received_ns, channel_id, sequence, measured_ns, data in messages:
             self._writer.add_message(channel_id, received_ns, data, measured_ns, sequence)
 
+    @property
+    def samples(self) -> int:
+        """How many were added so far."""
+        return sum(self._sequences.values())
+
     def flush(self) -> None:
         """Hand what was written to the operating system: a killed process loses it no more."""
         self._writer.flush()  # type: ignore[no-untyped-call]

@@ -214,6 +214,13 @@ def test_a_folders_logs_are_those_that_are_no_references(tmp_path: Path) -> None
     assert reference_path(tmp_path / "a.mcap") == tmp_path / "a.ref.mcap"
 
 
+def test_a_reference_without_its_log_is_an_error(tmp_path: Path) -> None:
+    for name in ("a.mcap", "a.ref.mcap", "b.ref.mcap"):
+        (tmp_path / name).touch()
+    with pytest.raises(ShiplogError, match=r"logs are gone \(b\.ref\.mcap\)"):
+        logs_in(tmp_path)
+
+
 def test_a_folder_without_logs_is_an_error_not_a_success(tmp_path: Path) -> None:
     with pytest.raises(ShiplogError, match="no logs"):
         logs_in(tmp_path)

@@ -614,3 +614,23 @@ def test_reading_leaves_the_file_free_to_be_replaced_or_removed(path: Path) -> N
     path.write_bytes(b"other")
     path.unlink()
     assert samples(log) == before
+
+
+def test_a_topic_described_twice_is_one_channel(tmp_path: Path) -> None:
+    """As a recorder leaves it that was started again within one file."""
+    path = tmp_path / "twice.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        scalar = schema_for(())
+        schema_id = writer.register_schema(scalar.name, "protobuf", scalar.descriptor_set)
+        for start in (0, 100):
+            metadata = {"unit": "rad/s", "channel": "yaw_rate", "source": "gyro"}
+            channel_id = writer.register_channel("/yaw_rate/gyro", "protobuf", schema_id, metadata)
+            for k in range(start, start + 100):
+                data = b"\x09" + struct.pack("<d", k)
+                writer.add_message(channel_id, k * 10**8, data, k * 10**8)
+        writer.finish()
+    log = read(path)
+    assert len(log.channels) == 1
+    assert log["yaw_rate"].values.tolist() == list(range(200))

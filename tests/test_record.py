@@ -27,7 +27,7 @@ class Sensor:
 
 def test_all_that_a_source_yields_is_written_and_told(tmp_path: Path) -> None:
     told: list[int] = []
-    assert record(Sensor(), tmp_path / "a.mcap", on_slab=told.append) == 30
+    assert record(Sensor(), tmp_path / "a.mcap", on_slab=told.append) == (30, False)
     assert told == [10, 20, 30]
     log = read(tmp_path / "a.mcap")
     assert len(log["yaw_rate"]) == 30
@@ -35,7 +35,7 @@ def test_all_that_a_source_yields_is_written_and_told(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_ends_the_recording_and_keeps_what_came(tmp_path: Path) -> None:
-    assert record(Sensor(KeyboardInterrupt()), tmp_path / "a.mcap") == 20
+    assert record(Sensor(KeyboardInterrupt()), tmp_path / "a.mcap") == (20, True)
     log = read(tmp_path / "a.mcap")
     assert len(log["yaw_rate"]) == 20
     assert not log.warnings

@@ -169,7 +169,7 @@ def test_slabs_hold_every_sample_once_in_the_order_of_reception(
     vessel: Vessel, tmp_path: Path
 ) -> None:
     trial = simulate(vessel, "pull-out", duration_secs=1500.0)
-    count = record(trial, tmp_path / "a.mcap")
+    count, _ = record(trial, tmp_path / "a.mcap")
     log = read(tmp_path / "a.mcap")
     assert count == sum(map(len, log)) == sum(map(len, trial.channels))
     for kept, made in zip(log, trial.channels, strict=True):

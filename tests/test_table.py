@@ -254,6 +254,15 @@ def test_a_spoilt_csv_is_refused_with_its_line(
     assert part in spoilt(tmp_path, old, new)
 
 
+def test_a_csv_that_was_cut_is_refused(tmp_path: Path) -> None:
+    write_csv(trial(), tmp_path / "a.csv")
+    text = (tmp_path / "a.csv").read_bytes()
+    for cut in (len(text) - 2, len(text) - 8, len(text) - 40):
+        (tmp_path / "b.csv").write_bytes(text[:cut])
+        with pytest.raises(LogError, match=r"cut|cannot be read"):
+            read_csv(tmp_path / "b.csv")
+
+
 def test_a_csv_saved_with_other_line_ends_still_reads(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     log = replace(trial(), channels=trial().channels[1:])
