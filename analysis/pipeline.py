@@ -8,6 +8,7 @@ import numpy as np
 
 from shiplog import LogError, Signals, TrialLog, Vessel, resample
 from shiplog.clock import gap_threshold_secs, usual_period_secs
+from shiplog.gyro_bias import gyro_bias_warning
 from shiplog.quality import examine
 from shiplog.rudder_sign import rudder_sign_warning
 from shiplog.units import CATALOGUE
@@ -137,9 +138,9 @@ def _doubtful(log: TrialLog) -> Iterator[str]:
             yield f"{log[name].topic}: never changes; if the sensor was dead, choose another"
     if np.nanmin(log["speed"].values) < 0 or np.nanmin(log["rpm"].values) < 0:
         yield "the ship goes astern in places, where the model does not hold"
-    sign = rudder_sign_warning(log)
-    if sign:
-        yield sign
+    for warning in (rudder_sign_warning(log), gyro_bias_warning(log)):
+        if warning:
+            yield warning
 
 
 def _require_outputs(log: TrialLog, signals: Signals) -> None:

@@ -235,11 +235,7 @@ def _sail(
         if t >= zigzag_start and order == 0.0:
             order = zigzag_rudder
         # what acts until the next knot
-        aim = min(max(order, -rudder_max), rudder_max)
-        arrival = t + abs(aim - delta) / rudder_rate
-        moving = arrival > t + 1e-12
-        delta_dot = np.sign(aim - delta) * rudder_rate if moving else 0.0
-        delta = delta if moving else aim
+        delta, delta_dot, arrival = _steer(delta, order, t, rudder_max, rudder_rate)
         forcing = Forcing(delta, delta_dot, schedule[at, 2], schedule[at, 3], waves[0], waves[1])
         if count == len(rows):
             rows = np.concatenate((rows, np.empty_like(rows)))
@@ -251,7 +247,7 @@ def _sail(
             return rows[:count]
         while grid_index * grid <= t + 1e-9:
             grid_index += 1
-        end = min(grid_index * grid, duration, arrival if moving else inf)
+        end = min(grid_index * grid, duration, arrival)
         end = min(end, schedule[at + 1, 0] if at + 1 < len(schedule) else inf)
         end = min(end, zigzag_start if t < zigzag_start else inf)
         # a zig-zag turns the rudder at the very instant the heading is reached
@@ -262,6 +258,18 @@ def _sail(
             order = -order
         delta += delta_dot * (end - t)
         state, t = after, end
+
+
+@compiled
+def _steer(
+    delta: float, order: float, t: float, largest: float, rate: float
+) -> tuple[float, float, float]:
+    """Where the rudder is, how fast it moves, and when it arrives: never, if it is there."""
+    aim = min(max(order, -largest), largest)
+    arrival = t + abs(aim - delta) / rate
+    if arrival > t + 1e-12:
+        return delta, np.sign(aim - delta) * rate, arrival
+    return aim, 0.0, inf
 
 
 @compiled

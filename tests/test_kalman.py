@@ -3,11 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.design import discretise, pseudo_input_matrices
+from analysis.design import discretise, pseudo_input_matrices, pseudo_inputs
 from analysis.kalman import (
     OUTPUTS,
     PAPER_RATIO,
+    FilterState,
     Noise,
+    _motion,
     filter_states,
     noise_level,
     noise_of,
@@ -216,3 +218,15 @@ def test_a_wrong_model_is_given_more_process_noise_than_the_true_one(
     wrong = noise_of(signals, c._replace(d=0.7 * c.d, a=0.7 * c.a), FilterSettings())
     assert right.process_ratio[0] < 3 * PAPER_RATIO
     assert wrong.process_ratio[0] > 10 * right.process_ratio[0]
+
+
+def test_the_filters_motion_is_a_x_plus_b_u(vessel: Vessel) -> None:
+    rng, c = np.random.default_rng(6), vessel.coefficients
+    for _ in range(50):
+        x = rng.uniform([-0.01, -3e-4, -1e-5, 3, -0.05], [0.01, 3e-4, 1e-5, 12, 0.05])
+        delta, rate, n, n_dot = rng.uniform([-0.6, -0.05, 40, -1], [0.6, 0.05, 120, 1])
+        A, B = pseudo_input_matrices(c, float(np.sign(x[0])))
+        expected = A @ x + B @ pseudo_inputs(x, delta, rate, n, n_dot, c.alpha3)
+        assert _motion(c, FilterState(*x), delta, rate, n, n_dot) == pytest.approx(
+            expected.tolist(), rel=1e-12, abs=1e-18
+        )
