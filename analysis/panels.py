@@ -167,7 +167,8 @@ def _coefficient(
         Series("model", span, (reference,)),
         Series("window", at, _banded("window", value, spread, colour)),
     )
-    title = f"{name} {_rounded(result, doubt)} [{prefix}{whole.unit}]"
+    said = _rounded(result, doubt) if whole.determined else "not determined"
+    title = f"{name} {said} [{prefix}{whole.unit}]"
     return Panel(f"coefficient_{name}", title, series, axis)
 
 
