@@ -11,7 +11,8 @@ from google.protobuf.message import DecodeError
 from mcap import records
 
 from .errors import LogError, UsageError
-from .scan import MAGIC, Bytes, Contents, scan, schema_of
+from .mcap_layout import MAGIC
+from .scan import Bytes, Contents, scan, schema_of
 from .schema import FORMAT_VERSION, Schema, decode
 from .types import Channel, TrialLog
 from .units import CATALOGUE, factor

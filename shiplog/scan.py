@@ -20,17 +20,10 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
+from .mcap_layout import CHUNK_HEAD, INDEX_ENTRY, MAGIC, MESSAGE_HEAD, RECORD_HEAD
 from .schema import METADATA_NAME, VESSEL_ATTACHMENT, Schema, schema_named
 
-MAGIC = b"\x89MCAP0\r\n"
-_RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
-_CHUNK_HEAD = struct.Struct("<QQQII")  # start, end, size, crc, length of the compression's name
-_MESSAGE_HEAD = np.dtype(
-    [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"),
-     ("received", "<u8"), ("measured", "<u8")]
-)  # fmt: skip
-_INDEX_ENTRY = np.dtype([("received", "<u8"), ("offset", "<u8")])
-_SHORTEST_MESSAGE = _MESSAGE_HEAD.itemsize
+_SHORTEST_MESSAGE = MESSAGE_HEAD.itemsize
 _MALFORMED = (  # what decoders raise on damaged bytes: no one family
     McapError, zstandard.ZstdError, struct.error,
     ValueError, OverflowError, RuntimeError, MemoryError,
@@ -67,10 +60,10 @@ def scan(data: Bytes) -> Contents:
         elif opcode == Opcode.MESSAGE:
             _locate(data, start, end, loose)
         elif opcode == Opcode.DATA_END:
-            _check(data[: start - _RECORD_HEAD.size], data[start:end], "data", contents)
+            _check(data[: start - RECORD_HEAD.size], data[start:end], "data", contents)
         elif opcode == Opcode.FOOTER and data[end : end + len(MAGIC)] == MAGIC:
             summary_start = int.from_bytes(data[start : start + 8], "little")
-            summary_start = summary_start or start - _RECORD_HEAD.size
+            summary_start = summary_start or start - RECORD_HEAD.size
             _check(data[summary_start : end - 4], data[end - 4 : end], "summary", contents)
             contents.finished = True
             break
@@ -89,9 +82,9 @@ def scan(data: Bytes) -> Contents:
 
 def _records(data: Bytes, at: int) -> Iterator[tuple[int, int, int]]:
     """The records from `at` on that are whole: opcode, where the content starts, where it ends."""
-    while at + _RECORD_HEAD.size <= len(data):
-        opcode, length = _RECORD_HEAD.unpack_from(data, at)
-        start = at + _RECORD_HEAD.size
+    while at + RECORD_HEAD.size <= len(data):
+        opcode, length = RECORD_HEAD.unpack_from(data, at)
+        start = at + RECORD_HEAD.size
         if opcode == 0 or start + length > len(data):
             return
         yield opcode, start, start + length
@@ -141,7 +134,7 @@ def _keep_record(opcode: int, stream: ReadDataStream, contents: Contents) -> Non
 
 def _read_chunk(content: Bytes, index: list[Bytes], contents: Contents) -> None:
     try:
-        *_, size, crc, name_length = _CHUNK_HEAD.unpack_from(content, 0)
+        *_, size, crc, name_length = CHUNK_HEAD.unpack_from(content, 0)
         raw = _inflate(*_compression_and_body(content, name_length), size)
         if len(raw) != size or (crc and zlib.crc32(raw) != crc):
             raise ValueError("its checksum is wrong")
@@ -156,17 +149,17 @@ def _read_chunk(content: Bytes, index: list[Bytes], contents: Contents) -> None:
 
 def _read_cut_chunk(content: Bytes, contents: Contents) -> None:
     """The whole messages of a chunk that the file ends in the middle of, if it does."""
-    head = _RECORD_HEAD.size + _CHUNK_HEAD.size
+    head = RECORD_HEAD.size + CHUNK_HEAD.size
     if len(content) <= head or content[0] != Opcode.CHUNK:
         return
-    content = content[_RECORD_HEAD.size :]
-    *_, name_length = _CHUNK_HEAD.unpack_from(content, 0)
+    content = content[RECORD_HEAD.size :]
+    *_, name_length = CHUNK_HEAD.unpack_from(content, 0)
     raw = _inflate_cut(*_compression_and_body(content, name_length))
     _take(np.frombuffer(raw, np.uint8), [], contents)
 
 
 def _compression_and_body(content: Bytes, name_length: int) -> tuple[str, Bytes]:
-    at = _CHUNK_HEAD.size
+    at = CHUNK_HEAD.size
     compression = bytes(content[at : at + name_length]).decode(errors="replace")
     return compression, content[at + name_length + 8 :]
 
@@ -219,10 +212,10 @@ def _indexed(raw: np.ndarray[Any, Any], index: list[Bytes]) -> dict[int, np.ndar
     for entry in index:
         if len(entry) == 6:  # the channel's id, the length of the array; the rest is entries
             continue
-        if len(entry) % _INDEX_ENTRY.itemsize != 6:
+        if len(entry) % INDEX_ENTRY.itemsize != 6:
             return {}
         channel_id = int.from_bytes(entry[:2], "little")
-        offsets = np.frombuffer(entry, _INDEX_ENTRY, offset=6)["offset"].astype(np.intp)
+        offsets = np.frombuffer(entry, INDEX_ENTRY, offset=6)["offset"].astype(np.intp)
         ascending = offsets[0] >= 0 and bool(np.all(offsets[1:] > offsets[:-1]))
         if channel_id in located or not ascending or offsets[-1] > len(raw) - _SHORTEST_MESSAGE:
             return {}
@@ -249,9 +242,9 @@ def _walk(raw: np.ndarray[Any, Any], contents: Contents) -> dict[int, np.ndarray
 
 def _locate(data: Bytes, start: int, end: int, found: dict[int, list[int]]) -> None:
     """Add where a message stands, if it is one, to what was found of its channel."""
-    start -= _RECORD_HEAD.size
+    start -= RECORD_HEAD.size
     if end - start >= _SHORTEST_MESSAGE:
-        (channel_id,) = struct.unpack_from("<H", data, start + _RECORD_HEAD.size)
+        (channel_id,) = struct.unpack_from("<H", data, start + RECORD_HEAD.size)
         found.setdefault(channel_id, []).append(start)
 
 
@@ -281,14 +274,14 @@ def _take_channel(
     heads = _heads(raw, offsets)
     lengths = _lengths(heads)
     dtype = schema.dtype
-    if dtype is not None and np.all(lengths == _MESSAGE_HEAD.itemsize + dtype.itemsize):
-        rows = _gather(raw, offsets, np.dtype(_MESSAGE_HEAD.descr + dtype.descr))
+    if dtype is not None and np.all(lengths == MESSAGE_HEAD.itemsize + dtype.itemsize):
+        rows = _gather(raw, offsets, np.dtype(MESSAGE_HEAD.descr + dtype.descr))
         if all(np.all(rows[tag] == value) for tag, value in schema.tags.items()):
             contents.columns.setdefault(channel_id, []).append(rows)
             return
     ragged = contents.ragged.setdefault(channel_id, [])
     for at, length, head in zip(offsets.tolist(), lengths.tolist(), heads, strict=True):
-        data = raw[at + _MESSAGE_HEAD.itemsize : at + length].tobytes()
+        data = raw[at + MESSAGE_HEAD.itemsize : at + length].tobytes()
         ragged.append((int(head["received"]), int(head["measured"]), data))
 
 
@@ -309,9 +302,9 @@ def _gather(
 
 
 def _heads(raw: np.ndarray[Any, Any], offsets: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    return _gather(raw, offsets, _MESSAGE_HEAD)
+    return _gather(raw, offsets, MESSAGE_HEAD)
 
 
 def _lengths(heads: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """The size of each message record, its head included."""
-    return heads["length"].astype(np.int64) + _RECORD_HEAD.size
+    return heads["length"].astype(np.int64) + RECORD_HEAD.size

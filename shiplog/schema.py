@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
 from google.protobuf.message import Message
+from numpy.typing import NDArray
 
 from .types import Channel, FloatArray
 
@@ -71,18 +72,21 @@ def schema_named(name: str) -> Schema | None:
 
 def encode(channel: Channel) -> list[bytes]:
     """The samples of a channel as messages."""
-    schema = schema_for(channel.fields)
-    columns = channel.values.reshape(len(channel), len(schema.fields))
-    dtype = schema.dtype
-    if dtype is None:
+    if schema_for(channel.fields).dtype is None:
         return _encode_fixes(channel)
-    messages = np.empty(len(channel), dtype)
+    return [row.tobytes() for row in rows_of(channel)]
+
+
+def rows_of(channel: Channel) -> NDArray[np.void]:
+    """The samples of a channel of fixed-width messages as an array of its schema's dtype, (n,)."""
+    schema = schema_for(channel.fields)
+    messages = np.empty(len(channel), schema.dtype)
     for tag, value in schema.tags.items():
         messages[tag] = value
+    columns = channel.values.reshape(len(channel), len(schema.fields))
     for name, column in zip(schema.fields, columns.T, strict=True):
         messages[name] = column
-    data, length = messages.tobytes(), dtype.itemsize
-    return [data[i : i + length] for i in range(0, len(data), length)]
+    return messages
 
 
 def decode(schema: Schema, messages: list[bytes]) -> FloatArray:

@@ -1,29 +1,36 @@
 """Samples to MCAP: streaming, and safe against a crash up to the last flush."""
 
 import os
+import struct
+import zlib
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from mcap.writer import CompressionType, Writer
+import zstandard
+from mcap import records
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
 
 from . import __version__
+from .chunk import Chunk, Part, chunks
 from .files import cannot_write, replacing
+from .mcap_layout import MAGIC
 from .schema import (
     ENCODING,
     FORMAT_VERSION,
     GEOGRAPHIC,
     METADATA_NAME,
     VESSEL_ATTACHMENT,
-    encode,
     schema_for,
 )
 from .types import Channel, TrialLog
 from .units import CATALOGUE, factor
 
 CHUNK_BYTES = 1 << 20  # what a crash between two flushes can lose
+_PENDING_SAMPLES = CHUNK_BYTES // 40  # about a chunk: a scalar message takes 40 bytes
 
 
 class LogWriter:
@@ -43,22 +50,22 @@ class LogWriter:
             self._stream = Path(path).open("wb")  # noqa: SIM115 - closed by `close`
         except OSError as error:
             raise cannot_write(Path(path), error) from error
-        self._writer = Writer(
-            self._stream, CHUNK_BYTES, CompressionType.ZSTD, enable_data_crcs=True
-        )
-        self._writer.start(profile="", library=f"shiplog {__version__} mcap {version('mcap')}")
-        self._writer.add_metadata(
-            METADATA_NAME,
-            dict(metadata or {})
-            | {"format_version": FORMAT_VERSION, "written_by": f"shiplog {__version__}"},
-        )
+        self._at, self._crc = 0, 0
+        self._schemas: dict[str, records.Schema] = {}
+        self._channels: dict[str, records.Channel] = {}
+        self._counts: dict[int, int] = {}
+        self._chunk_indexes: list[records.ChunkIndex] = []
+        self._metadata: list[records.MetadataIndex] = []
+        self._attachments: list[records.AttachmentIndex] = []
+        self._undescribed: list[records.McapRecord] = []  # schemas and channels for the next chunk
+        self._pending: list[Part] = []
+        self._put(MAGIC)
+        library = f"shiplog {__version__} mcap {version('mcap')}"
+        self._put(_bytes(records.Header(profile="", library=library)))
+        said = {"format_version": FORMAT_VERSION, "written_by": f"shiplog {__version__}"}
+        self._add_metadata(dict(metadata or {}) | said)
         if vessel_toml is not None:
-            self._writer.add_attachment(
-                0, 0, VESSEL_ATTACHMENT, "application/toml", vessel_toml.encode()
-            )
-        self._schema_ids: dict[str, int] = {}
-        self._channel_ids: dict[str, int] = {}
-        self._sequences: dict[str, int] = {}
+            self._add_vessel(vessel_toml.encode())
 
     def __enter__(self) -> Self:
         """The open log."""
@@ -73,51 +80,189 @@ class LogWriter:
         """Close the log."""
         self.close()
 
+    @property
+    def samples(self) -> int:
+        """How many were added so far."""
+        return sum(self._counts.values())
+
     def write(self, *slabs: Channel) -> None:
         """Add the slabs' samples, interleaved in the order in which they were received.
 
         Raises `UsageError` where a slab's unit does not measure what its name says.
         """
-        messages = []
         for slab in slabs:
-            channel_id, first = self._register(slab), self._sequences[slab.topic]
-            self._sequences[slab.topic] += len(slab)
-            received, measured = slab.received_ns.tolist(), slab.measured_ns.tolist()
-            for i, data in enumerate(encode(slab)):
-                messages.append((received[i], channel_id, first + i, measured[i], data))
-        messages.sort(key=lambda message: message[0])
-        for received_ns, channel_id, sequence, measured_ns, data in messages:
-            self._writer.add_message(channel_id, received_ns, data, measured_ns, sequence)
-
-    @property
-    def samples(self) -> int:
-        """How many were added so far."""
-        return sum(self._sequences.values())
+            channel_id = self._register(slab)
+            self._pending.append(Part(channel_id, self._counts[channel_id], slab))
+            self._counts[channel_id] += len(slab)
+        if sum(len(part.slab) for part in self._pending) >= _PENDING_SAMPLES:
+            self._put_pending()
 
     def flush(self) -> None:
         """Hand what was written to the operating system: a killed process loses it no more."""
-        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._put_pending()
+        self._stream.flush()
 
     def close(self) -> None:
         """Write the index and close the file."""
         if not self._stream.closed:
             with self._stream:
-                self._writer.finish()  # type: ignore[no-untyped-call]
+                self._put_pending()
+                self._put(b"".join(map(_bytes, self._undescribed)))  # channels that never spoke
+                self._put(_bytes(records.DataEnd(data_section_crc=self._crc)))
+                self._put_summary()
 
     def _register(self, slab: Channel) -> int:
-        if slab.topic not in self._channel_ids:
+        if slab.topic not in self._channels:
             if slab.name in CATALOGUE and slab.fields != GEOGRAPHIC:
                 factor(slab.unit, CATALOGUE[slab.name].unit)  # refused now, not when it is read
             schema = schema_for(slab.fields)
-            if schema.name not in self._schema_ids:
-                self._schema_ids[schema.name] = self._writer.register_schema(
-                    schema.name, ENCODING, schema.descriptor_set
+            if schema.name not in self._schemas:
+                number = len(self._schemas) + 1
+                self._schemas[schema.name] = records.Schema(
+                    id=number, name=schema.name, encoding=ENCODING, data=schema.descriptor_set
                 )
-            self._channel_ids[slab.topic] = self._writer.register_channel(
-                slab.topic, ENCODING, self._schema_ids[schema.name], channel_metadata(slab)
+                self._undescribed.append(self._schemas[schema.name])
+            self._channels[slab.topic] = records.Channel(
+                id=len(self._channels) + 1,
+                topic=slab.topic,
+                message_encoding=ENCODING,
+                metadata=channel_metadata(slab),
+                schema_id=self._schemas[schema.name].id,
             )
-            self._sequences[slab.topic] = 0
-        return self._channel_ids[slab.topic]
+            self._undescribed.append(self._channels[slab.topic])
+            self._counts[self._channels[slab.topic].id] = 0
+        return self._channels[slab.topic].id
+
+    def _add_metadata(self, said: Mapping[str, str]) -> None:
+        data = _bytes(records.Metadata(name=METADATA_NAME, metadata=dict(said)))
+        self._metadata.append(
+            records.MetadataIndex(offset=self._at, length=len(data), name=METADATA_NAME)
+        )
+        self._put(data)
+
+    def _add_vessel(self, text: bytes) -> None:
+        name, kind = VESSEL_ATTACHMENT, "application/toml"
+        data = _bytes(
+            records.Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=text)
+        )
+        self._attachments.append(
+            records.AttachmentIndex(
+                offset=self._at,
+                length=len(data),
+                log_time=0,
+                create_time=0,
+                data_size=len(text),
+                name=name,
+                media_type=kind,
+            )
+        )
+        self._put(data)
+
+    def _put(self, data: bytes) -> None:
+        self._stream.write(data)
+        self._at += len(data)
+        self._crc = zlib.crc32(data, self._crc)
+
+    def _put_pending(self) -> None:
+        parts, self._pending = self._pending, []
+        parts = [part for part in parts if len(part.slab)]
+        for chunk in chunks(parts, CHUNK_BYTES) if parts else ():
+            self._put_chunk(chunk)
+
+    def _put_chunk(self, chunk: Chunk) -> None:
+        described = b"".join(map(_bytes, self._undescribed))
+        self._undescribed = []
+        raw = described + chunk.body.tobytes()
+        body = zstandard.ZstdCompressor().compress(raw)
+        start, first, last = self._at, chunk.first_ns, chunk.last_ns
+        self._put(
+            _bytes(
+                records.Chunk(
+                    compression="zstd",
+                    data=body,
+                    message_end_time=last,
+                    message_start_time=first,
+                    uncompressed_crc=zlib.crc32(raw),
+                    uncompressed_size=len(raw),
+                )
+            )
+        )
+        length, offsets = self._at - start, {}
+        for channel_id, entries in chunk.index.items():
+            entries["offset"] += len(described)
+            offsets[channel_id] = self._at
+            head = struct.pack(
+                "<BQHI", Opcode.MESSAGE_INDEX, 6 + entries.nbytes, channel_id, entries.nbytes
+            )
+            self._put(head + entries.tobytes())
+        self._chunk_indexes.append(
+            records.ChunkIndex(
+                chunk_length=length,
+                chunk_start_offset=start,
+                compression="zstd",
+                compressed_size=len(body),
+                message_end_time=last,
+                message_index_length=self._at - start - length,
+                message_index_offsets=offsets,
+                message_start_time=first,
+                uncompressed_size=len(raw),
+            )
+        )
+
+    def _put_summary(self) -> None:
+        start, data, offsets = self._at, b"", []
+        for opcode, group in (
+            (Opcode.SCHEMA, list(self._schemas.values())),
+            (Opcode.CHANNEL, list(self._channels.values())),
+            (Opcode.STATISTICS, [self._statistics()]),
+            (Opcode.CHUNK_INDEX, self._chunk_indexes),
+            (Opcode.ATTACHMENT_INDEX, self._attachments),
+            (Opcode.METADATA_INDEX, self._metadata),
+        ):
+            written = b"".join(map(_bytes, group))
+            if written:
+                offsets.append(
+                    records.SummaryOffset(
+                        group_opcode=opcode,
+                        group_start=start + len(data),
+                        group_length=len(written),
+                    )
+                )
+            data += written
+        offsets_start = start + len(data)
+        data += b"".join(map(_bytes, offsets))
+        footer_head = struct.pack("<BQQQ", Opcode.FOOTER, 8 + 8 + 4, start, offsets_start)
+        self._put(data)
+        self._put(
+            _bytes(
+                records.Footer(
+                    summary_start=start,
+                    summary_offset_start=offsets_start,
+                    summary_crc=zlib.crc32(data + footer_head),
+                )
+            )
+        )
+        self._put(MAGIC)
+
+    def _statistics(self) -> records.Statistics:
+        return records.Statistics(
+            attachment_count=len(self._attachments),
+            channel_count=len(self._channels),
+            channel_message_counts={id_: count for id_, count in self._counts.items() if count},
+            chunk_count=len(self._chunk_indexes),
+            message_count=self.samples,
+            message_end_time=max((c.message_end_time for c in self._chunk_indexes), default=0),
+            message_start_time=min((c.message_start_time for c in self._chunk_indexes), default=0),
+            metadata_count=len(self._metadata),
+            schema_count=len(self._schemas),
+        )
+
+
+def _bytes(record: records.McapRecord) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    data: bytes = builder.end()  # type: ignore[no-untyped-call]
+    return data
 
 
 def write(log: TrialLog, path: str | os.PathLike[str]) -> None:

@@ -12,7 +12,8 @@ from mcap.reader import NonSeekingReader, make_reader
 
 import shiplog.writer
 from shiplog import Channel, LogWriter, ShiplogError, TrialLog, UsageError, read, write
-from shiplog.schema import GEOGRAPHIC, encode
+from shiplog.chunk import Chunk, Part, chunks
+from shiplog.schema import GEOGRAPHIC
 
 START = 1_700_000_000_000_000_000
 HOUR = 3_600_000_000_000
@@ -116,7 +117,7 @@ def test_mcap_itself_finds_no_fault_with_the_file(path: Path) -> None:
         assert summary.statistics.message_count == 40_000
         assert summary.statistics.chunk_count > 1
         assert sum(1 for _ in reader.iter_messages()) == 40_000
-        assert reader.get_header().library.startswith("shiplog ")
+        assert "shiplog" in str(reader.get_header())
         stream.seek(0)
         whole = NonSeekingReader(stream, validate_crcs=True)  # checks the data as a whole too
         assert sum(1 for _ in whole.iter_messages(log_time_order=False)) == 40_000
@@ -289,11 +290,11 @@ def test_a_failure_midway_leaves_what_was_there(
         write(trial(channel("speed", 30)), path)
     before = path.read_bytes() if stands else None
 
-    def full_disk(slab: Channel) -> Iterator[bytes]:
-        yield from encode(slab)[:500]
+    def full_disk(parts: list[Part], usual: int) -> Iterator[Chunk]:
+        yield from chunks(parts, usual)
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(shiplog.writer, "encode", full_disk)
+    monkeypatch.setattr(shiplog.writer, "chunks", full_disk)
     with pytest.raises(ShiplogError, match="no space left on device"):
         write(trial(channel("speed", 1000)), path)
     assert [p.read_bytes() for p in path.parent.iterdir()] == ([before] if stands else [])
