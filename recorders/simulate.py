@@ -21,7 +21,7 @@ from .manoeuvres import Manoeuvre, manoeuvre
 from .sensors import Suite, corrupt, delays, sample_times, suite
 
 GRID_SECS = 0.1  # the longest step; Runge-Kutta's error is then below 1e-10
-SLAB_SECS = 600.0
+SLAB_SECS = 60.0  # of reception: what one damaged chunk can cost
 MOST_SAMPLES = 50_000_000  # of one sensor
 START_NS = 1_767_225_600 * 10**9  # 2026-01-01 00:00 UTC: a fixed instant, so that runs repeat
 
