@@ -174,7 +174,7 @@ def _filter(
     """Rows of the state, its variances, the innovations and their variances, (n, 14)."""
     count = len(measured)
     rows = np.empty((count, 14))
-    FT = F.T.copy()
+    P, FP = P.copy(), np.empty((5, 5))
     last_rate = 0.0
     for k in range(count):
         ahead = min(k + 1, count - 1)
@@ -190,14 +190,37 @@ def _filter(
             if np.isfinite(innovation):
                 K = P[:, state] / S
                 x = _corrected(x, K, innovation)
-                P = P - np.outer(K, P[state, :])
+                _subtract_outer(P, K, P[state].copy())
         for i in range(5):
             rows[k, 5 + i] = max(P[i, i], 0.0)
         rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3], rows[k, 4] = x
         x = _predicted(c, x, delta[k], delta_dot, n[k], n_dot, dt)
-        P = F @ P @ FT + Q
-        P = (P + P.T) / 2
+        _propagate(P, F, Q, FP)
     return rows
+
+
+@compiled
+def _subtract_outer(P: FloatArray, K: FloatArray, row: FloatArray) -> None:
+    """P - K row, in place."""
+    for i in range(5):
+        for j in range(5):
+            P[i, j] -= K[i] * row[j]
+
+
+@compiled
+def _propagate(P: FloatArray, F: FloatArray, Q: FloatArray, FP: FloatArray) -> None:
+    """F P F' + Q in place, symmetric; `FP` is room to work in."""
+    for i in range(5):
+        for j in range(5):
+            FP[i, j] = 0.0
+            for k in range(5):
+                FP[i, j] += F[i, k] * P[k, j]
+    for i in range(5):
+        for j in range(i + 1):
+            P[i, j] = Q[i, j]
+            for k in range(5):
+                P[i, j] += FP[i, k] * F[j, k]
+            P[j, i] = P[i, j]
 
 
 @compiled

@@ -1,0 +1,1 @@
+"""What shiplog is fast at, measured against the straightforward peer in the same run."""
