@@ -24,7 +24,6 @@ from .sliding import Identification
 SUFFIX = ".ref.mcap"
 NOT_LOGS = (SUFFIX, ".truth.mcap")
 BLOCK_SECS = 4.0
-MOST_ROWS = 200  # of a history or a track, evenly: a change lasts longer than their distance
 
 # How far a channel may stray, as a share of its largest value when the reference was made: what
 # another processor's rounding may do to it, amplified by the condition of what is solved.
@@ -43,6 +42,7 @@ _SHARES = {
     "history": 1e-7,
     "history_std": 1e-6,
     "track": 1e-9,
+    "count": 1e-12,
 }
 _UNITS = {
     "yaw_acceleration": "rad/s²",
@@ -181,33 +181,41 @@ def compare(
     The reference is the file beside the log unless given. A log that does not replay, or has no
     reference, is a comparison that is not `ok`; its `problem` says why.
     """
-    name = log.name if isinstance(log, TrialLog) else Path(log).name
+    name, replay = log.name if isinstance(log, TrialLog) else Path(log).name, None
     try:
         trial = log if isinstance(log, TrialLog) else read(log)
-        if reference is None:
-            reference = _beside(log)
-        known = reference if isinstance(reference, TrialLog) else read(reference)
+        if trial.data_lost:
+            raise ShiplogError(f"data were lost: {'; '.join(trial.warnings)}")
         replay = make_reference(analyse(trial, vessel))
+        known = _reference(log if reference is None else reference, beside=reference is None)
     except ShiplogError as error:
-        return Comparison(name, (), str(error))
+        return Comparison(name, (), str(error), replay)
     return Comparison(name, _differences(replay, known), "", replay, known)
 
 
-def _beside(log: str | os.PathLike[str] | TrialLog) -> Path:
-    """The reference beside a log; `ShiplogError` where there is none."""
-    if isinstance(log, TrialLog):
-        raise ShiplogError("a log that is no file needs its reference given")
-    path = reference_path(Path(log))
-    if not path.exists():
-        raise ShiplogError(
-            f"has no reference; look at its replay, then run `shiplog check {log} --update`"
-        )
-    return path
+def _reference(where: str | os.PathLike[str] | TrialLog, *, beside: bool) -> TrialLog:
+    """The reference itself, its file, or the one beside a log; `ShiplogError` if there is none."""
+    if isinstance(where, TrialLog):
+        if beside:
+            raise ShiplogError("a log that is no file needs its reference given")
+        known = where
+    else:
+        path = reference_path(Path(where)) if beside else Path(where)
+        if beside and not path.exists():
+            raise ShiplogError(
+                f"has no reference; look at its replay, then run `shiplog check {where} --update`"
+            )
+        known = read(path)
+    if "reference_of" not in known.metadata:
+        raise ShiplogError(f"{known.name} is a log, not a reference; move it away")
+    return known
 
 
-def update(log: Path) -> None:
-    """Make the replay as it is now the reference."""
-    write(make_reference(analyse(read(log))), reference_path(log))
+def update(log: Path, comparison: Comparison) -> None:
+    """Make a replay that was compared the reference of its log."""
+    if comparison.replay is None:
+        raise ShiplogError(f"nothing to keep of {comparison.name}: {comparison.problem}")
+    write(comparison.replay, reference_path(log))
 
 
 def make_reference(analysis: Analysis) -> TrialLog:
@@ -262,41 +270,35 @@ def _estimated(analysis: Analysis) -> Iterator[Channel]:
 
 
 def _identified(analysis: Analysis, found: Identification) -> Iterator[Channel]:
-    history = found.history
-    rows = _evenly(len(history.time_secs))
-    stamps = _stamps(analysis, history.time_secs[rows])
+    history, at = found.history, found.history.time_secs
     for i, (name, whole) in enumerate(found.coefficients.items()):
         yield _single(analysis, name, "whole", whole.value)
         yield _single(analysis, name, "whole_std", whole.std)
-        yield _channel(name, "history", stamps, history.values[rows, i])
-        yield _channel(name, "history_std", stamps, history.stds[rows, i])
+        yield _blocks(analysis, name, "history", history.values[:, i], at)
+        yield _blocks(analysis, name, "history_std", history.stds[:, i], at)
 
 
 def _tracked(analysis: Analysis) -> Iterator[Channel]:
     track = analysis.track
-    rows = _evenly(len(track.time_secs))
-    stamps = _stamps(analysis, track.time_secs[rows])
-    yield _channel("north", "track", stamps, track.north[rows])
-    yield _channel("east", "track", stamps, track.east[rows])
+    yield _blocks(analysis, "north", "track", track.north, track.time_secs)
+    yield _blocks(analysis, "east", "track", track.east, track.time_secs)
+    yield _single(analysis, "warnings", "count", float(len(analysis.warnings)))
 
 
-def _evenly(count: int) -> TimeArray:
-    return np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(np.int64))
-
-
-def _stamps(analysis: Analysis, time_secs: FloatArray) -> TimeArray:
-    return analysis.signals.start_ns + np.round(time_secs * 1e9).astype(np.int64)
-
-
-def _blocks(analysis: Analysis, name: str, kind: str, values: FloatArray) -> Channel:
-    """The means of what was there in each block; NaN where there was nothing."""
-    block = (analysis.signals.time_secs // BLOCK_SECS).astype(np.int64)
+def _blocks(
+    analysis: Analysis, name: str, kind: str, values: FloatArray, at: FloatArray | None = None
+) -> Channel:
+    """The means of what was there in each block of time; NaN where there was nothing."""
+    time_secs = analysis.signals.time_secs if at is None else at
+    block = (np.maximum(time_secs, 0) // BLOCK_SECS).astype(np.int64)
     there = np.isfinite(values)
-    count = np.bincount(block[there], minlength=int(block[-1]) + 1)
-    total = np.bincount(block[there], weights=values[there], minlength=len(count))
+    size = int(np.max(block, initial=0)) + 1
+    count = np.bincount(block[there], minlength=size)
+    total = np.bincount(block[there], weights=values[there], minlength=size)
     with np.errstate(invalid="ignore"):
         means = total / count
-    return _channel(name, kind, _stamps(analysis, np.arange(len(count)) * BLOCK_SECS), means)
+    starts = np.round(np.arange(size) * BLOCK_SECS * 1e9).astype(np.int64)
+    return _channel(name, kind, analysis.signals.start_ns + starts, means)
 
 
 def _single(analysis: Analysis, name: str, kind: str, value: float) -> Channel:

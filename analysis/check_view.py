@@ -6,6 +6,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from shiplog import ShiplogError
 from shiplog.files import replacing
 from shiplog.types import FloatArray, TimeArray
 
@@ -21,7 +22,10 @@ def write_overlay(comparison: Comparison, path: str | os.PathLike[str]) -> None:
     """
     with replacing(path) as part:
         recording = rr.RecordingStream("shiplog check", recording_id=comparison.name)
-        recording.save(part, default_blueprint=_blueprint(comparison))
+        try:
+            recording.save(part, default_blueprint=_blueprint(comparison))
+        except RuntimeError as error:  # what Rerun makes of a full disk
+            raise ShiplogError(f"cannot write the overlay; is the disk full? {path}") from error
         for difference in comparison.changed:
             for label, log, colour, width in (
                 ("reference", comparison.reference, (150, 150, 150), 3.0),

@@ -1,20 +1,18 @@
 """From a log to what it says: the order of the steps."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
 
 from shiplog import LogError, Signals, TrialLog, Vessel, resample
-from shiplog.clock import gap_threshold_secs, usual_period_secs
-from shiplog.gyro_bias import gyro_bias_warning
+from shiplog.clock import usual_period_secs
 from shiplog.quality import examine
-from shiplog.rudder_sign import rudder_sign_warning
-from shiplog.units import CATALOGUE
 from shiplog.vessel import FilterSettings, parse_vessel
 
 from .disturbance import Disturbance, observe_disturbance
+from .doubts import doubtful, possible, silent_ends
 from .first_model import fit_first_model
 from .kalman import OUTPUTS, Estimates, Noise, filter_states, noise_of
 from .residuals import OutputResiduals, judge
@@ -57,14 +55,16 @@ def analyse(
     channel or cannot be used as it is.
     """
     on_step("check")
-    warnings = [*log.warnings, *examine(log, NEEDED)]
+    also = tuple(name for name in ("heading", "position") if name in log)
+    warnings = [*log.warnings, *examine(log, (*NEEDED, *also))]
 
     on_step("one clock")
-    possible = _possible(log)
-    signals = resample(possible, channels=NEEDED, optional=("heading",))
+    credible = possible(log)
+    signals = resample(credible, channels=NEEDED, optional=("heading",))
     _require_outputs(log, signals)
-    known, unknown = _hold_inputs(signals)
-    warnings += [*_doubtful(possible), *_silent_ends(possible, signals), *unknown]
+    known, unknown = _hold_inputs(credible, signals)
+    warnings += doubtful(credible, NEEDED)
+    warnings += [*silent_ends(credible, signals, NEEDED), *unknown]
 
     on_step("model")
     vessel, origin = _model(log, vessel, signals)
@@ -80,16 +80,7 @@ def analyse(
             f"the filter runs away: the model does not fit this log ({origin}); "
             f"give the ship's own with --vessel: {log.name}"
         )
-    residuals = tuple(
-        judge(
-            name,
-            log[name].unit,
-            estimates.innovations[:, i],
-            estimates.innovation_stds[:, i],
-            noise_measured=noise.measured[i],
-        )
-        for i, name in enumerate(OUTPUTS)
-    )
+    residuals = tuple(_judged(log, estimates, noise, i) for i in range(len(OUTPUTS)))
 
     on_step("disturbance")
     disturbance = observe_disturbance(known, model, noise)
@@ -112,37 +103,6 @@ def _model(log: TrialLog, given: Vessel | None, signals: Signals) -> tuple[Vesse
     return fit_first_model(signals, log.name), FITTED
 
 
-def _possible(log: TrialLog) -> TrialLog:
-    """The log with what no ship does as not measured; `examine` has said where."""
-    channels = []
-    for channel in log:
-        kind = CATALOGUE.get(channel.name)
-        if kind is not None and not channel.fields:
-            possible = (channel.values >= kind.lowest) & (channel.values <= kind.highest)
-            channel = replace(channel, values=np.where(possible, channel.values, np.nan))  # noqa: PLW2901
-        channels.append(channel)
-    return replace(log, channels=tuple(channels))
-
-
-def _doubtful(log: TrialLog) -> Iterator[str]:
-    """What in a log may not be what it seems."""
-    for name in NEEDED:
-        sources = [channel.source for channel in log if channel.name == name]
-        if len(sources) > 1:
-            yield (
-                f"{name}: {len(sources)} sources ({', '.join(sources)}), {sources[0]} is used; "
-                f"choose another with --source {name}={sources[1]}"
-            )
-    for name in OUTPUTS:
-        if np.nanmin(log[name].values) == np.nanmax(log[name].values):
-            yield f"{log[name].topic}: never changes; if the sensor was dead, choose another"
-    if np.nanmin(log["speed"].values) < 0 or np.nanmin(log["rpm"].values) < 0:
-        yield "the ship goes astern in places, where the model does not hold"
-    for warning in (rudder_sign_warning(log), gyro_bias_warning(log)):
-        if warning:
-            yield warning
-
-
 def _require_outputs(log: TrialLog, signals: Signals) -> None:
     for name in OUTPUTS:
         count = int(np.isfinite(signals[name]).sum())
@@ -151,24 +111,6 @@ def _require_outputs(log: TrialLog, signals: Signals) -> None:
                 f"channel {name!r} has {count} samples while the others are there too, "
                 f"and {FEWEST} are needed; check the recorder or choose another log: {log.name}"
             )
-
-
-def _silent_ends(log: TrialLog, signals: Signals) -> Iterator[str]:
-    """Parts of the log that are not replayed, or only predicted, for want of a channel."""
-    first, last = signals.start_ns, int(signals.stamps_ns[-1])
-    spans = {name: log[name].measured_ns[np.isfinite(log[name].values)] for name in NEEDED}
-    begun = max(spans, key=lambda name: int(spans[name].min()))
-    late = (first - min(int(times.min()) for times in spans.values())) * 1e-9
-    if late > gap_threshold_secs(log[begun]):
-        yield f"{begun}: sets in {late:.1f} s after the others; the replay begins there"
-    ceased = min(INPUTS, key=lambda name: int(spans[name].max()))
-    early = (max(int(times.max()) for times in spans.values()) - last) * 1e-9
-    if early > gap_threshold_secs(log[ceased]):
-        yield f"{ceased}: ends {early:.1f} s before the others; the replay ends there"
-    for name in OUTPUTS:
-        silent = (last - int(spans[name].max())) * 1e-9
-        if silent > gap_threshold_secs(log[name]):
-            yield f"{name}: silent for the last {silent:.1f} s, which are only predicted"
 
 
 def _averaged(settings: FilterSettings, log: TrialLog, dt_secs: float) -> FilterSettings:
@@ -180,7 +122,18 @@ def _averaged(settings: FilterSettings, log: TrialLog, dt_secs: float) -> Filter
     return replace(settings, yaw_rate_std=stds[0], speed_std=stds[1])
 
 
-def _hold_inputs(signals: Signals) -> tuple[Signals, list[str]]:
+def _judged(log: TrialLog, estimates: Estimates, noise: Noise, output: int) -> OutputResiduals:
+    name = OUTPUTS[output]
+    return judge(
+        name,
+        log[name].unit,
+        estimates.innovations[:, output],
+        estimates.innovation_stds[:, output],
+        noise_measured=noise.measured[output],
+    )
+
+
+def _hold_inputs(log: TrialLog, signals: Signals) -> tuple[Signals, list[str]]:
     """Rudder and revolutions at their last known value wherever they were not measured.
 
     A filter cannot predict without them; what it predicts then is said to be a guess.
@@ -190,9 +143,19 @@ def _hold_inputs(signals: Signals) -> tuple[Signals, list[str]]:
         missing = np.isnan(values[name])
         if missing.any():
             last = np.maximum.accumulate(np.where(missing, 0, np.arange(len(missing))))
-            values[name] = values[name][last]
+            held = values[name][last]
+            if np.isnan(held[0]):  # the clock begins in the midst of a gap
+                held = np.where(np.isnan(held), _last_before(log, name, signals), held)
+            values[name] = held
             said.append(
                 f"{name}: not measured for {missing.sum() * signals.dt_secs:.1f} s in all; "
                 "held at its last value there, so that the estimates there are guesses"
             )
     return replace(signals, values=values), said
+
+
+def _last_before(log: TrialLog, name: str, signals: Signals) -> float:
+    """What was known of an input when the clock began."""
+    channel = log[name]
+    earlier = np.isfinite(channel.values) & (channel.measured_ns <= signals.start_ns)
+    return float(channel.values[earlier][np.argmax(channel.measured_ns[earlier])])

@@ -52,8 +52,8 @@ def write_review(analysis: Analysis, path: str | os.PathLike[str], *, text: str)
     """
     with replacing(path) as part:
         recording = _recording(analysis)
-        recording.save(part)
         try:
+            recording.save(part)
             _send(recording, analysis, text)
         except RuntimeError as error:  # what Rerun makes of a full disk
             raise ShiplogError(f"cannot finish the review; is the disk full? {path}") from error

@@ -219,7 +219,7 @@ def _filter_section(analysis: Analysis) -> Section:
             (
                 f"{residuals.name} [{unit}]",
                 f"{rms:.3g}",
-                f"{residuals.normalised_squared:.3f}",
+                f"{residuals.normalised_squared:.4g}",
                 f"{residuals.whiteness_p:.2g}",
             )
         )
@@ -234,7 +234,7 @@ def _verdict(residuals: OutputResiduals) -> str:
         larger = residuals.normalised_squared > residuals.expected[1]
         size = f"; they are {'larger' if larger else 'smaller'} than the noise assumed"
     if residuals.white is None:
-        return f"{residuals.name}: too few measurements to tell whether innovations are white."
+        return f"{residuals.name}: the innovations cannot be told to be white or not{size}."
     if residuals.white:
         return f"{residuals.name}: innovations are white (test at 1 %){size}."
     return (
@@ -281,7 +281,8 @@ def _coefficient_section(analysis: Analysis) -> Section:
         f"Condition of the scaled regressors: yaw {analysis.yaw.condition:.0f}, "
         f"surge {analysis.surge.condition:.0f}. "
         "Not determined: the log cannot tell it from the others, or not even its sign. "
-        "Two standard deviations are a 95 % interval. A gyro's bias goes into b1, b2, b3 and e."
+        "Two standard deviations are about a 95 % interval, less where a few seconds tell all. "
+        "A gyro's bias goes into b1, b2, b3 and e."
     )
     columns = ("coefficient", "from this log", "std", "unit", "in the model")
     return Section("Coefficients", columns, tuple(rows), (remark,))

@@ -24,20 +24,19 @@ class Track:
 def find_track(log: TrialLog, signals: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
     """The positions recorded, or else dead reckoning from heading and speed ahead.
 
-    `yaw_rate` and `speed` are the filter's, (n,) on the signals' clock; without a heading the
-    yaw rate is integrated.
+    `yaw_rate` and `speed` are the filter's, (n,) on the signals' clock; where there is no heading
+    the yaw rate is integrated.
     """
     position = log.get("position")
-    if position is not None and len(position) > 1:
+    if position is not None and np.isfinite(position.values).all(axis=1).sum() > 1:
         return _recorded(position, signals)
-    if "heading" in signals and np.isfinite(signals["heading"]).sum() > 1:
-        known = np.isfinite(signals["heading"])
+    heading = np.cumsum(yaw_rate) * signals.dt_secs
+    origin = "dead reckoning from yaw rate and speed ahead"
+    known = np.isfinite(signals["heading"]) if "heading" in signals else np.zeros(0, bool)
+    if known.any():  # the yaw rate bridges where the compass was silent
         at = np.arange(len(signals))
-        heading: FloatArray = np.interp(at, at[known], signals["heading"][known])
+        heading = heading + np.interp(at, at[known], (signals["heading"] - heading)[known])
         origin = "dead reckoning from heading and speed ahead"
-    else:
-        heading = np.cumsum(yaw_rate) * signals.dt_secs
-        origin = "dead reckoning from yaw rate and speed ahead"
     north = np.cumsum(speed * np.cos(heading)) * signals.dt_secs
     east = np.cumsum(speed * np.sin(heading)) * signals.dt_secs
     return Track(signals.time_secs, north - north[0], east - east[0], origin)

@@ -36,6 +36,11 @@ def record(
     part = final if is_device(final) else final.with_name(final.name + ".part")
     if final.is_dir():
         raise cannot_write(final, IsADirectoryError())
+    if part != final and part.exists():
+        raise ShiplogError(
+            "a recording that was not finished lies there; rescue it with `shiplog convert`, "
+            f"or delete it: {part}"
+        )
     interrupted = False
     writer = LogWriter(part, metadata=source.metadata, vessel_toml=source.vessel_toml)
     try:

@@ -6,6 +6,7 @@ which they were received, each a head and its payload. No loop runs over message
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -37,8 +38,8 @@ class Chunk:
     index: dict[int, NDArray[np.void]]  # of INDEX_ENTRY
 
 
-def chunks(parts: Sequence[Part], usual: int) -> Iterator[Chunk]:
-    """Lay parts out in even chunks of about `usual` bytes, in the order of reception."""
+def chunks(parts: Sequence[Part], largest: int) -> Iterator[Chunk]:
+    """Lay parts out in even chunks of at most about `largest` bytes, in the order of reception."""
     records = [_records(part) for part in parts]
     of_part = np.repeat(np.arange(len(parts)), [len(r) for r in records])
     of_row = np.concatenate([np.arange(len(r)) for r in records])
@@ -46,7 +47,7 @@ def chunks(parts: Sequence[Part], usual: int) -> Iterator[Chunk]:
     sizes = np.concatenate([r.sizes for r in records])
     order = np.argsort(received, kind="stable")
     ends = np.cumsum(sizes[order])
-    even = -(-int(ends[-1]) // max(1, round(int(ends[-1]) / usual)))
+    even = ceil(ends[-1] / ceil(ends[-1] / largest))
     cuts = np.flatnonzero(np.diff((ends - 1) // even)) + 1
     for chosen in np.split(order, cuts):
         if len(chosen):

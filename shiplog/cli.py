@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import __version__
 from .errors import ShiplogError, UsageError
-from .files import replacing
+from .files import is_device, replacing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         code = _fail(f"cannot write the output: {error.strerror or error}", FAILURE)
     except KeyboardInterrupt:
-        code = _fail("interrupted; nothing was written", FAILURE)
+        code = _fail("interrupted; no output is half-written", FAILURE)
     return code
 
 
@@ -182,7 +182,7 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
     from .vessel import load_vessel
     from .writer import write
 
-    _require_distinct(arguments.output, arguments.truth)
+    _require_distinct([arguments.output, arguments.truth], [arguments.vessel])
     vessel, text = load_vessel(arguments.vessel)
     with _progress("recorders") as tell:
         tell("sail and measure")
@@ -199,10 +199,11 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
             vessel_toml=text,
         )
         tell("write")
-        recorded = record(trial, arguments.output)
+        recorded = record(trial, arguments.output, on_slab=lambda n: tell(f"write: {n} samples"))
         if arguments.truth and not recorded.interrupted:
             write(trial.truth(), arguments.truth)
-    print(f"{arguments.output}: {recorded.samples} samples of {len(trial.channels)} channels")
+    said = f"{arguments.output}: {recorded.samples} samples of {len(trial.channels)} channels"
+    print(said, file=sys.stderr if is_device(Path(arguments.output)) else sys.stdout)
     if recorded.interrupted:
         print("interrupted: the log ends there", file=sys.stderr)
     return FINE
@@ -211,11 +212,11 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
 def _run_info(arguments: argparse.Namespace) -> int:
     from .info import info
 
-    _require_distinct(arguments.log, arguments.json)
+    _require_distinct([arguments.json], [arguments.log])
     found = info(arguments.log)
     if arguments.json:
         _write_json(found.as_json(), arguments.json)
-        return FINE
+        return DATA_LOST if found.data_lost else FINE
     print(f"{found.name}: {(found.end_ns - found.start_ns) * 1e-9:.1f} s")
     rows = [("topic", "samples", "unit", "positive")]
     rows += [(c.topic, str(c.samples), c.unit, c.positive) for c in found.channels]
@@ -227,7 +228,7 @@ def _run_info(arguments: argparse.Namespace) -> int:
         print(f"  {key}: {value}")
     print(f"  vessel.toml: {'attached' if found.has_vessel else 'none'}")
     _warn(found.warnings)
-    return FINE
+    return DATA_LOST if found.data_lost else FINE
 
 
 def _run_replay(arguments: argparse.Namespace) -> int:
@@ -240,7 +241,7 @@ def _run_replay(arguments: argparse.Namespace) -> int:
 
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
-    _require_distinct(arguments.log, output, arguments.json, arguments.vessel)
+    _require_distinct([output, arguments.json], [arguments.log, arguments.vessel])
     sources = _sources(arguments.source)
     with _progress("analysis") as tell:
         tell("read")
@@ -273,14 +274,19 @@ def _run_check(arguments: argparse.Namespace) -> int:
         for log in logs:
             tell(log.name)
             comparisons.append(compare(log))
-    _require_distinct(arguments.json, *logs, *map(reference_path, logs))
+    _require_distinct([arguments.json], [*logs, *map(reference_path, logs)])
     for comparison in comparisons:
         print(comparison, file=sys.stderr if arguments.json == "-" else sys.stdout)
     if arguments.json:
         _write_json([as_json(comparison) for comparison in comparisons], arguments.json)
     if arguments.update:
-        for log in logs:
-            update(log)
+        unusable = [c.name for c in comparisons if c.replay is None]
+        if unusable:
+            raise ShiplogError(
+                f"no reference was updated: {', '.join(unusable)} cannot be replayed"
+            )
+        for log, comparison in zip(logs, comparisons, strict=True):
+            update(log, comparison)
             print(f"updated: {reference_path(log)}", file=sys.stderr)
         return FINE
     for comparison in comparisons:
@@ -304,11 +310,14 @@ def _run_convert(arguments: argparse.Namespace) -> int:
     return DATA_LOST if log.data_lost else FINE
 
 
-def _require_distinct(*paths: str | Path | None) -> None:
-    """Refuse to write over what is read, or over another output."""
-    named = [Path(path).resolve() for path in paths if path and str(path) != "-"]
-    for path in named:
-        if named.count(path) > 1:
+def _require_distinct(
+    outputs: Sequence[str | Path | None], inputs: Sequence[str | Path | None]
+) -> None:
+    """Refuse to write over what is read, or over another output; devices may be shared."""
+    written = [Path(path).resolve() for path in outputs if path and str(path) != "-"]
+    written = [path for path in written if not is_device(path)]
+    for path in written:
+        if written.count(path) > 1 or path in [Path(p).resolve() for p in inputs if p]:
             raise UsageError(f"the same file is named twice; name another for the output: {path}")
 
 

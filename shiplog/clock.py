@@ -50,7 +50,7 @@ def resample(
             f"correct the clock of one of {', '.join(names)}: {log.name}"
         )
     grid = np.arange(int(steps) + 1) * dt
-    used |= {name: log[name] for name in optional if name in log}
+    used |= {name: log[name] for name in optional if name in log and _measured(log[name]) > 1}
     values = {}
     for name, channel in used.items():
         at = (channel.measured_ns - start_ns) * 1e-9
@@ -99,13 +99,19 @@ def _require_samples(log: TrialLog, name: str, channel: Channel) -> None:
             f"channel {name!r} has components ({', '.join(channel.fields)}), "
             f"and a clock takes one value a sample; name others: {log.name}"
         )
-    measured = int(np.isfinite(channel.values).sum())
+    measured = _measured(channel)
     if measured < 2 or usual_period_secs(channel) == 0:
-        has = "one sample" if measured == 1 else f"{measured} samples at one instant or none"
+        has = {0: "no measured value", 1: "one sample"}.get(
+            measured, "all its samples at one instant"
+        )
         raise LogError(
             f"channel {name!r} has {has}, and a replay needs it over time; "
             f"check the recorder or choose another log: {log.name}"
         )
+
+
+def _measured(channel: Channel) -> int:
+    return int(np.isfinite(channel.values).sum())
 
 
 def _common_span(log: TrialLog, channels: list[Channel]) -> tuple[int, int]:

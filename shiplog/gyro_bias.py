@@ -18,7 +18,10 @@ def gyro_bias_warning(log: TrialLog) -> str | None:
     their scatter; blocks with a gap in either channel are left out. None where a channel is
     missing, or too little of it is whole.
     """
-    biases = _block_biases(log)
+    biases = _block_biases(log, 1.0)
+    contrary = _block_biases(log, -1.0)
+    if len(biases) >= BLOCKS // 2 and np.std(contrary) < 0.1 * np.std(biases):
+        return f"{log['heading'].topic}: counts to port; set the heading's sign = -1 in the layout"
     if len(biases) < BLOCKS // 2:
         return None
     bias = float(np.mean(biases))
@@ -32,7 +35,7 @@ def gyro_bias_warning(log: TrialLog) -> str | None:
     )
 
 
-def _block_biases(log: TrialLog) -> FloatArray:
+def _block_biases(log: TrialLog, sign: float) -> FloatArray:
     """How fast the integral of the yaw rate gains on the heading, rad/s, in each whole block."""
     gyro, compass = log.get("yaw_rate"), log.get("heading")
     if gyro is None or compass is None:
@@ -42,7 +45,7 @@ def _block_biases(log: TrialLog) -> FloatArray:
     compass_at = compass.measured_ns[heading_known] * 1e-9
     if min(len(at), len(compass_at)) < 4 * BLOCKS:
         return np.zeros(0)
-    rate, heading = gyro.values[rate_known], np.unwrap(compass.values[heading_known])
+    rate, heading = gyro.values[rate_known], sign * np.unwrap(compass.values[heading_known])
     turned = np.concatenate(([0.0], np.cumsum(np.diff(at) * (rate[1:] + rate[:-1]) / 2)))
     start, end = max(at[0], compass_at[0]), min(at[-1], compass_at[-1])
     edges = np.linspace(start, end, BLOCKS + 1)

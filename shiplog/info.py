@@ -36,6 +36,7 @@ class LogInfo:
     metadata: Mapping[str, str]
     has_vessel: bool
     warnings: tuple[str, ...] = ()
+    data_lost: bool = False
 
     def as_json(self) -> dict[str, Any]:
         """The same as plain values."""
@@ -101,4 +102,5 @@ def _by_reading(path: Path) -> LogInfo:
         for channel in log
     )
     has_vessel = log.vessel_toml is not None
-    return LogInfo(path.name, start, end, channels, log.metadata, has_vessel, log.warnings)
+    said = dict(log.metadata)
+    return LogInfo(path.name, start, end, channels, said, has_vessel, log.warnings, log.data_lost)

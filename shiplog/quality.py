@@ -69,7 +69,7 @@ def _faults(channel: Channel) -> Iterator[str]:
     missing = int(np.count_nonzero(np.isnan(_rows(channel)).all(axis=1)))
     if missing:
         share = 100 * missing / len(channel)
-        yield f"{_count(missing, 'sample')} ({share:.2g} %) not measured (NaN)"
+        yield f"{_count(missing, 'sample')} ({share:.1f} %) not measured (NaN)"
     yield from _stuck(channel)
     yield from _impossible(channel)
     yield from _irregular(channel)

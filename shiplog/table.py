@@ -129,8 +129,11 @@ def _csv_rows(path: Path, stream: IO[str], before: int) -> tuple[Any, ...]:
     reader, ended = csv.reader(stream), False
     try:
         for cells in reader:
-            if ended := cells == [CSV_END]:
-                break
+            if ended:
+                raise LogError(f"rows stand behind its {CSV_END!r}; take them out: {path}")
+            if cells == [CSV_END]:
+                ended = True
+                continue
             topic, field, measured_text, received_text, text = cells
             topics.append(topic)
             fields.append(field)

@@ -114,12 +114,12 @@ class TrialLog:
         return iter(self.channels)
 
     def preferring(self, sources: Mapping[str, str]) -> "TrialLog":
-        """The same log, in which `log[name]` is the source given for that name.
+        """The same log with one source only for each name given, the one given.
 
         Raises `LogError` where there is no such channel.
         """
         preferred = [self[f"{name}/{source}"] for name, source in sources.items()]
-        others = [channel for channel in self.channels if channel not in preferred]
+        others = [channel for channel in self.channels if channel.name not in sources]
         return replace(self, channels=(*preferred, *others))
 
     @property

@@ -197,8 +197,36 @@ def test_a_missing_reference_fails_with_the_remedy(zigzag: SimulatedTrial, tmp_p
     assert not found.ok
     assert "no reference" in str(found)
     assert "--update" in str(found)
-    update(tmp_path / "z.mcap")
+    update(tmp_path / "z.mcap", found)
     assert compare(tmp_path / "z.mcap").ok
+
+
+def test_a_log_that_is_no_reference_is_refused_as_one(
+    zigzag: SimulatedTrial, zigzag_log: TrialLog
+) -> None:
+    assert "not a reference" in str(compare(zigzag_log, zigzag.truth()))
+
+
+def test_a_log_that_lost_data_is_no_success(zigzag_log: TrialLog, reference: TrialLog) -> None:
+    damaged = replace(zigzag_log, data_lost=True, warnings=("a chunk was damaged",))
+    found = compare(damaged, reference)
+    assert not found.ok
+    assert "a chunk was damaged" in str(found)
+    with pytest.raises(ShiplogError, match="nothing to keep"):
+        update(Path("z.mcap"), found)
+
+
+def test_a_new_warning_and_a_moved_position_turn_it_red(
+    zigzag_log: TrialLog, reference: TrialLog
+) -> None:
+    position = zigzag_log["position"]
+    values = position.values.copy()
+    values[301, 0] += 500.0
+    moved = tuple(replace(c, values=values) if c.name == "position" else c for c in zigzag_log)
+    found = compare(replace(zigzag_log, channels=moved), reference)
+    assert [d.topic for d in found.changed] == ["/north/track"]
+    warned = compare(replace(zigzag_log, warnings=("something new",)), reference)
+    assert [d.topic for d in warned.changed] == ["/warnings/count"]
 
 
 def test_a_log_that_does_not_replay_fails_with_its_error(tmp_path: Path) -> None:

@@ -316,6 +316,7 @@ def test_a_wrong_request_is_a_usage_error_in_one_line(
         "convert LOG LOG",
         "check LOG --json LOG",
         "record simulate spiral -o z.mcap --truth z.mcap",
+        "record simulate spiral --vessel LOG -o LOG",
     ],
 )
 def test_no_output_is_written_over_a_log_or_another_output(
@@ -354,10 +355,30 @@ def test_another_source_can_be_chosen(recorded: Path, capsys: pytest.CaptureFixt
     assert "speed: 2 sources (dead, simulated), dead is used" in said
     assert "never changes" in said
     assert main(["replay", "x.mcap", "--source", "speed=simulated"]) == FINE
-    assert "never changes" not in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "never changes" not in said
+    assert "2 sources" not in said
     assert "no channel 'speed/doppler'" in refusal(
         capsys, FAILURE, "replay", "x.mcap", "--source", "speed=doppler"
     )
+
+
+def test_a_recording_that_was_killed_is_not_recorded_over(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("k.mcap.part").write_bytes(b"hours of trial")
+    simulate = "record simulate spiral --duration 20 -o k.mcap"
+    assert "not finished lies there" in refusal(capsys, FAILURE, *simulate.split())
+    assert Path("k.mcap.part").read_bytes() == b"hours of trial"
+
+
+def test_what_was_lost_of_a_log_shows_in_every_verbs_exit_code(recorded: Path) -> None:
+    data = recorded.read_bytes()
+    Path("cut.mcap").write_bytes(data[: len(data) * 3 // 4])
+    assert main(["info", "cut.mcap", "--json", "-"]) == DATA_LOST
+    assert main(["replay", "cut.mcap"]) == DATA_LOST
+    assert main(["check", "cut.mcap", "--update"]) == FAILURE
+    assert not Path("cut.ref.mcap").exists()
 
 
 def test_a_recording_that_was_killed_is_rescued_by_convert(

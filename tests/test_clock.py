@@ -217,8 +217,8 @@ def test_positions_are_passed_over_and_refused_when_named() -> None:
     [
         ([0], [1], "has one sample"),
         ([0, 1], [1, nan], "has one sample"),
-        ([0, 1], [nan, nan], "has 0 samples"),
-        ([], [], "has 0 samples"),
+        ([0, 1], [nan, nan], "has no measured value"),
+        ([], [], "has no measured value"),
         ([5, 5, 5], [1, 2, 3], "at one instant"),
     ],
 )

@@ -42,6 +42,14 @@ def test_dropouts_do_not_pass_for_a_bias(vessel: Vessel) -> None:
         assert gyro_bias_warning(sailed(vessel, seed, **gaps)) is None
 
 
+def test_a_heading_that_counts_to_port_is_called_that(vessel: Vessel) -> None:
+    log = sailed(vessel)
+    contrary = tuple(replace(c, values=-c.values) if c.name == "heading" else c for c in log)
+    warning = gyro_bias_warning(replace(log, channels=contrary))
+    assert warning is not None
+    assert "counts to port" in warning
+
+
 def test_without_a_heading_nothing_is_said(vessel: Vessel) -> None:
     log = sailed(vessel, yaw_rate__bias=1.0)
     assert gyro_bias_warning(replace(log, channels=log.channels[:4])) is None

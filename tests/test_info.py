@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,7 @@ def test_an_unfinished_log_is_described_by_reading_it(tmp_path: Path) -> None:
     assert found.channels[0].samples == 100
     assert found.metadata["ship"] == "test"
     assert any("not finished" in warning for warning in found.warnings)
+    assert json.loads(json.dumps(found.as_json()))["metadata"]["ship"] == "test"
     writer.close()
 
 

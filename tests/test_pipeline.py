@@ -211,6 +211,28 @@ def test_a_command_that_begins_with_nothing_measured_does_not_spoil_the_filter(
     assert np.isfinite(found.estimates.states).all()
 
 
+@pytest.mark.parametrize("name", ["rudder", "rpm"])
+def test_a_dead_command_is_said(zigzag_log: TrialLog, name: str) -> None:
+    dead = tuple(replace(c, values=0 * c.values) if c.name == name else c for c in zigzag_log)
+    found = analyse(replace(zigzag_log, channels=dead))
+    said = "never changes" if name == "rudder" else "0 throughout"
+    assert any(w.startswith(f"/{name}/") and said in w for w in found.warnings)
+
+
+def test_a_compass_that_is_off_is_as_no_compass(zigzag_log: TrialLog) -> None:
+    off = bias("heading", np.nan)(zigzag_log)
+    found = analyse(off)
+    assert "heading" not in found.signals
+
+
+def test_a_clock_that_begins_within_a_gap_of_the_rudder_holds_what_it_was(
+    zigzag_log: TrialLog,
+) -> None:
+    late = dropout("speed", 0.0, 20.0)(dropout("rudder", 0.05, 100.0)(zigzag_log))
+    found = analyse(late)
+    assert np.isfinite(found.estimates.states).all()
+
+
 def test_what_no_ship_does_is_left_out_and_said(zigzag_log: TrialLog) -> None:
     found = analyse(spike("speed", 100.0, 1e300)(zigzag_log))
     assert np.isnan(found.signals["speed"][1000])

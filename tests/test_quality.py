@@ -79,7 +79,7 @@ def test_equal_times_are_counted() -> None:
 def test_samples_not_measured_are_counted() -> None:
     values = noise()
     values[30:36] = np.nan
-    assert said(channel(values)) == ["/yaw_rate/a: 6 samples (1 %) not measured (NaN)"]
+    assert said(channel(values)) == ["/yaw_rate/a: 6 samples (1.0 %) not measured (NaN)"]
 
 
 def test_a_channel_without_samples_is_said_so() -> None:
@@ -88,7 +88,7 @@ def test_a_channel_without_samples_is_said_so() -> None:
 
 def test_a_channel_of_nan_alone_is_no_stuck_one() -> None:
     assert said(channel(np.full(600, np.nan))) == [
-        "/yaw_rate/a: 600 samples (1e+02 %) not measured (NaN)"
+        "/yaw_rate/a: 600 samples (100.0 %) not measured (NaN)"
     ]
 
 

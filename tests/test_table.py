@@ -263,6 +263,14 @@ def test_a_csv_that_was_cut_is_refused(tmp_path: Path) -> None:
             read_csv(tmp_path / "b.csv")
 
 
+def test_rows_behind_the_end_of_a_csv_are_refused(tmp_path: Path) -> None:
+    write_csv(trial(), tmp_path / "a.csv")
+    with (tmp_path / "a.csv").open("a") as stream:
+        stream.write("/speed/log,value,1,1,2.0\n")
+    with pytest.raises(LogError, match="rows stand behind"):
+        read_csv(tmp_path / "a.csv")
+
+
 def test_a_csv_saved_with_other_line_ends_still_reads(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     log = replace(trial(), channels=trial().channels[1:])

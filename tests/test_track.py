@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -25,6 +27,29 @@ def test_without_positions_the_track_is_dead_reckoned(zigzag: SimulatedTrial) ->
         assert origin in track.origin
         away = np.hypot(track.north - truth["position"][:, 0], track.east - truth["position"][:, 1])
         assert away.max() < 5  # m, of four kilometres
+
+
+def test_the_yaw_rate_bridges_where_the_compass_was_silent(zigzag: SimulatedTrial) -> None:
+    log = TrialLog("x", tuple(c for c in zigzag.channels if c.name != "position"))
+    signals = resample(log, channels=("yaw_rate", "rudder", "heading"))
+    truth = zigzag.trajectory.at(signals.time_secs)
+    for silent in (slice(0, 2000), slice(1000, 4000), slice(2500, None), slice(None)):
+        heading = signals["heading"].copy()
+        heading[silent] = np.nan
+        partly = Signals(0, signals.dt_secs, dict(signals.values) | {"heading": heading})
+        track = find_track(log, partly, truth["yaw_rate"], truth["speed"])
+        away = np.hypot(track.north - truth["position"][:, 0], track.east - truth["position"][:, 1])
+        assert away.max() < 10
+
+
+def test_positions_that_were_never_measured_are_no_track(zigzag_log: TrialLog) -> None:
+    blank = tuple(
+        replace(c, values=c.values * np.nan) if c.name == "position" else c for c in zigzag_log
+    )
+    signals = resample(zigzag_log, channels=("yaw_rate", "heading"))
+    rate = signals["yaw_rate"]
+    track = find_track(TrialLog("x", blank), signals, rate, np.full(len(rate), 8.0))
+    assert "dead reckoning" in track.origin
 
 
 def test_positions_on_the_globe_become_metres() -> None:

@@ -290,8 +290,8 @@ def test_a_failure_midway_leaves_what_was_there(
         write(trial(channel("speed", 30)), path)
     before = path.read_bytes() if stands else None
 
-    def full_disk(parts: list[Part], usual: int) -> Iterator[Chunk]:
-        yield from chunks(parts, usual)
+    def full_disk(parts: list[Part], largest: int) -> Iterator[Chunk]:
+        yield from chunks(parts, largest)
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(shiplog.writer, "chunks", full_disk)
