@@ -78,6 +78,10 @@ def test_what_is_written_is_read(path: Path) -> None:
     assert all(same(one, other) for one, other in zip(written, log, strict=True))
 
 
+OURS = {"format_version", "written_by", "channel", "source", "unit", "positive"}
+keys = st.text(min_size=1).filter(lambda key: key not in OURS)  # these the writer itself says
+
+
 @st.composite
 def channels(draw: st.DrawFn, name: str) -> Channel:
     count = draw(st.integers(0, 20))
@@ -89,11 +93,11 @@ def channels(draw: st.DrawFn, name: str) -> Channel:
         draw(arrays(np.int64, count, elements=times)),
         np.sort(draw(arrays(np.int64, count, elements=times))),
         draw(arrays(np.float64, count, elements=st.floats(allow_nan=True))),
-        metadata=draw(st.dictionaries(st.text(min_size=1), st.text(), max_size=2)),
+        metadata=draw(st.dictionaries(keys, st.text(), max_size=2)),
     )
 
 
-@given(st.tuples(channels("yaw_rate"), channels("heave")), st.dictionaries(st.text(), st.text()))
+@given(st.tuples(channels("yaw_rate"), channels("heave")), st.dictionaries(keys, st.text()))
 @settings(derandomize=True, deadline=None, max_examples=100)
 def test_any_log_comes_back_bit_for_bit(
     tmp_path_factory: pytest.TempPathFactory, held: tuple[Channel, ...], metadata: dict[str, str]
