@@ -71,7 +71,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_record(verbs: Any) -> None:  # noqa: ANN401 - argparse keeps that type to itself
-    record = verbs.add_parser("record", help="write sensor streams to a log")
+    said = "write sensor streams to a log"
+    record = verbs.add_parser("record", help=said, description=said.capitalize() + ".")
     sources = record.add_subparsers(metavar="SOURCE", required=True)
     simulate = sources.add_parser(
         "simulate",
@@ -111,7 +112,9 @@ sensors, each setting in SI:
     simulate.add_argument(
         "--wave", metavar="DEG@PERIOD", help="a sinusoidal yaw moment worth DEG of rudder"
     )
-    simulate.add_argument("--truth", metavar="FILE", help="write what really happened there")
+    simulate.add_argument(
+        "--truth", metavar="FILE", help="write what really happened there, at 10 Hz"
+    )
     simulate.add_argument("-o", "--output", required=True, metavar="FILE", help="the log")
     simulate.set_defaults(run=_run_simulate)
 
@@ -151,7 +154,8 @@ def _add_check(verbs: Any) -> None:  # noqa: ANN401
     check = verbs.add_parser(
         "check",
         help="compare replays with their references",
-        description="Replay a log, or the logs of a folder, and compare with NAME.ref.mcap.",
+        description="Replay a log, or the logs of a folder, and compare with NAME.ref.mcap; "
+        "what differs is drawn in NAME.check.rrd, here.",
     )
     check.add_argument("path", metavar="PATH", type=Path)
     check.add_argument(
