@@ -7,16 +7,14 @@ Results go to stdout, everything else to stderr. Exit codes: 0 fine, 1 failure, 
 import argparse
 import json
 import os
-import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from math import radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from . import __version__
+from .arguments import gust, parser, settings, sources, wave
 from .errors import ShiplogError, UsageError
 from .files import is_device, replacing
 
@@ -24,20 +22,18 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from analysis.pipeline import Analysis
-    from recorders.simulate import Gust, WaveMoment
-
 FINE, FAILURE, USAGE, DATA_LOST = 0, 1, 2, 3
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; the exit code says how it went."""
-    parser = _parser()
-    parsed = parser.parse_args(arguments)
-    if "run" not in parsed:
-        parser.print_help(sys.stderr)
+    grammar = parser()
+    parsed = grammar.parse_args(arguments)
+    if "verb" not in parsed:
+        grammar.print_help(sys.stderr)
         return USAGE
     try:
-        code = int(parsed.run(parsed))
+        code = _VERBS[parsed.verb](parsed)
         sys.stdout.flush()
     except UsageError as error:
         code = _fail(error, USAGE)
@@ -58,130 +54,11 @@ def _fail(error: object, code: int) -> int:
     return code
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="shiplog", description=__doc__.split("\n", 1)[0])
-    parser.add_argument("--version", action="version", version=f"shiplog {__version__}")
-    verbs = parser.add_subparsers(metavar="VERB")
-    _add_record(verbs)
-    _add_info(verbs)
-    _add_replay(verbs)
-    _add_check(verbs)
-    _add_convert(verbs)
-    return parser
-
-
-def _add_record(verbs: Any) -> None:  # noqa: ANN401 - argparse keeps that type to itself
-    said = "write sensor streams to a log"
-    record = verbs.add_parser("record", help=said, description=said.capitalize() + ".")
-    sources = record.add_subparsers(metavar="SOURCE", required=True)
-    simulate = sources.add_parser(
-        "simulate",
-        help="a simulated trial",
-        description="Sail a manoeuvre with a model ship and record what its sensors say.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="""manoeuvres:
-  turning-circle[-ANGLE][-port] (35 degrees)  zigzag-RUDDER-HEADING[-port]
-  pull-out[-ANGLE] (20)
-  spiral  pseudo-random  paper
-sensors, each setting in SI:
-  --sensor yaw_rate.bias=1e-4 --sensor speed.rate_hz=2 --sensor rudder.dropout=0.02
-  rate_hz, jitter_secs, delay_secs, white, uniform, uniform_relative, wave, wave_tau_secs,
-  bias, dropout, dropout_secs""",
-    )
-    simulate.add_argument("manoeuvre", metavar="MANOEUVRE", help="such as zigzag-20-20")
-    simulate.add_argument(
-        "--vessel", default="table1", help="a preset (table1, table1-rad) or a vessel.toml"
-    )
-    simulate.add_argument("--seed", type=int, default=0, help="the same seed, the same samples")
-    simulate.add_argument(
-        "--duration", type=float, default=600.0, metavar="S", help="in seconds (default: 600)"
-    )
-    simulate.add_argument(
-        "--noise", default="paper", help="of the sensors: none, white, paper (default)"
-    )
-    simulate.add_argument(
-        "--sensor", action="append", default=[], metavar="CHANNEL.SETTING=VALUE", help="see below"
-    )
-    simulate.add_argument(
-        "--gust",
-        action="append",
-        default=[],
-        metavar="DEG@START[+LENGTH]",
-        help="a yaw moment worth DEG of rudder at the approach speed (to port: --gust=-2@100)",
-    )
-    simulate.add_argument(
-        "--wave", metavar="DEG@PERIOD", help="a sinusoidal yaw moment worth DEG of rudder"
-    )
-    simulate.add_argument(
-        "--truth", metavar="FILE", help="write what really happened there, at 10 Hz"
-    )
-    simulate.add_argument("-o", "--output", required=True, metavar="FILE", help="the log")
-    simulate.set_defaults(run=_run_simulate)
-
-
-def _add_info(verbs: Any) -> None:  # noqa: ANN401
-    said = "what is in a log, without reading it all"
-    info = verbs.add_parser("info", help=said, description=f"Tell {said}.")
-    info.add_argument("log", metavar="LOG")
-    info.add_argument("--json", metavar="FILE", help="as JSON, - for stdout")
-    info.set_defaults(run=_run_info)
-
-
-def _add_replay(verbs: Any) -> None:  # noqa: ANN401
-    replay = verbs.add_parser(
-        "replay",
-        help="filter, observe, identify; a Rerun review and a summary",
-        description="Replay a log through the filter, the observer and the identifier.",
-    )
-    replay.add_argument("log", metavar="LOG")
-    replay.add_argument("--vessel", help="a preset or a vessel.toml, instead of the log's own")
-    replay.add_argument(
-        "--source",
-        action="append",
-        default=[],
-        metavar="CHANNEL=SOURCE",
-        help="which of several sources of a channel to use",
-    )
-    replay.add_argument(
-        "-o", "--output", metavar="FILE", help="the review (default: LOG's name with .rrd, here)"
-    )
-    replay.add_argument("--json", metavar="FILE", help="the summary as JSON, - for stdout")
-    replay.add_argument("--view", action="store_true", help="open the review in the Rerun viewer")
-    replay.set_defaults(run=_run_replay)
-
-
-def _add_check(verbs: Any) -> None:  # noqa: ANN401
-    check = verbs.add_parser(
-        "check",
-        help="compare replays with their references",
-        description="Replay a log, or the logs of a folder, and compare with NAME.ref.mcap; "
-        "what differs is drawn in NAME.check.rrd, here.",
-    )
-    check.add_argument("path", metavar="PATH", type=Path)
-    check.add_argument(
-        "--update", action="store_true", help="after looking: make the replays the references"
-    )
-    check.add_argument("--json", metavar="FILE", help="the comparison as JSON, - for stdout")
-    check.set_defaults(run=_run_check)
-
-
-def _add_convert(verbs: Any) -> None:  # noqa: ANN401
-    convert = verbs.add_parser(
-        "convert",
-        help="a table to a log, a log to a table",
-        description="By the endings: .mcap, .csv, .parquet are ours; other tables need a layout.",
-    )
-    convert.add_argument("source", metavar="FROM", type=Path)
-    convert.add_argument("target", metavar="TO", type=Path)
-    convert.add_argument("--layout", type=Path, help="what the table's columns mean (TOML)")
-    convert.set_defaults(run=_run_convert)
-
-
 def _run_simulate(arguments: argparse.Namespace) -> int:
     _require_ours("recorders")
     from recorders.record import record
     from recorders.sensors import suite
-    from recorders.simulate import simulate
+    from recorders.simulate import Gust, WaveMoment, simulate
 
     from .vessel import load_vessel
     from .writer import write
@@ -196,10 +73,10 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
             duration_secs=arguments.duration,
             seed=arguments.seed,
             sensors=suite(
-                arguments.noise, _settings(arguments.sensor), angle_unit=vessel.angle_unit
+                arguments.noise, settings(arguments.sensor), angle_unit=vessel.angle_unit
             ),
-            gusts=tuple(_gust(text) for text in arguments.gust),
-            wave=_wave(arguments.wave) if arguments.wave else None,
+            gusts=tuple(Gust(*gust(text)) for text in arguments.gust),
+            wave=WaveMoment(*wave(arguments.wave)) if arguments.wave else None,
             vessel_toml=text,
         )
         tell("write")
@@ -246,10 +123,10 @@ def _run_replay(arguments: argparse.Namespace) -> int:
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
     _require_distinct([output, arguments.json], [arguments.log, arguments.vessel])
-    sources = _sources(arguments.source)
+    chosen = sources(arguments.source)
     with _progress("analysis") as tell:
         tell("read")
-        log = read(arguments.log).preferring(sources)
+        log = read(arguments.log).preferring(chosen)
         _warn(log.warnings)  # now: they may explain why the replay fails
         analysis = analyse(log, vessel, on_step=tell)
         tell("review")
@@ -392,45 +269,10 @@ def _write_json(value: object, where: str) -> None:
         part.write_text(text, encoding="utf-8")
 
 
-def _settings(texts: Sequence[str]) -> dict[str, float]:
-    """`yaw_rate.bias=1e-4` as a name and a number."""
-    settings = {}
-    for text in texts:
-        name, _, value = text.partition("=")
-        try:
-            settings[name] = float(value)
-        except ValueError:
-            raise UsageError(
-                f"--sensor wants CHANNEL.SETTING=VALUE, such as yaw_rate.bias=1e-4, got {text!r}"
-            ) from None
-    return settings
-
-
-def _sources(texts: Sequence[str]) -> dict[str, str]:
-    """`speed=doppler` as a name and a source."""
-    for text in texts:
-        if not re.fullmatch(r"[^=]+=[^=]+", text):
-            raise UsageError(f"--source wants CHANNEL=SOURCE, such as speed=doppler, got {text!r}")
-    return dict(text.split("=") for text in texts)
-
-
-_NUMBER = r"([-+]?\d*\.?\d+(?:e[-+]?\d+)?)"
-
-
-def _gust(text: str) -> "Gust":
-    from recorders.simulate import Gust
-
-    match = re.fullmatch(rf"{_NUMBER}@{_NUMBER}(?:\+{_NUMBER})?", text)
-    if not match:
-        raise UsageError(f"--gust wants DEG@START[+LENGTH], such as 2@200+60, got {text!r}")
-    angle, start, length = match.groups()
-    return Gust(radians(float(angle)), float(start), *([float(length)] if length else []))
-
-
-def _wave(text: str) -> "WaveMoment":
-    from recorders.simulate import WaveMoment
-
-    match = re.fullmatch(rf"{_NUMBER}@{_NUMBER}", text)
-    if not match or float(match[2]) <= 0:
-        raise UsageError(f"--wave wants DEG@PERIOD, such as 0.5@8, got {text!r}")
-    return WaveMoment(radians(float(match[1])), float(match[2]))
+_VERBS = {
+    "simulate": _run_simulate,
+    "info": _run_info,
+    "replay": _run_replay,
+    "check": _run_check,
+    "convert": _run_convert,
+}
