@@ -11,11 +11,11 @@ from analysis.check import (
     as_json,
     compare,
     logs_in,
-    make_reference,
     reference_path,
     update,
 )
 from analysis.pipeline import Analysis, analyse
+from analysis.reference import make_reference
 from recorders.record import record
 from recorders.simulate import SimulatedTrial
 from shiplog import ShiplogError, TrialLog, Vessel, read, write
