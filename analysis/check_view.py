@@ -11,6 +11,7 @@ from shiplog.files import replacing
 from shiplog.types import FloatArray, TimeArray
 
 from .check import Comparison
+from .rerun_view import WHOLE_RUN
 
 MOST_VIEWS = 9  # the first to differ are where to look
 
@@ -50,14 +51,11 @@ def _send(
 
 
 def _blueprint(comparison: Comparison) -> rrb.Blueprint:
-    everything = rr.TimeRange(
-        start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
-    )
     views = [
         rrb.TimeSeriesView(
             name=f"{difference.topic} [{difference.unit}]",
             origin=difference.topic,
-            axis_x=rrb.TimeAxis(view_range=everything),
+            axis_x=WHOLE_RUN,
         )
         for difference in comparison.changed[:MOST_VIEWS]
     ]

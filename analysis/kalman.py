@@ -23,6 +23,7 @@ from .design import discretise, pseudo_input_matrices
 
 STATES = ("yaw_rate", "yaw_acceleration", "yaw_jerk", "speed", "surge_acceleration")
 OUTPUTS = ("yaw_rate", "speed")
+OUTPUT_STATES = (0, 3)  # where they stand among the states: C of y = C x
 PAPER_RATIO = 0.01 / 400  # Burylin's Q over his R: no default trusts the model more
 TUNING_SAMPLES = 50_000  # of a long log are enough to tell how well the model fits
 
@@ -183,7 +184,7 @@ def _filter(
         jump = rudder_effect(c, x.v, n[k]) * c.e * (delta_dot - last_rate)
         x = FilterState(x.w, x.w_dot, x.w_ddot + jump, x.v, x.v_dot)
         last_rate = delta_dot
-        for output, state in ((0, 0), (1, 3)):
+        for output, state in enumerate(OUTPUT_STATES):
             S = P[state, state] + r[output]
             innovation = measured[k, output] - x[state]
             rows[k, 10 + output], rows[k, 12 + output] = innovation, S

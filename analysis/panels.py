@@ -13,6 +13,7 @@ from shiplog.clock import longest_step_secs, usual_interval_secs
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, factor
 
+from .kalman import OUTPUT_STATES, OUTPUTS
 from .pipeline import Analysis
 from .sliding import Identification
 
@@ -91,7 +92,7 @@ def coefficient_panels(analysis: Analysis) -> list[Panel]:
 
 
 def _output(analysis: Analysis, output: int, colour: Colour) -> Panel:
-    name, state = analysis.residuals[output].name, (0, 3)[output]
+    name, state = OUTPUTS[output], OUTPUT_STATES[output]
     signals, unit = analysis.signals, CATALOGUE[name].display_unit
     scale = factor(CATALOGUE[name].unit, unit)
     measured = signals[name] * scale

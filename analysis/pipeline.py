@@ -14,7 +14,7 @@ from shiplog.vessel import FilterSettings, parse_vessel
 from .disturbance import Disturbance, observe_disturbance
 from .doubts import doubtful, possible, silent_ends
 from .first_model import fit_first_model
-from .kalman import OUTPUTS, Estimates, Noise, filter_states, noise_of
+from .kalman import OUTPUT_STATES, OUTPUTS, Estimates, Noise, filter_states, noise_of
 from .residuals import OutputResiduals, judge
 from .sliding import Identification, identify
 from .track import Track, find_track
@@ -88,7 +88,7 @@ def analyse(
     on_step("coefficients")
     yaw_rows, surge_rows = weak_form(signals, model)
     yaw, surge = identify(yaw_rows, constant=True), identify(surge_rows)
-    track = find_track(log, signals, estimates.states[:, 0], estimates.states[:, 3])
+    track = find_track(log, signals, *(estimates.states[:, i] for i in OUTPUT_STATES))
     return Analysis(
         log, vessel, origin, signals, noise, estimates, residuals, disturbance, yaw, surge, track,
         tuple(warnings),

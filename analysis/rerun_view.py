@@ -35,6 +35,11 @@ from .panels import (
 from .pipeline import Analysis
 
 VIEWER_SECS = 20.0  # within which a viewer listens, or never will
+WHOLE_RUN = rrb.TimeAxis(
+    view_range=rr.TimeRange(
+        start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
+    )
+)
 ROWS = [1.3, 0.9, 1.0, 0.9]  # heights: outputs, inputs, disturbances, residuals
 KEY = """\
 *Grey: measured, or in the model. Blue, orange: estimated, of yaw and of surge, ±2σ. \
@@ -230,13 +235,10 @@ def _blueprint(
 
 def _plot(panel: Panel) -> rrb.TimeSeriesView:
     """A view of a panel over the whole trial."""
-    everything = rr.TimeRange(
-        start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
-    )
     return rrb.TimeSeriesView(
         origin=panel.name,
         name=panel.title,
-        axis_x=rrb.TimeAxis(view_range=everything),
+        axis_x=WHOLE_RUN,
         axis_y=rrb.ScalarAxis(range=panel.limits),
         plot_legend=rrb.PlotLegend(visible=False),
     )

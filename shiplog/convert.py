@@ -8,6 +8,7 @@ import numpy as np
 from .errors import LogError, UsageError
 from .foreign import read_table
 from .layout import load_layout
+from .quality import times_in_words
 from .reader import read
 from .rudder_sign import rudder_sign_warning
 from .table import CSV_MARK, read_csv, read_parquet, write_csv, write_parquet
@@ -95,11 +96,8 @@ def sorted_by_time(log: TrialLog) -> tuple[TrialLog, list[str]]:
                 values=channel.values[order],
             )
             notes.append(
-                f"{channel.topic}: the measured times ran backwards {_times(late)}; now sorted"
+                f"{channel.topic}: the measured times ran backwards {times_in_words(late)}; "
+                "now sorted"
             )
         channels.append(channel)
     return replace(log, channels=tuple(channels)), notes
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"

@@ -51,8 +51,8 @@ def _require_usable(log: TrialLog, channel: Channel) -> None:
     if len(back):
         at, by = (times[back[0]] - times[0]) * 1e-9, (times[back[0]] - times[back[0] + 1]) * 1e-9
         raise LogError(
-            f"the measured times of {channel.topic} run backwards {_times(len(back))}, first by "
-            f"{by:.3f} s, {at:.3f} s after its start; `shiplog convert IN.mcap OUT.mcap` sorts "
+            f"the measured times of {channel.topic} run backwards "
+            f"{times_in_words(len(back))}, first by {by:.3f} s, {at:.3f} s after its start; `shiplog convert IN.mcap OUT.mcap` sorts "
             f"them: {log.name}"
         )
 
@@ -106,7 +106,7 @@ def _stuck(channel: Channel) -> Iterator[str]:
         worst = int(np.argmax(np.where(long, lasted, -1.0)))
         held = ", ".join(_shown(channel, float(value)) for value in values[starts[worst]])
         yield (
-            f"stuck {_times(int(np.count_nonzero(long)))}, longest at {held} for "
+            f"stuck {times_in_words(int(np.count_nonzero(long)))}, longest at {held} for "
             f"{lasted[worst]:.1f} s, {times[starts[worst]]:.1f} s after its start"
         )
 
@@ -174,5 +174,6 @@ def _count(number: int, thing: str) -> str:
     return f"1 {thing}" if number == 1 else f"{number} {thing}s"
 
 
-def _times(count: int) -> str:
+def times_in_words(count: int) -> str:
+    """How often, as it is said."""
     return "once" if count == 1 else f"{count} times"
