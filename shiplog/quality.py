@@ -51,9 +51,9 @@ def _require_usable(log: TrialLog, channel: Channel) -> None:
     if len(back):
         at, by = (times[back[0]] - times[0]) * 1e-9, (times[back[0]] - times[back[0] + 1]) * 1e-9
         raise LogError(
-            f"the measured times of {channel.topic} run backwards "
-            f"{times_in_words(len(back))}, first by {by:.3f} s, {at:.3f} s after its start; `shiplog convert IN.mcap OUT.mcap` sorts "
-            f"them: {log.name}"
+            f"the measured times of {channel.topic} run backwards {times_in_words(len(back))}, "
+            f"first by {by:.3f} s, {at:.3f} s after its start; "
+            f"`shiplog convert IN.mcap OUT.mcap` sorts them: {log.name}"
         )
 
 
