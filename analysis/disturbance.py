@@ -12,7 +12,13 @@ import numpy as np
 
 from shiplog.clock import usual_interval_secs
 from shiplog.compiled import compiled
-from shiplog.ship import Coefficients, rudder_effect, surge_acceleration, yaw_acceleration_rate
+from shiplog.ship import (
+    Coefficients,
+    rudder_effects,
+    surge_acceleration,
+    yaw_acceleration_rate,
+    yaw_stiffness,
+)
 from shiplog.types import FloatArray, Signals
 
 from .design import Observer, butterworth_poles, discrete_observer
@@ -49,7 +55,7 @@ def observe_disturbance(signals: Signals, model: Coefficients, noise: Noise) -> 
     """
     w, v = signals["yaw_rate"], signals["speed"]
     dt = signals.dt_secs
-    turning = _stiffness(model, float(np.sqrt(np.nanmean(w**2))))
+    turning = yaw_stiffness(model, float(np.sqrt(np.nanmean(w**2))))
     interval = usual_interval_secs(w, dt)
     yaw = _yaw_observer(model, turning, interval)
     surge = _surge_observer(model, float(np.nanmedian(v)), usual_interval_secs(v, dt))
@@ -58,7 +64,7 @@ def observe_disturbance(signals: Signals, model: Coefficients, noise: Noise) -> 
         turning, interval,
     )  # fmt: skip
     # a ship without way has a rudder that does nothing: the equivalent is then not a number
-    steering = model.d * _rudder_effects(model, rows[:, 2], signals["rpm"])
+    steering = model.d * rudder_effects(model, rows[:, 2], signals["rpm"])
     with np.errstate(divide="ignore", invalid="ignore"):
         works = np.abs(steering) > 1e-3 * np.max(np.abs(steering))
         rudder = np.where(works, rows[:, 1] / steering, np.nan)
@@ -73,12 +79,6 @@ def observe_disturbance(signals: Signals, model: Coefficients, noise: Noise) -> 
         rudder=rudder,
         rudder_std=yaw_std / usual if usual > 0 else np.nan,
     )
-
-
-@compiled
-def _stiffness(c: Coefficients, w: float) -> float:
-    """d w'' / dw at a yaw rate: b1 and what the nonlinear terms add to it, 1/s^2."""
-    return c.b1 + 2 * c.b2 * abs(w) + 3 * c.b3 * w * w
 
 
 def _yaw_observer(c: Coefficients, stiffness: float, interval: float) -> Observer:
@@ -120,7 +120,7 @@ def _observe(
     for k in range(count):
         if np.isfinite(w_measured[k]):
             error = w_measured[k] - w
-            stiffer = (_stiffness(c, w) - turning) * interval
+            stiffer = (yaw_stiffness(c, w) - turning) * interval
             w_dot = w_dot + (yaw[1] + stiffer) * error
             w, moment = w + yaw[0] * error, moment + yaw[2] * error
         if np.isfinite(v_measured[k]):
@@ -139,11 +139,3 @@ def _observe(
         w_dot = w_dot + dt * (w1 + w2 + moment) / 2
         v = v + dt * (v1 + v2 + force) / 2
     return rows
-
-
-@compiled
-def _rudder_effects(c: Coefficients, v: FloatArray, n: FloatArray) -> FloatArray:
-    effects = np.empty(len(v))
-    for k in range(len(v)):
-        effects[k] = rudder_effect(c, v[k], n[k])
-    return effects

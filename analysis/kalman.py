@@ -15,6 +15,7 @@ from shiplog.ship import (
     rudder_effect_rate,
     surge_acceleration,
     yaw_acceleration_rate,
+    yaw_stiffness,
 )
 from shiplog.types import FloatArray, Signals
 from shiplog.vessel import FilterSettings
@@ -260,12 +261,11 @@ def _motion(
     """A x + B u, row by row, with the pseudo-inputs written out."""
     ks = rudder_effect(c, x.v, n)
     ks_dot = rudder_effect_rate(c, x.v, x.v_dot, n, n_dot)
-    damping = c.b1 + 2 * c.b2 * abs(x.w) + 3 * c.b3 * x.w * x.w
     steering = c.d * delta + c.e * delta_dot
     return FilterState(
         x.w_dot,
         yaw_acceleration_rate(c, x.w, x.w_dot, x.v, n, delta, delta_dot),
-        c.a * x.w_ddot + damping * x.w_dot + ks_dot * steering + ks * c.d * delta_dot,
+        c.a * x.w_ddot + yaw_stiffness(c, x.w) * x.w_dot + ks_dot * steering + ks * c.d * delta_dot,
         surge_acceleration(c, x.w, x.v, n),
         2 * c.f * x.w * x.w_dot + 2 * c.g * x.v * x.v_dot + c.h * n_dot,
     )

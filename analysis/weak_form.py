@@ -18,7 +18,7 @@ import numpy as np
 from scipy.signal import upfirdn
 
 from shiplog.clock import longest_step_secs, usual_interval_secs
-from shiplog.ship import Coefficients
+from shiplog.ship import Coefficients, rudder_effects
 from shiplog.types import FloatArray, Signals
 
 BUMP_SECS = 60.0  # long against the noise, short against the ship's turning
@@ -56,7 +56,7 @@ def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
     w, v, delta, n = (
         _bridged(signals[name], dt) for name in ("yaw_rate", "speed", "rudder", "rpm")
     )
-    ks = model.alpha1 * v + model.alpha2 * n * np.exp(-model.alpha3 * v)
+    ks = rudder_effects(model, v, n)
     delta_dot = np.gradient(delta, dt)
     half = max(2, round(min(BUMP_SECS, len(signals) * dt / 5) / dt / 2))
     stride = max(1, round(STRIDE_SECS / dt))

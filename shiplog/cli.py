@@ -75,7 +75,7 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
             sensors=suite(
                 arguments.noise, settings(arguments.sensor), angle_unit=vessel.angle_unit
             ),
-            gusts=tuple(Gust(*gust(text)) for text in arguments.gust),
+            gusts=tuple(Gust(*gust(said)) for said in arguments.gust),
             wave=WaveMoment(*wave(arguments.wave)) if arguments.wave else None,
             vessel_toml=text,
         )
@@ -132,14 +132,15 @@ def _run_replay(arguments: argparse.Namespace) -> int:
         tell("review")
         from analysis.rerun_view import view_review, write_review
 
-        write_review(analysis, output, text=markdown(analysis))
+        page = markdown(analysis)
+        write_review(analysis, output, text=page)
     if arguments.json:
         _write_json(summarise(analysis), arguments.json)
     _print_tables(analysis, to_stderr=arguments.json == "-")
     _warn(analysis.warnings[len(log.warnings) :])
     print(f"review: {output} (open it with: rerun {output})", file=sys.stderr)
     if arguments.view:
-        view_review(analysis, text=markdown(analysis))
+        view_review(analysis, text=page)
     return DATA_LOST if log.data_lost else FINE
 
 
@@ -151,11 +152,11 @@ def _run_check(arguments: argparse.Namespace) -> int:
         raise UsageError("references are not updated in CI; run it where somebody looks")
     comparisons = []
     logs = logs_in(arguments.path)
+    _require_distinct([arguments.json], [*logs, *map(reference_path, logs)])
     with _progress("analysis") as tell:
         for log in logs:
             tell(log.name)
             comparisons.append(compare(log))
-    _require_distinct([arguments.json], [*logs, *map(reference_path, logs)])
     for comparison in comparisons:
         print(comparison, file=sys.stderr if arguments.json == "-" else sys.stdout)
     if arguments.json:

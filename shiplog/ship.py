@@ -16,7 +16,10 @@ g v^2 has no sign, so that astern it drives her on.
 from math import cos, exp, sin, sqrt
 from typing import NamedTuple
 
+import numpy as np
+
 from .compiled import compiled
+from .types import FloatArray
 
 
 class Coefficients(NamedTuple):
@@ -61,6 +64,15 @@ def rudder_effect(c: Coefficients, v: float, n: float) -> float:
 
 
 @compiled
+def rudder_effects(c: Coefficients, v: FloatArray, n: FloatArray) -> FloatArray:
+    """ks over a run, (n,); NaN where speed or revolutions are."""
+    effects = np.empty(len(v))
+    for k in range(len(v)):
+        effects[k] = rudder_effect(c, v[k], n[k])
+    return effects
+
+
+@compiled
 def rudder_effect_rate(c: Coefficients, v: float, v_dot: float, n: float, n_dot: float) -> float:
     """d ks / dt."""
     slipstream = c.alpha2 * exp(-c.alpha3 * v)
@@ -74,6 +86,12 @@ def yaw_acceleration_rate(
     """w'' of eq. (4), rad/s^3."""
     hull = c.a * w_dot + c.b1 * w + c.b2 * w * abs(w) + c.b3 * w * w * w
     return hull + rudder_effect(c, v, n) * (c.d * delta + c.e * delta_dot)
+
+
+@compiled
+def yaw_stiffness(c: Coefficients, w: float) -> float:
+    """d w'' / dw at a yaw rate: b1 and what the nonlinear terms add to it, 1/s^2."""
+    return c.b1 + 2 * c.b2 * abs(w) + 3 * c.b3 * w * w
 
 
 @compiled
