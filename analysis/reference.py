@@ -82,8 +82,8 @@ def _assumed(analysis: Analysis) -> Iterator[Channel]:
         yield _single(analysis, name, "model", value)
     noise = analysis.noise
     for i, name in enumerate(OUTPUTS):
-        assumed = np.array([noise.measurement_std[i], noise.process_ratio[i]])
-        yield _row(analysis, f"{name}_noise", "assumed", assumed)
+        yield _single(analysis, f"{name}_noise", "assumed", float(noise.measurement_std[i]))
+        yield _single(analysis, f"{name}_ratio", "assumed", float(noise.process_ratio[i]))
 
 
 def _estimated(analysis: Analysis) -> Iterator[Channel]:
@@ -94,8 +94,10 @@ def _estimated(analysis: Analysis) -> Iterator[Channel]:
     for i, name in enumerate(OUTPUTS):
         yield _blocks(analysis, name, "innovation", estimates.innovations[:, i])
         judged = analysis.residuals[i]
-        verdict = [judged.rms, judged.normalised_squared, *judged.expected, judged.whiteness_p]
-        yield _row(analysis, f"{name}_residuals", "verdict", np.array(verdict))
+        yield _single(analysis, f"{name}_rms", "verdict", judged.rms)
+        yield _single(analysis, f"{name}_squared", "verdict", judged.normalised_squared)
+        yield _single(analysis, f"{name}_expected", "verdict", judged.expected[1])
+        yield _single(analysis, f"{name}_whiteness", "verdict", judged.whiteness_p)
     for name, values, std in (
         ("yaw_disturbance", found.yaw, found.yaw_std),
         ("rudder_disturbance", found.rudder, found.rudder_std),
@@ -138,12 +140,8 @@ def _blocks(
 
 
 def _single(analysis: Analysis, name: str, kind: str, value: float) -> Channel:
-    return _row(analysis, name, kind, np.array([value]))
-
-
-def _row(analysis: Analysis, name: str, kind: str, values: FloatArray) -> Channel:
-    """Values that are of the whole trial, one after the other."""
-    return _channel(name, kind, np.full(len(values), analysis.signals.start_ns), values)
+    """A number that is of the whole trial."""
+    return _channel(name, kind, np.array([analysis.signals.start_ns]), np.array([value]))
 
 
 def _channel(name: str, kind: str, stamps: TimeArray, values: FloatArray) -> Channel:

@@ -120,7 +120,10 @@ def test_every_number_of_the_summary_is_watched(
         "/yaw_rate_noise/assumed": replace(
             a, noise=replace(a.noise, measurement_std=a.noise.measurement_std * [1.01, 1])
         ),
-        "/speed_residuals/verdict": replace(
+        "/speed_rms/verdict": replace(
+            a, residuals=(a.residuals[0], replace(judged, rms=judged.rms * 1.0001))
+        ),
+        "/speed_whiteness/verdict": replace(
             a, residuals=(a.residuals[0], replace(judged, whiteness_p=0.5))
         ),
         "/rudder_disturbance/estimate": replace(
