@@ -6,11 +6,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from mcap.exceptions import McapError
-from mcap.reader import SeekingReader
-
+from .mcap_summary import read_summary
 from .reader import open_mcap, read
-from .schema import METADATA_NAME, VESSEL_ATTACHMENT
 from .units import CATALOGUE
 
 
@@ -44,24 +41,14 @@ class LogInfo:
 
 
 def info(path: str | os.PathLike[str]) -> LogInfo:
-    """What is in a log; only its summary is read, if it has one.
+    """What is in a log; only its summary is read, if it has one that its checksum vouches for.
 
     Raises `LogError` where the file is missing or is not MCAP.
     """
     path = Path(path)
     with open_mcap(path) as stream:
-        try:
-            reader = SeekingReader(stream)
-            summary = reader.get_summary()
-            metadata = {
-                key: value
-                for record in reader.iter_metadata()
-                if record.name == METADATA_NAME
-                for key, value in record.metadata.items()
-            }
-        except (McapError, ValueError, KeyError, OSError, AssertionError):
-            summary = None
-    if summary is None or summary.statistics is None:
+        summary = read_summary(stream)
+    if summary is None:
         return _by_reading(path)
     counts = summary.statistics.channel_message_counts
     channels = []
@@ -82,8 +69,8 @@ def info(path: str | os.PathLike[str]) -> LogInfo:
         summary.statistics.message_start_time,
         summary.statistics.message_end_time,
         tuple(channels),
-        metadata,
-        any(index.name == VESSEL_ATTACHMENT for index in summary.attachment_indexes),
+        summary.metadata,
+        summary.vessel_toml is not None,
     )
 
 

@@ -1,8 +1,9 @@
 """MCAP to `TrialLog`, by columns."""
 
-import mmap
 import os
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -12,45 +13,89 @@ from mcap import records
 
 from .errors import LogError, UsageError
 from .mcap_layout import MAGIC
-from .scan import Bytes, Contents, scan, schema_of
+from .mcap_summary import Summary, read_summary
+from .messages import Contents, Piece, schema_of
+from .scan import scan
 from .schema import FORMAT_VERSION, Schema, decode
-from .types import Channel, TrialLog
+from .types import Channel, TimeArray, TrialLog
 from .units import CATALOGUE, factor
 
 
-def read(path: str | os.PathLike[str]) -> TrialLog:
-    """Read a recorded trial.
+@dataclass(frozen=True)
+class Span:
+    """Times of reception: from `start_ns` on, before `end_ns`; None is no bound."""
+
+    start_ns: int | None = None
+    end_ns: int | None = None
+
+    def within(self, received_ns: TimeArray) -> tuple[int, int]:
+        """Where the samples start and end that were received within it; (n,) ascending."""
+        start = 0 if self.start_ns is None else np.searchsorted(received_ns, self.start_ns)
+        end = len(received_ns) if self.end_ns is None else np.searchsorted(received_ns, self.end_ns)
+        return int(start), max(int(start), int(end))
+
+    def is_beside(self, first_ns: int, last_ns: int) -> bool:
+        """Whether nothing of what lasts from the one to the other is within it."""
+        return first_ns <= last_ns and (
+            (self.start_ns is not None and last_ns < self.start_ns)
+            or (self.end_ns is not None and first_ns >= self.end_ns)
+        )
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    channels: Iterable[str] | None = None,
+    start_ns: int | None = None,
+    end_ns: int | None = None,
+) -> TrialLog:
+    """Read a recorded trial, or a part of it.
+
+    `channels` are named as in `log[...]`; the log keeps them in the order of the file. Samples
+    are kept that were received from `start_ns` on and before `end_ns`. Chunks that by the file's
+    summary hold none of that are not read: damage in them is not noticed, and the checksum of
+    the data as a whole is not verified. A file without a summary is read whole, then cut.
 
     A file that was not finished is read as far as it goes; a damaged chunk is left out; foreign
     topics are passed over. The log's `warnings` say so.
 
-    Raises `LogError` where the file is missing, is not MCAP, or holds a unit nobody knows.
+    Raises `LogError` where the file is missing, is not MCAP, holds a unit nobody knows, or has
+    no such channel.
     """
     path = Path(path)
+    contents, skip = Contents(), frozenset[int]()
+    keys = None if channels is None else tuple(channels)
+    span = Span(start_ns, end_ns)
+    part = keys is not None or span != Span()
     with open_mcap(path) as stream:
-        # unmapped by its last reader: closing it would fail while an exception holds a slice
-        contents = scan(Bytes(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)))
-    return _trial_log(path, contents)
+        summary = read_summary(stream) if part else None
+        if summary is not None:
+            contents = described(summary)
+            contents.wanted = _ids(path, contents, keys)
+            skip = _not_wanted(summary, contents.wanted, span)
+        for _ in scan(stream, contents, skip):
+            pass
+    log = trial_log(path, contents)
+    return _part(log, keys, span) if part else log
 
 
-def open_mcap(path: Path) -> IO[bytes]:
-    """The file, opened, if it exists and begins as an MCAP file does; else `LogError`."""
+@contextmanager
+def open_mcap(path: Path) -> Iterator[IO[bytes]]:
+    """The file, opened, if it begins as an MCAP file does.
+
+    Raises `LogError` where it does not, or cannot be read, then or later.
+    """
     try:
-        stream = path.open("rb")
+        with path.open("rb") as stream:
+            magic = stream.read(len(MAGIC))
+            if not magic:
+                raise LogError(f"the file is empty: record or convert it again: {path}")
+            if magic != MAGIC:
+                raise LogError(f"not an MCAP file; tables are read by `shiplog convert`: {path}")
+            stream.seek(0)
+            yield stream
     except OSError as error:
         raise LogError(_cannot_read(path, error)) from error
-    try:
-        magic = stream.read(len(MAGIC))
-        stream.seek(0)
-    except OSError as error:
-        stream.close()
-        raise LogError(_cannot_read(path, error)) from error
-    if magic != MAGIC:
-        stream.close()
-        if not magic:
-            raise LogError(f"the file is empty: record or convert it again: {path}")
-        raise LogError(f"not an MCAP file; tables are read by `shiplog convert`: {path}")
-    return stream
 
 
 def _cannot_read(path: Path, error: OSError) -> str:
@@ -61,32 +106,39 @@ def _cannot_read(path: Path, error: OSError) -> str:
     return f"cannot read: {(error.strerror or str(error)).lower()}: {path}"
 
 
-def _trial_log(path: Path, contents: Contents) -> TrialLog:
+def described(summary: Summary) -> Contents:
+    """Contents that know from the start what every message of the file is."""
+    return Contents(dict(summary.schemas), dict(summary.channels), keeps_orphans=False)
+
+
+def trial_log(path: Path, contents: Contents) -> TrialLog:
+    """All that the contents hold and say; they are drained.
+
+    Raises `LogError` as `read` does.
+    """
     version = contents.metadata.get("format_version", FORMAT_VERSION)
     if version != FORMAT_VERSION:
         raise LogError(
             f"written in format {version}, this shiplog reads format {FORMAT_VERSION}; "
             f"install a newer shiplog: {path}"
         )
-    channels, foreign = [], []
-    for channel_id, record in sorted(contents.channels.items()):
-        schema = schema_of(record, contents)
-        if schema is None:
-            foreign.append(record.topic)
-        else:
-            channels.append(_channel(path, record, schema, contents, channel_id))
-    channels = _merged(channels)
+    channels = merged(_channels(path, contents).values())
     warnings = list(contents.damage)
     if not contents.finished:
         warnings.append(
             "the file was not finished (the recorder was stopped or killed); "
-            f"its {sum(map(len, channels))} whole samples were read"
+            f"its {contents.taken} whole samples were read"
         )
+    foreign = [
+        channel.topic
+        for _, channel in sorted(contents.channels.items())
+        if schema_of(channel, contents.schemas) is None
+    ]
     if foreign:
         warnings.append(f"passed over {len(foreign)} topics not ours: {', '.join(foreign)}")
     return TrialLog(
         path.name,
-        tuple(channels),
+        channels,
         contents.metadata,
         contents.vessel_toml,
         tuple(warnings),
@@ -94,13 +146,13 @@ def _trial_log(path: Path, contents: Contents) -> TrialLog:
     )
 
 
-def _merged(channels: list[Channel]) -> list[Channel]:
+def merged(channels: Iterable[Channel]) -> tuple[Channel, ...]:
     """One channel a topic: a recorder that was started again describes its topics once more."""
-    merged: dict[tuple[str, tuple[str, ...]], Channel] = {}
+    by_topic: dict[tuple[str, tuple[str, ...]], Channel] = {}
     for channel in channels:
         key = (channel.topic, channel.fields)
-        if key in merged:
-            first = merged[key]
+        if key in by_topic:
+            first = by_topic[key]
             received = np.concatenate((first.received_ns, channel.received_ns))
             order = np.argsort(received, kind="stable")
             channel = replace(  # noqa: PLW2901 - the same channel, whole
@@ -109,21 +161,26 @@ def _merged(channels: list[Channel]) -> list[Channel]:
                 measured_ns=np.concatenate((first.measured_ns, channel.measured_ns))[order],
                 values=np.concatenate((first.values, channel.values))[order],
             )
-        merged[key] = channel
-    return list(merged.values())
+        by_topic[key] = channel
+    return tuple(by_topic.values())
 
 
-def _channel(
-    path: Path,
-    record: records.Channel,
-    schema: Schema,
-    contents: Contents,
-    channel_id: int,
-) -> Channel:
+def _channels(path: Path, contents: Contents) -> dict[int, Channel]:
+    """The samples that the contents hold, by channel id; the contents are drained."""
+    pieces = contents.drain()
+    found = {}
+    for channel_id, record in sorted(contents.channels.items()):
+        schema = schema_of(record, contents.schemas)
+        if schema is not None:
+            found[channel_id] = _channel(path, record, schema, pieces.pop(channel_id, []))
+    return found
+
+
+def _channel(path: Path, record: records.Channel, schema: Schema, pieces: list[Piece]) -> Channel:
     topic_name, _, topic_source = record.topic.strip("/").partition("/")
     name = record.metadata.get("channel", topic_name)
     try:
-        received, measured, values = _columns(schema, contents, channel_id)
+        received, measured, values = _columns(schema, pieces)
     except DecodeError as error:
         raise LogError(
             f"channel {name!r} holds messages that are no {schema.name}: {path}"
@@ -150,28 +207,18 @@ def _channel(
 
 
 def _columns(
-    schema: Schema, contents: Contents, channel_id: int
+    schema: Schema, pieces: list[Piece]
 ) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any], np.ndarray[Any, Any]]:
     """A channel's received times, measured times and values (n, k), in the order of the file."""
-    slabs = [
-        (
-            slab["received"].astype(np.int64),
-            slab["measured"].astype(np.int64),
-            np.stack([slab[name] for name in schema.fields], axis=1),
-        )
-        for slab in contents.columns.get(channel_id, [])
-    ]
-    ragged = contents.ragged.get(channel_id, [])
-    if ragged or not slabs:
-        received, measured, data = zip(*ragged, strict=True) if ragged else ((), (), ())
-        slabs.append(
-            (
-                np.array(received, np.uint64).astype(np.int64),
-                np.array(measured, np.uint64).astype(np.int64),
-                decode(schema, list(data)),
-            )
-        )
-    return tuple(np.concatenate(column) for column in zip(*slabs, strict=True))  # type: ignore[return-value]
+    if not pieces:
+        return np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, len(schema.fields)))
+    values = [p.values if isinstance(p.values, np.ndarray) else decode(schema, p.values)
+              for p in pieces]  # fmt: skip
+    return (
+        np.concatenate([piece.received for piece in pieces]),
+        np.concatenate([piece.measured for piece in pieces]),
+        np.concatenate(values),
+    )
 
 
 def _to_si(path: Path, name: str, unit: str) -> tuple[float, str]:
@@ -182,3 +229,33 @@ def _to_si(path: Path, name: str, unit: str) -> tuple[float, str]:
         return factor(unit, kind.unit), kind.unit
     except UsageError as error:
         raise LogError(f"channel {name!r} should be in {kind.unit}: {error}: {path}") from error
+
+
+def _ids(path: Path, contents: Contents, keys: Collection[str] | None) -> frozenset[int]:
+    """Those of the described channels that are asked for."""
+    by_id = _channels(path, contents)
+    if keys is None:
+        return frozenset(by_id)
+    log = TrialLog(path.name, merged(by_id.values()))
+    asked = {(log[key].topic, log[key].fields) for key in keys}
+    return frozenset(id_ for id_, c in by_id.items() if (c.topic, c.fields) in asked)
+
+
+def _not_wanted(summary: Summary, ids: frozenset[int], span: Span) -> frozenset[int]:
+    """Where the chunks stand that hold nothing of these channels and this span."""
+    return frozenset(
+        chunk.offset
+        for chunk in summary.chunks() or ()
+        if ids.isdisjoint(chunk.channel_ids) or span.is_beside(chunk.first_ns, chunk.last_ns)
+    )
+
+
+def _part(log: TrialLog, keys: Collection[str] | None, span: Span) -> TrialLog:
+    """The channels asked for, of the span asked for."""
+    kept = log.channels if keys is None else [log[key] for key in keys]
+    parts = [
+        channel.part(*span.within(channel.received_ns))
+        for channel in log
+        if any(channel is one for one in kept)
+    ]
+    return replace(log, channels=tuple(parts))

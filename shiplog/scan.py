@@ -1,153 +1,172 @@
-"""The bytes of an MCAP file to columns of messages.
+"""The bytes of an MCAP file, front to back, to columns of messages.
 
-A chunk of fixed-size messages needs no loop: the message index says where each message stands,
-and one gather in numpy takes them all. Chunks without an index, or with one that does not account
-for every byte, are walked; messages of uneven length are kept one by one. Every checksum is
-verified, and what is damaged is left out and said.
+The file is read record by record, so that no more of it is held than was asked for. Every
+checksum is verified, and what is damaged is left out and said.
 """
 
+import os
 import struct
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from io import BytesIO
-from typing import Any
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import IO
 
 import numpy as np
 import zstandard
-from mcap import records
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
-from .mcap_layout import CHUNK_HEAD, INDEX_ENTRY, MAGIC, MESSAGE_HEAD, RECORD_HEAD
-from .schema import METADATA_NAME, VESSEL_ATTACHMENT, Schema, schema_named
+from .mcap_layout import CHUNK_HEAD, MAGIC, RECORD_HEAD, crc_of
+from .messages import MALFORMED, Contents, keep_record, take, take_orphans
 
-_SHORTEST_MESSAGE = MESSAGE_HEAD.itemsize
-_MALFORMED = (  # what decoders raise on damaged bytes: no one family
-    McapError, zstandard.ZstdError, struct.error,
-    ValueError, OverflowError, RuntimeError, MemoryError,
-)  # fmt: skip
+_BLOCK = 1 << 20  # bytes that are read, and messages outside chunks that are taken, at a time
+_LONGEST = 1 << 28  # bytes: no attachment of ours is longer, and no chunk that a crash cut
 
-Bytes = memoryview
-_Located = tuple[np.ndarray[Any, Any], int, np.ndarray[Any, Any]]  # bytes, channel, offsets in them
+
+def scan(stream: IO[bytes], contents: Contents, skip: Collection[int] = ()) -> Iterator[None]:
+    """Go through a file once; control comes back after each chunk, taken into `contents`.
+
+    Chunks that start at an offset in `skip` are passed over unread; the checksum of the data as
+    a whole is then not verified.
+    """
+    tape = _Tape(stream, stream.seek(0, os.SEEK_END), skip)
+    for opcode, content, index in _gathered(tape):
+        if opcode == Opcode.CHUNK:
+            _read_chunk(content, index, contents)
+            yield
+        elif opcode == Opcode.MESSAGE:
+            contents.in_order &= not take(content, [], contents)
+            yield
+        elif opcode == Opcode.DATA_END:
+            if not skip:
+                _check(tape.crc_before, content, "data", contents)
+        elif opcode == Opcode.FOOTER and _ends_here(tape):
+            crc = _summary_crc(stream, tape.end, content)
+            _check(crc, content[-4:], "summary", contents)
+            contents.finished = True
+            break
+        else:
+            keep_record(opcode, content, contents)
+    if not contents.finished:
+        _read_tail(tape, contents)
+    take_orphans(contents)
+    yield
 
 
 @dataclass
-class Contents:
-    """What the scan of a file gathers."""
+class _Tape:
+    """A file's records, one after the other."""
 
-    schemas: dict[int, records.Schema] = field(default_factory=dict)
-    channels: dict[int, records.Channel] = field(default_factory=dict)
-    columns: dict[int, list[np.ndarray[Any, Any]]] = field(default_factory=dict)
-    ragged: dict[int, list[tuple[int, int, bytes]]] = field(default_factory=dict)
-    orphans: list[_Located] = field(default_factory=list)  # their channel is not yet described
-    metadata: dict[str, str] = field(default_factory=dict)
-    vessel_toml: str | None = None
-    finished: bool = False
-    cut: bool = False  # unfinished, and what it ends with is no whole record
-    damage: list[str] = field(default_factory=list)
+    stream: IO[bytes]
+    size: int
+    skip: Collection[int]
+    end: int = len(MAGIC)  # of the last record that was whole
+    crc: int = zlib.crc32(MAGIC)  # of all up to there
+    crc_before: int = 0  # of all before that record
 
-
-def scan(data: Bytes) -> Contents:
-    """Go through the file's top-level records once, chunk by chunk."""
-    contents = Contents()
-    loose: dict[int, list[int]] = {}  # messages outside any chunk
-    end = len(MAGIC)
-    for opcode, start, end in _records(data, len(MAGIC)):
-        if opcode == Opcode.CHUNK:
-            _read_chunk(data[start:end], _index_after(data, end), contents)
-        elif opcode == Opcode.MESSAGE:
-            _locate(data, start, end, loose)
-        elif opcode == Opcode.DATA_END:
-            _check(data[: start - RECORD_HEAD.size], data[start:end], "data", contents)
-        elif opcode == Opcode.FOOTER and data[end : end + len(MAGIC)] == MAGIC:
-            summary_start = int.from_bytes(data[start : start + 8], "little")
-            summary_start = summary_start or start - RECORD_HEAD.size
-            _check(data[summary_start : end - 4], data[end - 4 : end], "summary", contents)
-            contents.finished = True
-            break
-        elif opcode != Opcode.MESSAGE_INDEX:
-            _read_record(opcode, data[start:end], contents)
-    if not contents.finished:
-        contents.cut = end < len(data)
-        _read_cut_chunk(data[end:], contents)
-        if data[end:][-len(MAGIC) :] == MAGIC:
-            contents.damage.append(f"damaged at byte {end}: what follows was not read")
-    for channel_id, offsets in loose.items():
-        _take_channel(np.frombuffer(data, np.uint8), channel_id, np.array(offsets), contents)
-    _take_orphans(contents)
-    return contents
+    def __iter__(self) -> Iterator[tuple[int, bytes, bytes]]:
+        """The records that are whole: opcode, head, content."""
+        self.stream.seek(self.end)
+        skipping = False
+        while len(head := self.stream.read(RECORD_HEAD.size)) == RECORD_HEAD.size:
+            opcode, length = RECORD_HEAD.unpack(head)
+            end = self.end + RECORD_HEAD.size + length
+            if opcode == 0 or end > self.size:
+                return
+            # a chunk's indexes go with it
+            skipping = self.end in self.skip or (skipping and opcode == Opcode.MESSAGE_INDEX)
+            if skipping:
+                self.end = self.stream.seek(end)
+                continue
+            if opcode != Opcode.CHUNK and length > _LONGEST:
+                self.crc = crc_of(self.stream, self.end, end, self.crc)
+                self.end = end
+                continue
+            content = self.stream.read(length)
+            if len(content) < length:
+                return
+            self.end, self.crc_before = end, self.crc
+            if not self.skip:
+                self.crc = zlib.crc32(content, zlib.crc32(head, self.crc))
+            yield opcode, head, content
 
 
-def _records(data: Bytes, at: int) -> Iterator[tuple[int, int, int]]:
-    """The records from `at` on that are whole: opcode, where the content starts, where it ends."""
-    while at + RECORD_HEAD.size <= len(data):
-        opcode, length = RECORD_HEAD.unpack_from(data, at)
-        start = at + RECORD_HEAD.size
-        if opcode == 0 or start + length > len(data):
-            return
-        yield opcode, start, start + length
-        at = start + length
+def _gathered(tape: _Tape) -> Iterator[tuple[int, bytes, list[bytes]]]:
+    """Chunks with the message indexes that follow them, messages outside chunks in runs, others."""
+    chunk: bytes | None = None
+    index: list[bytes] = []
+    loose = bytearray()
+    for opcode, head, content in tape:
+        if opcode == Opcode.MESSAGE_INDEX:
+            index.append(content)
+            continue
+        if chunk is not None:
+            yield Opcode.CHUNK, chunk, index
+        chunk, index = (content if opcode == Opcode.CHUNK else None), []
+        if loose and (opcode != Opcode.MESSAGE or len(loose) >= _BLOCK):
+            yield Opcode.MESSAGE, bytes(loose), []
+            loose.clear()
+        if opcode == Opcode.MESSAGE:
+            loose += head + content
+        elif chunk is None:
+            yield opcode, content, []
+    if chunk is not None:
+        yield Opcode.CHUNK, chunk, index
+    if loose:
+        yield Opcode.MESSAGE, bytes(loose), []
 
 
-def _index_after(data: Bytes, at: int) -> list[Bytes]:
-    """The message indexes that follow a chunk."""
-    index = []
-    for opcode, start, end in _records(data, at):
-        if opcode != Opcode.MESSAGE_INDEX:
-            break
-        index.append(data[start:end])
-    return index
+def _summary_crc(stream: IO[bytes], end: int, footer: bytes) -> int:
+    """The checksum of the summary that a footer, which ends at `end`, speaks of."""
+    start = int.from_bytes(footer[:8], "little")
+    return crc_of(stream, start or end - len(footer) - RECORD_HEAD.size, end - 4)
 
 
-def _check(section: Bytes, checksum: Bytes, name: str, contents: Contents) -> None:
+def _ends_here(tape: _Tape) -> bool:
+    ends = tape.stream.read(len(MAGIC)) == MAGIC
+    tape.stream.seek(tape.end)
+    return ends
+
+
+def _check(crc: int, checksum: bytes, name: str, contents: Contents) -> None:
     """Whether a section of the file holds the bytes once written, where nothing yet says no."""
-    crc = int.from_bytes(checksum, "little")
-    if crc and not contents.damage and zlib.crc32(section) != crc:
+    said = int.from_bytes(checksum, "little")
+    if said and not contents.damage and said != crc:
         contents.damage.append(f"damaged: the checksum of its {name} is wrong, some may be missing")
 
 
-def _read_record(opcode: int, content: Bytes, contents: Contents) -> None:
-    try:
-        _keep_record(opcode, ReadDataStream(BytesIO(content)), contents)
-    except _MALFORMED as error:
-        contents.damage.append(f"left out a damaged record: {error}")
-
-
-def _keep_record(opcode: int, stream: ReadDataStream, contents: Contents) -> None:
-    if opcode == Opcode.SCHEMA:
-        schema = records.Schema.read(stream)
-        contents.schemas.setdefault(schema.id, schema)
-    elif opcode == Opcode.CHANNEL:
-        channel = records.Channel.read(stream)
-        contents.channels.setdefault(channel.id, channel)
-    elif opcode == Opcode.METADATA:
-        metadata = records.Metadata.read(stream)
-        if metadata.name == METADATA_NAME:
-            contents.metadata.update(metadata.metadata)
-    elif opcode == Opcode.ATTACHMENT:
-        attachment = records.Attachment.read(stream)
-        if attachment.name == VESSEL_ATTACHMENT:
-            contents.vessel_toml = attachment.data.decode()
-
-
-def _read_chunk(content: Bytes, index: list[Bytes], contents: Contents) -> None:
+def _read_chunk(content: bytes, index: list[bytes], contents: Contents) -> None:
     try:
         *_, size, crc, name_length = CHUNK_HEAD.unpack_from(content, 0)
         raw = _inflate(*_compression_and_body(content, name_length), size)
         if len(raw) != size or (crc and zlib.crc32(raw) != crc):
             raise ValueError("its checksum is wrong")
-    except _MALFORMED as error:
-        span = np.frombuffer(bytes(content[:16]).ljust(16, b"\0"), "<M8[ns]").astype("M8[ms]")
+    except MALFORMED as error:
+        span = np.frombuffer(content[:16].ljust(16, b"\0"), "<M8[ns]").astype("M8[ms]")
         contents.damage.append(
             f"lost what was received {span[0]} to {span[1]}: damaged chunk, {error}"
         )
     else:
-        _take(np.frombuffer(raw, np.uint8), index, contents)
+        _take_chunk(raw, content, index, contents)
 
 
-def _read_cut_chunk(content: Bytes, contents: Contents) -> None:
+def _take_chunk(raw: bytes, head: bytes, index: list[bytes], contents: Contents) -> None:
+    if take(raw, index, contents):
+        first, last = struct.unpack_from("<qq", head)  # signed, as we read all times
+        contents.in_order &= contents.latest_ns <= first <= last
+        contents.latest_ns = last
+
+
+def _read_tail(tape: _Tape, contents: Contents) -> None:
+    """What an unfinished file ends with after its last whole record."""
+    contents.cut = tape.end < tape.size
+    tape.stream.seek(tape.end)
+    _read_cut_chunk(tape.stream.read(_LONGEST), contents)
+    tape.stream.seek(max(tape.end, tape.size - len(MAGIC)))
+    if tape.stream.read(len(MAGIC)) == MAGIC:
+        contents.damage.append(f"damaged at byte {tape.end}: what follows was not read")
+
+
+def _read_cut_chunk(content: bytes, contents: Contents) -> None:
     """The whole messages of a chunk that the file ends in the middle of, if it does."""
     head = RECORD_HEAD.size + CHUNK_HEAD.size
     if len(content) <= head or content[0] != Opcode.CHUNK:
@@ -155,16 +174,16 @@ def _read_cut_chunk(content: Bytes, contents: Contents) -> None:
     content = content[RECORD_HEAD.size :]
     *_, name_length = CHUNK_HEAD.unpack_from(content, 0)
     raw = _inflate_cut(*_compression_and_body(content, name_length))
-    _take(np.frombuffer(raw, np.uint8), [], contents)
+    _take_chunk(raw, content, [], contents)
 
 
-def _compression_and_body(content: Bytes, name_length: int) -> tuple[str, Bytes]:
+def _compression_and_body(content: bytes, name_length: int) -> tuple[str, memoryview]:
     at = CHUNK_HEAD.size
-    compression = bytes(content[at : at + name_length]).decode(errors="replace")
-    return compression, content[at + name_length + 8 :]
+    compression = content[at : at + name_length].decode(errors="replace")
+    return compression, memoryview(content)[at + name_length + 8 :]
 
 
-def _inflate(compression: str, body: Bytes, size: int) -> bytes:
+def _inflate(compression: str, body: memoryview, size: int) -> bytes:
     if compression == "zstd":
         return zstandard.ZstdDecompressor().decompress(body, max_output_size=size)
     if compression == "lz4":
@@ -176,7 +195,7 @@ def _inflate(compression: str, body: Bytes, size: int) -> bytes:
     raise ValueError(f"compression {compression!r} is not known")
 
 
-def _inflate_cut(compression: str, body: Bytes) -> bytes:
+def _inflate_cut(compression: str, body: memoryview) -> bytes:
     """As much as the beginning of a compressed text tells."""
     written = bytes(body).rstrip(b"\0")  # a crash of the machine leaves zeros for what was not
     if compression == "":
@@ -190,121 +209,3 @@ def _inflate_cut(compression: str, body: Bytes) -> bytes:
     except zstandard.ZstdError:
         pass  # what came before is whole
     return bytes(raw)
-
-
-def _take(raw: np.ndarray[Any, Any], index: list[Bytes], contents: Contents) -> None:
-    """Sort a chunk's messages into the channels' columns."""
-    indexed = _indexed(raw, index)
-    start = min((int(offsets[0]) for offsets in indexed.values()), default=len(raw))
-    for located in (_walk(raw[:start], contents), indexed):
-        for channel_id, offsets in located.items():
-            _take_channel(raw, channel_id, offsets, contents)
-
-
-def _indexed(raw: np.ndarray[Any, Any], index: list[Bytes]) -> dict[int, np.ndarray[Any, Any]]:
-    """Where each channel's messages stand by the index, which no checksum protects.
-
-    Nothing where it does not account for every byte from the first message on: it is damaged, or
-    schemas and channels stand among the messages.
-    """
-    located: dict[int, np.ndarray[Any, Any]] = {}
-    covered = 0
-    for entry in index:
-        if len(entry) == 6:  # the channel's id, the length of the array; the rest is entries
-            continue
-        if len(entry) % INDEX_ENTRY.itemsize != 6:
-            return {}
-        channel_id = int.from_bytes(entry[:2], "little")
-        offsets = np.frombuffer(entry, INDEX_ENTRY, offset=6)["offset"].astype(np.intp)
-        ascending = offsets[0] >= 0 and bool(np.all(offsets[1:] > offsets[:-1]))
-        if channel_id in located or not ascending or offsets[-1] > len(raw) - _SHORTEST_MESSAGE:
-            return {}
-        heads = _heads(raw, offsets)
-        if np.any(heads["opcode"] != Opcode.MESSAGE) or np.any(heads["channel"] != channel_id):
-            return {}
-        located[channel_id] = offsets
-        covered += int(_lengths(heads).sum())
-    start = min((int(offsets[0]) for offsets in located.values()), default=0)
-    return located if start + covered == len(raw) else {}
-
-
-def _walk(raw: np.ndarray[Any, Any], contents: Contents) -> dict[int, np.ndarray[Any, Any]]:
-    """Go through a chunk record by record: where each channel's messages stand."""
-    data = raw.data
-    found: dict[int, list[int]] = {}
-    for opcode, start, end in _records(data, 0):
-        if opcode == Opcode.MESSAGE:
-            _locate(data, start, end, found)
-        else:
-            _read_record(opcode, data[start:end], contents)
-    return {channel_id: np.array(offsets, np.intp) for channel_id, offsets in found.items()}
-
-
-def _locate(data: Bytes, start: int, end: int, found: dict[int, list[int]]) -> None:
-    """Add where a message stands, if it is one, to what was found of its channel."""
-    start -= RECORD_HEAD.size
-    if end - start >= _SHORTEST_MESSAGE:
-        (channel_id,) = struct.unpack_from("<H", data, start + RECORD_HEAD.size)
-        found.setdefault(channel_id, []).append(start)
-
-
-def _take_orphans(contents: Contents) -> None:
-    """Messages that came before what describes them, the chunk with that being damaged."""
-    orphans, contents.orphans = contents.orphans, []
-    for raw, channel_id, offsets in orphans:
-        _take_channel(raw, channel_id, offsets, contents)
-    if contents.orphans:
-        lost = sum(len(offsets) for *_, offsets in contents.orphans)
-        contents.damage.append(f"lost {lost} samples: nothing describes their channel any more")
-
-
-def _take_channel(
-    raw: np.ndarray[Any, Any],
-    channel_id: int,
-    offsets: np.ndarray[Any, Any],
-    contents: Contents,
-) -> None:
-    channel = contents.channels.get(channel_id)
-    if channel is None or channel.schema_id not in {0, *contents.schemas}:
-        contents.orphans.append((raw, channel_id, offsets))
-        return
-    schema = schema_of(channel, contents)
-    if schema is None:
-        return
-    heads = _heads(raw, offsets)
-    lengths = _lengths(heads)
-    dtype = schema.dtype
-    if dtype is not None and np.all(lengths == MESSAGE_HEAD.itemsize + dtype.itemsize):
-        rows = _gather(raw, offsets, np.dtype(MESSAGE_HEAD.descr + dtype.descr))
-        if all(np.all(rows[tag] == value) for tag, value in schema.tags.items()):
-            contents.columns.setdefault(channel_id, []).append(rows)
-            return
-    ragged = contents.ragged.setdefault(channel_id, [])
-    for at, length, head in zip(offsets.tolist(), lengths.tolist(), heads, strict=True):
-        data = raw[at + MESSAGE_HEAD.itemsize : at + length].tobytes()
-        ragged.append((int(head["received"]), int(head["measured"]), data))
-
-
-def schema_of(channel: records.Channel, contents: Contents) -> Schema | None:
-    """Ours, by which a channel's messages are read; None for what others wrote."""
-    if channel.message_encoding != "protobuf":
-        return None
-    schema = contents.schemas.get(channel.schema_id)
-    return schema_named(schema.name) if schema else None
-
-
-def _gather(
-    raw: np.ndarray[Any, Any], offsets: np.ndarray[Any, Any], dtype: np.dtype[np.void]
-) -> np.ndarray[Any, Any]:
-    windows = np.lib.stride_tricks.sliding_window_view(raw, dtype.itemsize)
-    rows: np.ndarray[Any, Any] = windows[offsets].view(dtype)[:, 0]
-    return rows
-
-
-def _heads(raw: np.ndarray[Any, Any], offsets: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    return _gather(raw, offsets, MESSAGE_HEAD)
-
-
-def _lengths(heads: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """The size of each message record, its head included."""
-    return heads["length"].astype(np.int64) + RECORD_HEAD.size

@@ -74,19 +74,19 @@ def encode(channel: Channel) -> list[bytes]:
     """The samples of a channel as messages."""
     if schema_for(channel.fields).dtype is None:
         return _encode_fixes(channel)
-    return [row.tobytes() for row in rows_of(channel)]
+    rows = np.empty(len(channel), schema_for(channel.fields).dtype)
+    fill_rows(rows, channel)
+    return [row.tobytes() for row in rows]
 
 
-def rows_of(channel: Channel) -> NDArray[np.void]:
-    """The samples of a channel of fixed-width messages as an array of its schema's dtype, (n,)."""
+def fill_rows(rows: NDArray[np.void], channel: Channel) -> None:
+    """Lay out a channel's samples in rows (n,) that have the fields of its schema's dtype."""
     schema = schema_for(channel.fields)
-    messages = np.empty(len(channel), schema.dtype)
     for tag, value in schema.tags.items():
-        messages[tag] = value
+        rows[tag] = value
     columns = channel.values.reshape(len(channel), len(schema.fields))
     for name, column in zip(schema.fields, columns.T, strict=True):
-        messages[name] = column
-    return messages
+        rows[name] = column
 
 
 def decode(schema: Schema, messages: list[bytes]) -> FloatArray:

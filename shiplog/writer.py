@@ -3,12 +3,14 @@
 import os
 import struct
 import zlib
-from collections.abc import Mapping
-from importlib.metadata import version
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import mcap
+import numpy as np
 import zstandard
 from mcap import records
 from mcap.data_stream import RecordBuilder
@@ -17,7 +19,7 @@ from mcap.opcode import Opcode
 from . import __version__
 from .chunk import Chunk, Part, chunks
 from .files import cannot_write, replacing
-from .mcap_layout import MAGIC
+from .mcap_layout import CHUNK_HEAD, MAGIC, RECORD_HEAD
 from .schema import (
     ENCODING,
     FORMAT_VERSION,
@@ -30,6 +32,7 @@ from .types import Channel, TrialLog
 from .units import CATALOGUE, factor
 
 CHUNK_BYTES = 1 << 20  # what a crash between two flushes can lose
+_ZSTD = b"zstd"
 _PENDING_SAMPLES = CHUNK_BYTES // 40  # about a chunk: a scalar message takes 40 bytes
 
 
@@ -59,8 +62,9 @@ class LogWriter:
         self._attachments: list[records.AttachmentIndex] = []
         self._undescribed: list[records.McapRecord] = []  # schemas and channels for the next chunk
         self._pending: list[Part] = []
+        self._compressor = zstandard.ZstdCompressor()
         self._put(MAGIC)
-        library = f"shiplog {__version__} mcap {version('mcap')}"
+        library = f"shiplog {__version__} mcap {mcap.__version__}"
         self._put(_bytes(records.Header(profile="", library=library)))
         said = {"format_version": FORMAT_VERSION, "written_by": f"shiplog {__version__}"}
         self._add_metadata(dict(metadata or {}) | said)
@@ -164,48 +168,37 @@ class LogWriter:
         self._crc = zlib.crc32(data, self._crc)
 
     def _put_pending(self) -> None:
-        parts, self._pending = self._pending, []
-        parts = [part for part in parts if len(part.slab)]
+        parts, self._pending = _one_a_channel(self._pending), []
         for chunk in chunks(parts, CHUNK_BYTES) if parts else ():
             self._put_chunk(chunk)
 
     def _put_chunk(self, chunk: Chunk) -> None:
         described = b"".join(map(_bytes, self._undescribed))
         self._undescribed = []
-        raw = described + chunk.body.tobytes()
-        body = zstandard.ZstdCompressor().compress(raw)
-        start, first, last = self._at, chunk.first_ns, chunk.last_ns
-        self._put(
-            _bytes(
-                records.Chunk(
-                    compression="zstd",
-                    data=body,
-                    message_end_time=last,
-                    message_start_time=first,
-                    uncompressed_crc=zlib.crc32(raw),
-                    uncompressed_size=len(raw),
-                )
-            )
-        )
+        raw = described + chunk.body.tobytes() if described else chunk.body.data
+        body = self._compressor.compress(raw)
+        start, size = self._at, len(described) + len(chunk.body)
+        head = CHUNK_HEAD.pack(chunk.first_ns, chunk.last_ns, size, zlib.crc32(raw), len(_ZSTD))
+        head += _ZSTD + struct.pack("<Q", len(body))
+        self._put(RECORD_HEAD.pack(Opcode.CHUNK, len(head) + len(body)) + head)
+        self._put(body)
         length, offsets = self._at - start, {}
         for channel_id, entries in chunk.index.items():
             entries["offset"] += len(described)
             offsets[channel_id] = self._at
-            head = struct.pack(
-                "<BQHI", Opcode.MESSAGE_INDEX, 6 + entries.nbytes, channel_id, entries.nbytes
-            )
-            self._put(head + entries.tobytes())
+            self._put(RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + entries.nbytes))
+            self._put(struct.pack("<HI", channel_id, entries.nbytes) + entries.tobytes())
         self._chunk_indexes.append(
             records.ChunkIndex(
                 chunk_length=length,
                 chunk_start_offset=start,
-                compression="zstd",
+                compression=_ZSTD.decode(),
                 compressed_size=len(body),
-                message_end_time=last,
+                message_end_time=chunk.last_ns,
                 message_index_length=self._at - start - length,
                 message_index_offsets=offsets,
-                message_start_time=first,
-                uncompressed_size=len(raw),
+                message_start_time=chunk.first_ns,
+                uncompressed_size=size,
             )
         )
 
@@ -256,6 +249,26 @@ class LogWriter:
             metadata_count=len(self._metadata),
             schema_count=len(self._schemas),
         )
+
+
+def _one_a_channel(parts: Sequence[Part]) -> list[Part]:
+    """Slabs of one channel that follow one another, as one."""
+    by_channel: dict[int, list[Part]] = {}
+    for part in parts:
+        if len(part.slab):
+            by_channel.setdefault(part.channel_id, []).append(part)
+    return [few[0] if len(few) == 1 else _joined(few) for few in by_channel.values()]
+
+
+def _joined(parts: Sequence[Part]) -> Part:
+    slabs = [part.slab for part in parts]
+    whole = replace(
+        slabs[0],
+        measured_ns=np.concatenate([slab.measured_ns for slab in slabs]),
+        received_ns=np.concatenate([slab.received_ns for slab in slabs]),
+        values=np.concatenate([slab.values for slab in slabs]),
+    )
+    return replace(parts[0], slab=whole)
 
 
 def _bytes(record: records.McapRecord) -> bytes:

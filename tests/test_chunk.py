@@ -8,6 +8,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
+import shiplog.chunk
 from shiplog import Channel, LogWriter, TrialLog, write
 from shiplog.chunk import Part, chunks
 from shiplog.schema import GEOGRAPHIC, encode, schema_for
@@ -64,6 +65,31 @@ def test_every_message_is_the_one_mcaps_own_writer_would_write(seed: int) -> Non
     assert sorted(_split(ours.getvalue())) == sorted(_split(expected))
     received = [struct.unpack_from("<Q", r, 15)[0] for r in _split(ours.getvalue())]
     assert received == sorted(received)
+
+
+def test_laid_out_little_by_little_it_is_the_same_as_all_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(4)
+    parts = []
+    for number, (name, count) in enumerate(
+        {"speed": 900, "sway": 350, "geo": 120, "heave": 0}.items()
+    ):
+        at = np.sort(rng.integers(0, 2000, count))  # many at one instant
+        fields = GEOGRAPHIC if name == "geo" else ()
+        values = rng.normal(size=(count, len(fields)) if fields else count)
+        parts.append(Part(number, 7, Channel(name, "a", "1", at, at, values, fields)))
+    at_once = b"".join(chunk.body.tobytes() for chunk in chunks(parts, 4096))
+    monkeypatch.setattr(shiplog.chunk, "LAID_OUT_AT_ONCE", 100)
+    bits = list(chunks(parts, 4096))
+    assert b"".join(chunk.body.tobytes() for chunk in bits) == at_once
+    assert len(bits) > len(at_once) / 4096 + 3
+    for chunk in bits:
+        data = chunk.body.tobytes()
+        for channel_id, entries in chunk.index.items():
+            for got, offset in entries.tolist():
+                said = struct.unpack_from("<BQHIQ", data, offset)
+                assert (said[0], said[2], said[4]) == (5, channel_id, got)
 
 
 def _split(data: bytes) -> list[bytes]:

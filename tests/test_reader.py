@@ -1,6 +1,5 @@
 import json
 import struct
-from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,158 +7,41 @@ from typing import Any
 import numpy as np
 import pytest
 import zstandard
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
-from mcap.reader import McapReader, NonSeekingReader, make_reader
+from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, IndexType, Writer
+from mcap_files import (
+    START,
+    UNIT,
+    channel,
+    chunks,
+    flipped,
+    flushed,
+    foreign,
+    is_part_of,
+    position,
+    samples,
+    samples_by_mcap,
+    scalar,
+    top_level,
+    within,
+    written,
+)
 
+import shiplog.messages
+import shiplog.scan
 from shiplog import Channel, LogError, LogWriter, TrialLog, read, write
-from shiplog.schema import GEOGRAPHIC, encode, schema_for
+from shiplog.schema import GEOGRAPHIC, schema_for
 
 CONFORMANCE = Path(__file__).parents[2] / "shared" / "data" / "mcap_conformance"
-START = 1_700_000_000_000_000_000
-EXTREMES = [0.0, -0.0, 1.0, -1e308, 5e-324, float("inf"), float("-inf"), float("nan")]
-UNIT = {"yaw_rate": "rad/s", "speed": "m/s", "rudder": "rad", "position": "m"}
-
 ANYWHERE = st.floats(0, 1, exclude_max=True)
-
-Samples = dict[str, list[tuple[int, int, bytes]]]  # topic: received, measured, the values' bytes
-
-
-def channel(name: str, count: int, seed: int = 0, source: str = "test") -> Channel:
-    rng = np.random.default_rng(seed)
-    measured = START + np.cumsum(rng.integers(1, 200_000_000, count))
-    received = np.sort(measured + rng.integers(0, 50_000_000, count))
-    values = np.where(rng.random(count) < 0.3, rng.choice(EXTREMES, count), rng.normal(size=count))
-    return Channel(name, source, UNIT.get(name, "1"), measured, received, values)
-
-
-def position(count: int, fields: tuple[str, ...]) -> Channel:
-    at = START + np.arange(count) * 1_000_000_000
-    values = np.random.default_rng(5).normal(size=(count, len(fields)))
-    return Channel("position", "x".join(fields), "m", at, at + 7, values, fields)
-
-
-def samples(log: TrialLog) -> Samples:
-    return {
-        c.topic: [
-            (received, measured, value.tobytes())
-            for received, measured, value in zip(
-                c.received_ns.tolist(), c.measured_ns.tolist(), c.values, strict=True
-            )
-        ]
-        for c in log
-    }
-
-
-def samples_by_mcap(path: Path, reader: Callable[..., McapReader] = make_reader) -> Samples:
-    """The samples by mcap's own reader and the file's own schemas: nothing of ours."""
-    found: Samples = defaultdict(list)
-    types: dict[int, Any] = {}
-    with path.open("rb") as stream:
-        for schema, topic, message in reader(stream, validate_crcs=True).iter_messages():
-            assert schema is not None
-            if schema.id not in types:
-                pool = descriptor_pool.DescriptorPool()
-                for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
-                    pool.Add(file)
-                types[schema.id] = message_factory.GetMessageClass(
-                    pool.FindMessageTypeByName(schema.name)
-                )
-            decoded = types[schema.id].FromString(message.data)
-            doubles = [
-                getattr(decoded, f.name)
-                for f in decoded.DESCRIPTOR.fields
-                if f.type == f.TYPE_DOUBLE and not f.is_repeated
-            ]
-            found[topic.topic].append(
-                (message.log_time, message.publish_time, struct.pack(f"<{len(doubles)}d", *doubles))
-            )
-    return dict(found)
-
-
-def written(path: Path, *channels: Channel, **options: Any) -> Path:  # noqa: ANN401 - mcap's own
-    """The channels in a file as another program would lay it out."""
-    with path.open("wb") as stream:
-        writer = Writer(stream, **options)
-        writer.start()
-        messages = []
-        for c in channels:
-            schema = schema_for(c.fields)
-            schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
-            channel_id = writer.register_channel(
-                c.topic, "protobuf", schema_id, {"unit": c.unit, **c.metadata}
-            )
-            times = zip(c.received_ns.tolist(), c.measured_ns.tolist(), encode(c), strict=True)
-            messages += [(received, channel_id, *rest) for received, *rest in times]
-        for received, channel_id, measured, data in sorted(messages, key=lambda m: m[0]):
-            writer.add_message(channel_id, received, data, measured)
-        writer.finish()
-    return path
-
-
-def foreign(
-    path: Path, messages: list[bytes], *, unit: str | None = "rad/s", topic: str = "/yaw_rate/imu"
-) -> Path:
-    """A file of another program whose scalar messages are these bytes, one a second."""
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start()
-        schema = schema_for(())
-        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
-        metadata = {} if unit is None else {"unit": unit}
-        channel_id = writer.register_channel(topic, "protobuf", schema_id, metadata)
-        for second, data in enumerate(messages):
-            at = START + second * 1_000_000_000
-            writer.add_message(channel_id, at, data, at)
-        writer.finish()
-    return path
-
-
-def scalar(value: float, tag: int = 0x09) -> bytes:
-    return bytes([tag]) + struct.pack("<d", value)
-
-
-def top_level(data: bytes) -> list[tuple[int, int, int]]:
-    """Opcode, start and end of the file's records, their heads included."""
-    found, at = [], 8
-    while at + 9 <= len(data) - 8:
-        opcode, length = struct.unpack_from("<BQ", data, at)
-        found.append((opcode, at, at + 9 + length))
-        at += 9 + length
-    return found
-
-
-def chunks(data: bytes) -> list[tuple[int, int]]:
-    return [(start, end) for opcode, start, end in top_level(data) if opcode == Opcode.CHUNK]
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     return tmp_path / "trial.mcap"
-
-
-def flushed(path: Path, slabs: int = 5, count: int = 100) -> tuple[TrialLog, bytes]:
-    """A log written in flushed slabs, so in many chunks, and the bytes of its finished file."""
-    whole = [channel("yaw_rate", slabs * count, 1), channel("speed", slabs * count, 2)]
-    with LogWriter(path, metadata={"place": "Neva"}) as writer:
-        for at in range(0, slabs * count, count):
-            part = slice(at, at + count)
-            for c in whole:
-                writer.write(
-                    Channel(
-                        c.name,
-                        c.source,
-                        c.unit,
-                        c.measured_ns[part],
-                        c.received_ns[part],
-                        c.values[part],
-                    )
-                )
-            writer.flush()
-    return TrialLog("trial.mcap", tuple(whole)), path.read_bytes()
 
 
 # -- against a decoder that knows nothing of shiplog
@@ -234,6 +116,146 @@ def test_samples_are_in_the_order_in_which_they_were_received(path: Path) -> Non
     np.testing.assert_array_equal(log["speed"].values, [1, 4, 2, 3, 0])
     np.testing.assert_array_equal(log["speed"].measured_ns, [1, 4, 2, 3, 0])
     np.testing.assert_array_equal(log["speed"].received_ns, np.sort(received))
+
+
+# -- a part of a file
+
+
+LAYOUTS: list[dict[str, Any]] = [
+    {},
+    {"compression": CompressionType.NONE},
+    {"index_types": IndexType.NONE},
+    {"use_chunking": False},
+    {"repeat_channels": False, "repeat_schemas": False},
+]
+
+
+def parts_by_mcap(
+    path: Path, topics: list[str], start: int | None, end: int | None
+) -> dict[str, list[tuple[int, int, bytes]]]:
+    found: dict[str, list[tuple[int, int, bytes]]] = {}
+    with path.open("rb") as stream:
+        reader = make_reader(stream)
+        for _, topic, message in reader.iter_messages(topics, starting_at=start, ending_before=end):
+            found.setdefault(topic.topic, []).append(
+                (message.log_time, message.publish_time, message.data[1:])
+            )
+    return found
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_part_is_what_mcaps_reader_gives_of_these_topics_and_times(path: Path, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    held = channel("yaw_rate", 2000, 1), channel("speed", 700, 2), channel("torque", 90, 3)
+    written(path, *held, chunk_size=int(rng.integers(100, 20_000)))
+    topics = rng.choice([c.topic for c in held], rng.integers(1, 4), replace=False).tolist()
+    instants = np.concatenate([c.received_ns for c in held])
+    start, end = np.sort(rng.choice(instants, 2)).tolist()
+    for of, to in ((None, None), (start, None), (None, end), (start, end), (start, start)):
+        log = read(path, channels=topics, start_ns=of, end_ns=to)
+        assert {c.topic for c in log} == set(topics)
+        ours = {topic: told for topic, told in samples(log).items() if told}
+        assert ours == parts_by_mcap(path, topics, of, to)
+
+
+@pytest.mark.parametrize("options", LAYOUTS, ids=str)
+@pytest.mark.parametrize("unfinished", [False, True])
+def test_a_part_is_what_is_cut_from_the_whole(
+    path: Path, options: dict[str, Any], *, unfinished: bool
+) -> None:
+    held = (
+        channel("speed", 700, 2),
+        channel("yaw_rate", 2000, 1),
+        channel("yaw_rate", 500, 4, "imu"),
+        position(30, GEOGRAPHIC),
+    )
+    written(path, *held, **{"chunk_size": 1 << 12, **options})
+    if unfinished:
+        path.write_bytes(path.read_bytes()[:-10])
+    log = read(path)
+    start, end = (int(t) for t in log["speed"].received_ns[[100, 400]])
+    for keys in (None, ("yaw_rate",), ("yaw_rate/imu", "speed", "/speed/test"), ("position",), ()):
+        kept = log.channels if keys is None else [log[key] for key in keys]
+        part = read(path, channels=keys, start_ns=start, end_ns=end)
+        expected = []
+        for c in log:
+            within_it = (c.received_ns >= start) & (c.received_ns < end)
+            if any(c is one for one in kept):
+                expected.append((c.topic, c.received_ns[within_it], c.values[within_it]))
+        assert [c.topic for c in part] == [topic for topic, *_ in expected]
+        for c, (_, received, values) in zip(part, expected, strict=True):
+            np.testing.assert_array_equal(c.received_ns, received)
+            np.testing.assert_array_equal(c.values, values)
+        assert part.metadata == log.metadata
+        assert part.warnings == log.warnings
+
+
+def test_only_the_chunks_of_the_part_are_decompressed(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = ("yaw_rate", "speed") * 5
+    with LogWriter(path) as writer:
+        for number, name in enumerate(names):
+            at = START + 1000 * number + np.arange(100)
+            writer.write(Channel(name, "test", UNIT[name], at, at, np.full(100, float(number))))
+            writer.flush()
+    inflated: list[int] = []
+    inflate = shiplog.scan._inflate
+    monkeypatch.setattr(
+        shiplog.scan, "_inflate", lambda *of: inflated.append(of[2]) or inflate(*of)
+    )
+    speed = read(path, channels=["speed"])["speed"]
+    assert len(inflated) == 5
+    assert np.unique(speed.values).tolist() == [1, 3, 5, 7, 9]
+    inflated.clear()
+    later = read(path, channels=["speed"], start_ns=START + 3099, end_ns=START + 7000)["speed"]
+    assert len(inflated) == 2
+    assert later.values.tolist() == [3, *[5] * 100]
+    inflated.clear()
+    assert len(read(path, start_ns=START + 2000, end_ns=START + 4000)["yaw_rate"]) == 100
+    assert len(inflated) == 2
+
+
+def test_the_index_of_a_chunk_that_is_passed_over_is_not_taken_for_that_of_another(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with LogWriter(path) as writer:
+        for number in range(6):
+            at = START + 1000 * number + np.arange(100)
+            here = [Channel("speed", "test", "m/s", at, at, np.ones(100))]
+            if number % 2 == 0:  # two sizes of messages: only the index does without a walk
+                values = np.ones((100, 2))
+                here.append(Channel("position", "x", "m", at, at, values, ("north", "east")))
+            writer.write(*here)
+            writer.flush()
+    monkeypatch.delattr(shiplog.messages, "_walked")
+    assert len(read(path, channels=["position"])["position"]) == 300
+
+
+def test_damage_is_noticed_in_the_chunks_of_the_part_and_in_no_other(path: Path) -> None:
+    names = ("yaw_rate", "speed") * 3
+    with LogWriter(path) as writer:
+        for number, name in enumerate(names):
+            at = START + 1000 * number + np.arange(100)
+            writer.write(Channel(name, "test", UNIT[name], at, at, np.ones(100)))
+            writer.flush()
+    data = path.read_bytes()
+    start, end = chunks(data)[2]
+    path.write_bytes(flipped(data, 4 * (start + end)))
+    assert read(path, channels=["speed"]).warnings == ()
+    assert len(read(path, channels=["speed"])["speed"]) == 300
+    part = read(path, channels=["yaw_rate"])
+    assert len(part["yaw_rate"]) == 200
+    assert "damaged chunk" in part.warnings[0]
+    assert part.data_lost
+
+
+@pytest.mark.parametrize("cut", [0, 10])
+def test_a_part_with_a_channel_that_is_not_there_is_refused(path: Path, cut: int) -> None:
+    written(path, channel("speed", 100))
+    path.write_bytes(path.read_bytes()[: path.stat().st_size - cut])
+    with pytest.raises(LogError, match=r"no channel 'yaw_rate' in trial\.mcap; it has speed"):
+        read(path, channels=["speed", "yaw_rate"])
 
 
 # -- the files of others
@@ -484,26 +506,6 @@ def test_zeros_from_any_point_on_lose_what_follows_and_invent_nothing(
 def damaged(tmp_path_factory: pytest.TempPathFactory) -> tuple[TrialLog, bytes, Path]:
     path = tmp_path_factory.mktemp("damaged") / "trial.mcap"
     return *flushed(path), path
-
-
-def is_part_of(log: TrialLog, held: TrialLog) -> bool:
-    """Whether a log holds nothing but samples of the other, each as often and in that order."""
-    told = samples(held)
-    for topic, found in samples(log).items():
-        rest = iter(told.get(topic, []))
-        if not all(sample in rest for sample in found):
-            return False
-    return True
-
-
-def within(fraction: float, low: int, high: int) -> int:
-    return low + int(fraction * (high - low))
-
-
-def flipped(data: bytes, bit: int) -> bytes:
-    changed = bytearray(data)
-    changed[bit // 8] ^= 1 << bit % 8
-    return bytes(changed)
 
 
 @given(ANYWHERE, ANYWHERE, st.booleans())

@@ -1,5 +1,6 @@
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -225,6 +226,40 @@ def test_slabs_written_one_by_one_make_one_channel(path: Path) -> None:
     with path.open("rb") as stream:
         sequences = [message.sequence for *_, message in make_reader(stream).iter_messages()]
     assert sequences == list(range(100))
+
+
+def test_slabs_of_many_channels_written_one_by_one_are_whole_again(path: Path) -> None:
+    rng = np.random.default_rng(8)
+    whole = [channel("yaw_rate", 5000, 1), channel("speed", 900, 2), channel("torque", 70, 3)]
+    times = np.sort(rng.choice(whole[0].received_ns, 400, replace=False))
+    cuts = [[0, *np.searchsorted(c.received_ns, times), len(c)] for c in whole]
+    with LogWriter(path) as writer:
+        for number in range(len(times) + 1):
+            writer.write(
+                *(c.part(at[number], at[number + 1]) for c, at in zip(whole, cuts, strict=True))
+            )
+            if rng.random() < 0.02:
+                writer.flush()
+    assert all(same(one, other) for one, other in zip(read(path), whole, strict=True))
+    with path.open("rb") as stream:
+        messages = list(make_reader(stream).iter_messages(log_time_order=False))
+    received = [message.log_time for *_, message in messages]
+    assert received == sorted(received)
+    for c in whole:
+        of_it = [message.sequence for _, its, message in messages if its.topic == c.topic]
+        assert of_it == list(range(len(c)))
+
+
+def test_a_long_slab_takes_little_memory_of_its_own(path: Path) -> None:
+    count = 1_000_000
+    at = START + np.arange(count)
+    long = Channel("speed", "log", "m/s", at, at, np.ones(count))
+    with LogWriter(path) as writer:
+        tracemalloc.start()
+        writer.write(long)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert peak < count * 24
 
 
 def test_a_channel_that_never_spoke_is_kept(path: Path) -> None:
