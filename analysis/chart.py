@@ -3,6 +3,7 @@
 Points are (x, y) of a drawing whose y points down: (east, -north), in m.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import floor, log10
 
@@ -10,9 +11,9 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
-from .pipeline import Analysis
+from .drawing import Series
+from .pipeline import Findings
 
-POINTS = 20_000  # of the track, evenly: more than a screen has
 SHIPS = 10  # outlines along the track
 SYMBOL = 1 / 20  # of the chart's width: the length of a ship whose own is unknown or smaller
 HULL = np.array(  # forward and starboard, in lengths: bow, shoulders, stern
@@ -33,26 +34,26 @@ class Chart:
     bounds: tuple[FloatArray, FloatArray]  # the corners with the least and the greatest x and y
 
 
-def draw_track(analysis: Analysis) -> Chart | None:
+def draw_track(findings: Findings, drawn: Mapping[str, Series]) -> Chart | None:
     """The chart of a track; None where no position is known."""
-    track, at = analysis.track, analysis.track.time_secs
-    points = np.column_stack((track.east, -track.north))
-    known = np.flatnonzero(np.isfinite(points).all(axis=1))
-    kept = known[np.unique(np.linspace(0, len(known) - 1, min(len(known), POINTS)).astype(int))]
-    points, at = points[kept], at[kept]
+    track = drawn["track"]
+    north, east = (line.values for line in track.lines)
+    points = np.column_stack((east, -north))
+    known = np.isfinite(points).all(axis=1)
+    points, at = points[known], track.time_secs[known]
     if len(points) < 2:
         return None
     low, high = points.min(axis=0), points.max(axis=0)
     width = max(float((high - low).max()), 1.0)
-    length = max(analysis.vessel.length or 0.0, SYMBOL * width)
+    length = max(findings.vessel.length or 0.0, SYMBOL * width)
     bar = _round_length(width / 4)
     foot = np.array([low[0], high[1] + 0.12 * width])
     margin = 0.08 * width
     return Chart(
-        f"track, north up: {track.origin}",
+        f"track, north up: {findings.track_origin}",
         points,
         at,
-        _ships(analysis, points, at, length),
+        _ships(drawn.get("heading"), points, at, length),
         foot + np.array([[0.0, 0.0], [bar, 0.0]]),
         f"{bar:g} m" if bar < 1000 else f"{bar / 1000:g} km",
         (low - margin, np.array([max(high[0], foot[0] + bar), foot[1]]) + margin),
@@ -60,18 +61,15 @@ def draw_track(analysis: Analysis) -> Chart | None:
 
 
 def _ships(
-    analysis: Analysis, points: FloatArray, at: FloatArray, length: float
+    compass: Series | None, points: FloatArray, at: FloatArray, length: float
 ) -> list[FloatArray]:
     """Outlines evenly along the way, headed as measured, or else along the track."""
     sailed = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
     rows = np.unique(np.searchsorted(sailed, np.linspace(0.0, sailed[-1], SHIPS)))
     east, south = np.gradient(points, axis=0).T
     heading = np.arctan2(east, -south)
-    if "heading" in analysis.signals:
-        measured = analysis.signals["heading"]
-        known = np.isfinite(measured)
-        if known.any():
-            heading = np.interp(at, analysis.signals.time_secs[known], measured[known])
+    if compass is not None and len(compass.time_secs):
+        heading = np.interp(at, compass.time_secs, compass.lines[0].values)
     return [points[row] + _turned(HULL * length, heading[row]) for row in rows]
 
 

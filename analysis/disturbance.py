@@ -6,11 +6,12 @@ would couple them. Source: "Algorithm of ship course control system watcher for 
 disturbances and noise measurements", eqs (3), (4).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from shiplog.clock import usual_interval_secs
 from shiplog.compiled import compiled
 from shiplog.ship import (
     Coefficients,
@@ -19,66 +20,144 @@ from shiplog.ship import (
     yaw_acceleration_rate,
     yaw_stiffness,
 )
+from shiplog.thinned import Thinned
 from shiplog.types import FloatArray, Signals
 
 from .design import Observer, butterworth_poles, discrete_observer
+from .gauge import Gauge, gauge
+from .inputs import INPUTS, last_inputs
 from .kalman import Noise
+from .moments import Moments
 
 YAW_FREQUENCY = 0.05  # rad/s, the paper's
 SURGE_FREQUENCY = 0.02  # rad/s: surge is slower and its sensor noisier
 SETTLING = 5.0  # over the frequency: the paper's transient time
+DISTURBANCE_UNITS = {"yaw": "rad/s³", "rudder": "rad", "surge": "m/s²"}
 
 
 @dataclass(frozen=True, eq=False)
 class Disturbance:
-    """Specific disturbances on the signals' clock: what they add to the equations of motion.
-
-    The standard deviations are what sensor noise leaves once an observer has settled, the ship
-    turning as she usually did; an error of the model counts as a disturbance. Before the settling
-    time what is seen is the observer's own transient.
-    """
+    """Specific disturbances on the signals' clock: what they add to the equations of motion."""
 
     yaw: FloatArray  # (n,) rad/s^3, added to w''
-    yaw_std: float
     surge: FloatArray  # (n,) m/s^2, added to v'
-    surge_std: float
     rudder: FloatArray  # (n,) rad: the rudder that would do, at the speed then, what `yaw` does
-    rudder_std: float  # NaN where no rudder would
-    yaw_settling_secs: float = SETTLING / YAW_FREQUENCY
-    surge_settling_secs: float = SETTLING / SURGE_FREQUENCY
 
 
-def observe_disturbance(signals: Signals, model: Coefficients, noise: Noise) -> Disturbance:
-    """Observe a yaw moment and a surge force; where nothing is measured they are held.
+@dataclass(frozen=True)
+class Course:
+    """A disturbance over a trial, its first transient left out.
 
-    `rudder` and `rpm` must be known throughout.
+    The standard deviation is what sensor noise leaves once an observer has settled, the ship
+    turning as she usually did; an error of the model counts as a disturbance.
     """
-    w, v = signals["yaw_rate"], signals["speed"]
-    dt = signals.dt_secs
-    turning = yaw_stiffness(model, float(np.sqrt(np.nanmean(w**2))))
-    interval = usual_interval_secs(w, dt)
-    yaw = _yaw_observer(model, turning, interval)
-    surge = _surge_observer(model, float(np.nanmedian(v)), usual_interval_secs(v, dt))
-    rows = _observe(
-        model, w, v, signals["rudder"], signals["rpm"], dt, yaw.correction, surge.correction,
-        turning, interval,
-    )  # fmt: skip
-    # a ship without way has a rudder that does nothing: the equivalent is then not a number
-    steering = model.d * rudder_effects(model, rows[:, 2], signals["rpm"])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        works = np.abs(steering) > 1e-3 * np.max(np.abs(steering))
-        rudder = np.where(works, rows[:, 1] / steering, np.nan)
-    std_w, std_v = noise.measurement_std
-    yaw_std = float(yaw.noise_gain[2] * std_w)
-    usual = float(np.median(np.abs(steering)))
-    return Disturbance(
-        yaw=rows[:, 1],
-        yaw_std=yaw_std,
-        surge=rows[:, 3],
-        surge_std=float(surge.noise_gain[1] * std_v),
-        rudder=rudder,
-        rudder_std=yaw_std / usual if usual > 0 else np.nan,
-    )
+
+    unit: str
+    mean: float
+    rms: float
+    lowest: float
+    highest: float
+    last: float  # the mean over the settling time at the end
+    std: float  # NaN where no rudder would do it
+    settling_secs: float  # before it what is seen is the observer's own transient
+
+
+class Observing:
+    """Observes a yaw moment and a surge force in slabs; where nothing is measured they are held.
+
+    The inputs must be known throughout.
+    """
+
+    def __init__(self, model: Coefficients, noise: Noise, usual: Gauge) -> None:
+        self._model, self._usual = model, usual
+        self._turning = yaw_stiffness(model, usual.turning)
+        self._interval = float(usual.interval_secs[0])
+        yaw = _yaw_observer(model, self._turning, self._interval)
+        surge = _surge_observer(model, usual.ahead, float(usual.interval_secs[1]))
+        self._gains = yaw.correction, surge.correction
+        self._yaw_std = float(yaw.noise_gain[2] * noise.measurement_std[0])
+        self._surge_std = float(surge.noise_gain[1] * noise.measurement_std[1])
+        self._state = ObserverState(float(usual.first[0]), 0.0, 0.0, float(usual.first[1]), 0.0)
+        # a ship without way has a rudder that does nothing: its angle is then not a number
+        self._least_steering = 1e-3 * abs(model.d) * usual.steering
+        self._steering = Thinned()
+        settling = {"yaw": SETTLING / YAW_FREQUENCY, "surge": SETTLING / SURGE_FREQUENCY}
+        settling["rudder"] = settling["yaw"]
+        self._courses = {
+            name: _CourseWatch(secs, usual.count, usual.dt_secs) for name, secs in settling.items()
+        }
+
+    def step(self, slab: Signals, following: Mapping[str, float]) -> Disturbance:
+        """Observe the next slab; `following` are the inputs at the instant after it."""
+        delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
+        rows, self._state = _observe(
+            self._model, self._state, slab["yaw_rate"], slab["speed"], delta, n, slab.dt_secs,
+            *self._gains, self._turning, self._interval,
+        )  # fmt: skip
+        steering = self._model.d * rudder_effects(self._model, rows[:, 2], slab["rpm"])
+        self._steering.add(np.abs(steering))
+        works = np.abs(steering) > self._least_steering
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rudder = np.where(works, rows[:, 1] / steering, np.nan)
+        found = Disturbance(yaw=rows[:, 1], surge=rows[:, 3], rudder=rudder)
+        for name, watch in self._courses.items():
+            watch.add(getattr(found, name))
+        return found
+
+    def courses(self) -> dict[str, Course]:
+        """What was observed, once all was: of `yaw`, `rudder` and `surge`."""
+        usual = self._steering.median()
+        stds = {
+            "yaw": self._yaw_std,
+            "rudder": self._yaw_std / usual if usual > 0 else np.nan,
+            "surge": self._surge_std,
+        }
+        return {
+            name: self._courses[name].course(std, DISTURBANCE_UNITS[name])
+            for name, std in stds.items()
+        }
+
+
+def observe_disturbance(
+    signals: Signals, model: Coefficients, noise: Noise
+) -> tuple[Disturbance, dict[str, Course]]:
+    """The disturbance in signals that are all there, and what comes of it; as `Observing`."""
+    observing = Observing(model, noise, gauge(signals, model))
+    found = observing.step(signals, last_inputs(signals))
+    return found, observing.courses()
+
+
+class _CourseWatch:
+    """Looks at one disturbance as it is observed."""
+
+    def __init__(self, settling_secs: float, count: int, dt: float) -> None:
+        self._settling_secs = settling_secs
+        settling = int(settling_secs / dt)
+        self._skipped = settling if count > 2 * settling else 0
+        self._tail = max(settling, 1)
+        self._settled = Moments()
+        self._last: FloatArray = np.zeros(0)
+
+    def add(self, values: FloatArray) -> None:
+        """Take the next values."""
+        values = np.where(np.isfinite(values), values, np.nan)
+        self._settled.add(values[self._skipped :])
+        self._skipped = max(self._skipped - len(values), 0)
+        self._last = np.concatenate((self._last, values))[-self._tail :]
+
+    def course(self, std: float, unit: str) -> Course:
+        """What all of them come to."""
+        settled, last = self._settled, self._last[np.isfinite(self._last)]
+        return Course(
+            unit=unit,
+            mean=settled.mean,
+            rms=float(np.sqrt(settled.mean_square)),
+            lowest=settled.lowest,
+            highest=settled.highest,
+            last=float(np.mean(last)) if len(last) and settled.count else np.nan,
+            std=std,
+            settling_secs=self._settling_secs,
+        )
 
 
 def _yaw_observer(c: Coefficients, stiffness: float, interval: float) -> Observer:
@@ -95,9 +174,20 @@ def _surge_observer(c: Coefficients, speed: float, interval: float) -> Observer:
     return discrete_observer(A, C, butterworth_poles(2, SURGE_FREQUENCY), interval)
 
 
+class ObserverState(NamedTuple):
+    """The motion and what disturbs it."""
+
+    w: float
+    w_dot: float
+    moment: float  # rad/s^3
+    v: float
+    force: float  # m/s^2
+
+
 @compiled
 def _observe(
     c: Coefficients,
+    x: ObserverState,
     w_measured: FloatArray,
     v_measured: FloatArray,
     delta: FloatArray,
@@ -107,16 +197,16 @@ def _observe(
     surge: FloatArray,
     turning: float,
     interval: float,
-) -> FloatArray:
-    """Rows of w, yaw disturbance, v, surge disturbance, (n, 4).
+) -> tuple[FloatArray, ObserverState]:
+    """Rows of w, yaw disturbance, v, surge disturbance, (n, 4), and what the next slab begins with.
 
     The yaw correction was designed for the stiffness `turning`; what w' is given follows the
-    stiffness of the moment, so that the poles stay where they were placed.
+    stiffness of the moment, so that the poles stay where they were placed. `delta` and `n` are one
+    longer than the rest.
     """
-    count = len(delta)
+    count = len(w_measured)
     rows = np.empty((count, 4))
-    w, w_dot, moment = w_measured[np.isfinite(w_measured)][0], 0.0, 0.0
-    v, force = v_measured[np.isfinite(v_measured)][0], 0.0
+    w, w_dot, moment, v, force = x
     for k in range(count):
         if np.isfinite(w_measured[k]):
             error = w_measured[k] - w
@@ -128,14 +218,13 @@ def _observe(
             v, force = v + surge[0] * error, force + surge[1] * error
         rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = w, moment, v, force
         # Heun's step of the model, the disturbances constant
-        ahead = min(k + 1, count - 1)
-        rate = (delta[ahead] - delta[k]) / dt
+        rate = (delta[k + 1] - delta[k]) / dt
         w1 = yaw_acceleration_rate(c, w, w_dot, v, n[k], delta[k], rate) + moment
         v1 = surge_acceleration(c, w, v, n[k]) + force
         w_end, w_dot_end, v_end = w + dt * w_dot, w_dot + dt * w1, v + dt * v1
-        w2 = yaw_acceleration_rate(c, w_end, w_dot_end, v_end, n[ahead], delta[ahead], rate)
-        v2 = surge_acceleration(c, w_end, v_end, n[ahead])
+        w2 = yaw_acceleration_rate(c, w_end, w_dot_end, v_end, n[k + 1], delta[k + 1], rate)
+        v2 = surge_acceleration(c, w_end, v_end, n[k + 1])
         w = w + dt * (w_dot + w_dot_end) / 2
         w_dot = w_dot + dt * (w1 + w2 + moment) / 2
         v = v + dt * (v1 + v2 + force) / 2
-    return rows
+    return rows, ObserverState(w, w_dot, moment, v, force)

@@ -1,14 +1,13 @@
 """States from signals: the Kalman filter with pseudo-inputs."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from shiplog.clock import usual_interval_secs
 from shiplog.compiled import compiled
-from shiplog.errors import LogError
 from shiplog.ship import (
     Coefficients,
     rudder_effect,
@@ -21,12 +20,12 @@ from shiplog.types import FloatArray, Signals
 from shiplog.vessel import FilterSettings
 
 from .design import discretise, pseudo_input_matrices
+from .gauge import OUTPUTS, Gauge, gauge
+from .inputs import INPUTS, last_inputs
 
 STATES = ("yaw_rate", "yaw_acceleration", "yaw_jerk", "speed", "surge_acceleration")
-OUTPUTS = ("yaw_rate", "speed")
-OUTPUT_STATES = (0, 3)  # where they stand among the states: C of y = C x
+OUTPUT_STATES = (0, 3)  # where the outputs stand among the states: C of y = C x
 PAPER_RATIO = 0.01 / 400  # Burylin's Q over his R: no default trusts the model more
-TUNING_SAMPLES = 50_000  # of a long log are enough to tell how well the model fits
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,76 +58,73 @@ class FilterState(NamedTuple):
     v_dot: float
 
 
-def filter_states(signals: Signals, model: Coefficients, noise: Noise) -> Estimates:
-    """Filter yaw rate and speed through the five-state model of the identification paper.
+class Filter:
+    """The five-state model of the identification paper, filtering yaw rate and speed in slabs.
 
     The mean is propagated by the exact nonlinear derivative (A x + B u with corrected
     pseudo-inputs, `design.pseudo_input_matrices`), the covariance by A, as the paper has it. Where
-    an output is NaN there is no correction; `rudder` and `rpm` must be known throughout.
+    an output is NaN there is no correction; the inputs must be known throughout.
     Source: Burylin, eqs (4)-(6).
     """
-    measured = np.column_stack([signals[name] for name in OUTPUTS])
-    A, _ = pseudo_input_matrices(model, 1.0)
-    r = noise.measurement_std**2
-    intervals = [usual_interval_secs(signals[name], signals.dt_secs) for name in OUTPUTS]
-    per_state = np.repeat(noise.process_ratio * r * intervals, (3, 2))
-    F, Q = map(np.ascontiguousarray, discretise(A, np.diag(per_state), signals.dt_secs))
-    start, P = _start(model, measured, signals)
-    rows = _filter(
-        model, start, P, F, Q, measured, r, signals["rudder"], signals["rpm"], signals.dt_secs
-    )
-    return Estimates(rows[:, :5], np.sqrt(rows[:, 5:10]), rows[:, 10:12], np.sqrt(rows[:, 12:]))
+
+    def __init__(self, model: Coefficients, noise: Noise, usual: Gauge) -> None:
+        A, _ = pseudo_input_matrices(model, 1.0)
+        self._model, self._r = model, noise.measurement_std**2
+        per_state = np.repeat(noise.process_ratio * self._r * usual.interval_secs, (3, 2))
+        F, Q = discretise(A, np.diag(per_state), usual.dt_secs)
+        self._F, self._Q = np.ascontiguousarray(F), np.ascontiguousarray(Q)
+        self._x, self._P = _start(model, usual)
+        self._last_rate = 0.0  # of the rudder
+
+    def step(self, slab: Signals, following: Mapping[str, float]) -> Estimates:
+        """Filter the next slab; `following` are the inputs at the instant after it."""
+        measured = np.column_stack([slab[name] for name in OUTPUTS])
+        delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
+        rows, self._x, self._P, self._last_rate = _filter(
+            self._model, self._x, self._P, self._F, self._Q, measured, self._r, delta, n,
+            slab.dt_secs, self._last_rate,
+        )  # fmt: skip
+        return Estimates(rows[:, :5], np.sqrt(rows[:, 5:10]), rows[:, 10:12], np.sqrt(rows[:, 12:]))
 
 
-def noise_of(signals: Signals, model: Coefficients, settings: FilterSettings) -> Noise:
+def filter_states(signals: Signals, model: Coefficients, noise: Noise) -> Estimates:
+    """Filter signals that are all there; as `Filter`."""
+    following = last_inputs(signals)
+    return Filter(model, noise, gauge(signals, model)).step(signals, following)
+
+
+def noise_of(usual: Gauge, model: Coefficients, settings: FilterSettings) -> Noise:
     """The noise a vessel file states, and from the log what it leaves open.
 
     The measurement noise shows in the third differences of a signal, where the ship's motion does
     not; the process noise is what makes the innovations most likely.
     """
     given = (settings.yaw_rate_std, settings.speed_std)
-    stds = np.array(
-        [
-            noise_level(signals[name]) if std is None else std
-            for name, std in zip(OUTPUTS, given, strict=True)
-        ]
-    )
+    stds = np.array([a if b is None else b for a, b in zip(usual.noise, given, strict=True)])
     measured = (given[0] is None, given[1] is None)
     if settings.process_ratio is not None:
         return Noise(stds, np.full(2, settings.process_ratio), measured)
-    head = _head(signals, TUNING_SAMPLES)
+    of_head = gauge(usual.head, model)
     ratio = np.full(2, PAPER_RATIO)
     for output in range(2):
-        ratio[output] = _likeliest_ratio(head, model, stds, ratio, output)
+        ratio[output] = _likeliest_ratio(usual.head, of_head, model, stds, ratio, output)
     return Noise(stds, ratio, measured, tuned=True)
 
 
-def noise_level(values: FloatArray) -> float:
-    """The standard deviation of a signal's white noise, from its third differences, (n,).
-
-    Differences eight times the usual are spikes and not counted. A signal printed to few digits
-    has at least the noise of its rounding.
-    """
-    seen = values[np.isfinite(values)]
-    thirds = np.diff(seen, 3) / np.sqrt(20.0)  # white noise of variance s^2 gives 20 s^2
-    if not len(thirds):
-        raise LogError("fewer than four samples on the common clock; record for longer")
-    usual = 1.4826 * float(np.median(np.abs(thirds)))
-    kept = thirds[np.abs(thirds) <= 8 * usual] if usual > 0 else thirds
-    steps = np.abs(np.diff(seen))
-    rounding = float(np.min(steps[steps > 0], initial=np.inf))
-    rounding = rounding / np.sqrt(12.0) if np.isfinite(rounding) else 0.0
-    floor = max(1e-6 * float(np.std(seen)), 1e-12)
-    return max(float(np.sqrt(np.mean(kept**2))), min(rounding, float(np.std(seen))), floor)
-
-
 def _likeliest_ratio(
-    signals: Signals, model: Coefficients, stds: FloatArray, ratio: FloatArray, output: int
+    signals: Signals,
+    usual: Gauge,
+    model: Coefficients,
+    stds: FloatArray,
+    ratio: FloatArray,
+    output: int,
 ) -> float:
+    following = last_inputs(signals)
+
     def unlikelihood(log_ratio: float) -> float:
         trial = ratio.copy()
         trial[output] = 10.0**log_ratio
-        estimates = filter_states(signals, model, Noise(stds, trial))
+        estimates = Filter(model, Noise(stds, trial), usual).step(signals, following)
         e, s = estimates.innovations[:, output], estimates.innovation_stds[:, output]
         score = float(np.nansum((e / s) ** 2 + 2 * np.log(s)))
         return score if np.isfinite(score) else 1e300
@@ -139,22 +135,13 @@ def _likeliest_ratio(
     return float(10.0**best.x)
 
 
-def _head(signals: Signals, count: int) -> Signals:
-    if len(signals) <= count:
-        return signals
-    head = {name: values[:count] for name, values in signals.values.items()}
-    return Signals(signals.start_ns, signals.dt_secs, head)
-
-
-def _start(
-    c: Coefficients, measured: FloatArray, signals: Signals
-) -> tuple[FilterState, FloatArray]:
+def _start(c: Coefficients, usual: Gauge) -> tuple[FilterState, FloatArray]:
     """The first values measured, their rates from the model at rest; as unsure as they vary."""
-    w, v = (column[np.isfinite(column)][0] for column in measured.T)
-    n = signals["rpm"][0]
-    w_ddot = yaw_acceleration_rate(c, w, 0.0, v, n, signals["rudder"][0], 0.0)
+    w, v = usual.first
+    delta, n = (usual.head[name][0] for name in INPUTS)
+    w_ddot = yaw_acceleration_rate(c, w, 0.0, v, n, delta, 0.0)
     start = FilterState(w, 0.0, w_ddot, v, surge_acceleration(c, w, v, n))
-    dw, dv = np.nanstd(measured, axis=0) + 1e-9
+    dw, dv = usual.spread + 1e-9
     rate = abs(c.a) + 1e-3
     spread = np.array([dw, rate * dw, rate**2 * dw, dv, 1e-2 * dv])
     return start, np.diag(spread**2)
@@ -172,15 +159,17 @@ def _filter(
     delta: FloatArray,
     n: FloatArray,
     dt: float,
-) -> FloatArray:
-    """Rows of the state, its variances, the innovations and their variances, (n, 14)."""
+    last_rate: float,
+) -> tuple[FloatArray, FilterState, FloatArray, float]:
+    """Rows of the state, its variances, the innovations and their variances, (n, 14).
+
+    And what the next slab begins with: x, P and the rudder's rate. `delta` and `n` are one longer.
+    """
     count = len(measured)
     rows = np.empty((count, 14))
     P, FP = P.copy(), np.empty((5, 5))
-    last_rate = 0.0
     for k in range(count):
-        ahead = min(k + 1, count - 1)
-        delta_dot, n_dot = (delta[ahead] - delta[k]) / dt, (n[ahead] - n[k]) / dt
+        delta_dot, n_dot = (delta[k + 1] - delta[k]) / dt, (n[k + 1] - n[k]) / dt
         # a rudder that starts or stops makes w'' jump
         jump = rudder_effect(c, x.v, n[k]) * c.e * (delta_dot - last_rate)
         x = FilterState(x.w, x.w_dot, x.w_ddot + jump, x.v, x.v_dot)
@@ -198,7 +187,7 @@ def _filter(
         rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3], rows[k, 4] = x
         x = _predicted(c, x, delta[k], delta_dot, n[k], n_dot, dt)
         _propagate(P, F, Q, FP)
-    return rows
+    return rows, x, P, last_rate
 
 
 @compiled

@@ -1,111 +1,251 @@
-"""From a log to what it says: the order of the steps."""
+"""From a log to what it says: the order of the steps.
 
-from collections.abc import Callable
+A log may be longer than memory: it is gone through three times in slabs. First it is surveyed,
+then put on one clock to see what its signals usually do and to fit what is fitted to the whole of
+it, and at last replayed. Every stage takes slabs, gives slabs and carries its state; where the
+slabs are cut changes nothing.
+"""
+
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
 
-from shiplog import LogError, Signals, TrialLog, Vessel, resample
-from shiplog.clock import usual_period_secs
-from shiplog.quality import examine
+from shiplog import Channel, LogError, Signals, Vessel
+from shiplog.clock import Clock, on_clock, set_clock
+from shiplog.errors import UsageError
+from shiplog.gyro_bias import GyroWatch
+from shiplog.quality import faults
+from shiplog.rudder_sign import RudderWatch
+from shiplog.ship import Coefficients
+from shiplog.survey import Survey, longest_step_secs, survey
+from shiplog.types import Log
 from shiplog.vessel import FilterSettings, parse_vessel
 
-from .disturbance import Disturbance, observe_disturbance
-from .doubts import doubtful, possible, silent_ends
-from .first_model import fit_first_model
-from .kalman import OUTPUT_STATES, OUTPUTS, Estimates, Noise, filter_states, noise_of
-from .residuals import OutputResiduals, judge
-from .sliding import Identification, identify
-from .track import Track, find_track
-from .weak_form import weak_form
+from .disturbance import Course, Disturbance, Observing
+from .doubts import doubtful, silent_ends
+from .first_model import BARE, fit_first_model
+from .gauge import OUTPUTS, Gauge, Gauging
+from .identification import Identification, Identifying
+from .inputs import INPUTS, Holding, held_throughout
+from .kalman import OUTPUT_STATES, Estimates, Filter, Noise, noise_of
+from .residuals import Judging, OutputResiduals
+from .sliding import History
+from .stacking import stacked
+from .track import Track, Tracking
+from .weak_form import WeakForm
 
-INPUTS = ("rudder", "rpm")
 FITTED = "a first model, fitted to this log"
 FEWEST = 4  # samples of an output: their third difference shows its noise
 NEEDED = (*OUTPUTS, *INPUTS)
-STEPS = ("check", "one clock", "model", "filter", "disturbance", "coefficients")
+STEPS = ("check", "one clock", "model", "replay")
+
+Tell = Callable[[str, float], None]  # the step, and the share of it that is done
 
 
 @dataclass(frozen=True, eq=False)
-class Analysis:
-    """All that a replay found, on the signals' clock."""
+class Slab:
+    """What a replay says of a stretch of the trial; each part as far as it is known by then."""
 
-    log: TrialLog
+    signals: Signals  # as measured, NaN where not
+    estimates: Estimates
+    disturbance: Disturbance
+    yaw_history: History
+    surge_history: History
+    track: Track
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What a replay comes to."""
+
+    survey: Survey
+    metadata: dict[str, str]  # of the log
+    clock: Clock
     vessel: Vessel
     model_origin: str  # where the model came from, in words
-    signals: Signals  # as measured, NaN where not
+    usual: Gauge
     noise: Noise
-    estimates: Estimates
     residuals: tuple[OutputResiduals, ...]  # of yaw rate and speed
-    disturbance: Disturbance
+    courses: dict[str, Course]  # of the disturbances
     yaw: Identification
     surge: Identification
-    track: Track
+    track_origin: str  # how the track is known, in words
     warnings: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The log's."""
+        return self.survey.name
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis(Findings, Slab):
+    """All that a replay found: what it comes to, and the whole trial in one slab."""
 
 
 def analyse(
-    log: TrialLog, vessel: Vessel | None = None, *, on_step: Callable[[str], None] = lambda _: None
+    log: Log, vessel: Vessel | None = None, *, on_step: Tell = lambda _step, _share: None
 ) -> Analysis:
     """Replay a log: check it, filter it, observe what disturbed it, identify the ship.
 
     The model is `vessel`'s, or the one the log carries, or else a first one fitted to the log.
-    `on_step` is told each of `STEPS` as it begins. Raises `LogError` where the log lacks a needed
-    channel or cannot be used as it is.
+    `on_step` is told each of `STEPS`, and the share of it that is done. For a log longer than
+    memory use `Replay`. Raises `LogError` where the log lacks a needed channel or cannot be used
+    as it is.
     """
-    on_step("check")
-    also = tuple(name for name in ("heading", "position") if name in log)
-    warnings = [*log.warnings, *examine(log, (*NEEDED, *also))]
+    replay = Replay(log, vessel, on_step=on_step)
+    whole = stacked(list(replay.slabs()))
+    return Analysis(**vars(whole), **vars(replay.findings))
 
-    on_step("one clock")
-    credible = possible(log)
-    signals = resample(credible, channels=NEEDED, optional=("heading",))
-    _require_outputs(log, signals)
-    known, unknown = _hold_inputs(credible, signals)
-    warnings += doubtful(credible, NEEDED)
-    warnings += [*silent_ends(credible, signals, NEEDED), *unknown]
 
-    on_step("model")
-    vessel, origin = _model(log, vessel, signals)
-    model = vessel.coefficients
-    if origin == FITTED and not (model.a < 0 and model.g <= 0 and model.h >= 0):
-        warnings.append("the model fitted to this log is no ship's: too little moves in it to tell")
+class Replay:
+    """A replay in slabs: go through `slabs`, then ask for the `findings`.
 
-    on_step("filter")
-    noise = noise_of(known, model, _averaged(vessel.filter, log, signals.dt_secs))
-    estimates = filter_states(known, model, noise)
-    if not np.all(np.isfinite(estimates.states)):
-        raise LogError(
-            f"the filter runs away: the model does not fit this log ({origin}); "
-            f"give the ship's own with --vessel: {log.name}"
+    As `analyse`, except that no more than a slab is held.
+    """
+
+    def __init__(
+        self, log: Log, vessel: Vessel | None = None, *, on_step: Tell = lambda _step, _share: None
+    ) -> None:
+        self._log, self._tell = log, on_step
+        on_step("check", 0.0)
+        self.survey = found = survey(log, strict=True)
+        also = tuple(name for name in ("heading", "position") if name in found)
+        warnings = [*log.warnings, *faults(found, (*NEEDED, *also))]
+        self.clock = set_clock(log, found, channels=NEEDED, optional=("heading",))
+
+        stated = _stated_model(log, vessel)
+        alphas = stated[0].coefficients if stated else BARE
+        gauging, holding, weak_form = Gauging(alphas), Holding(self.clock), self._weak_form(alphas)
+        self._yaw = Identifying(weak_form.rows, constant=True)
+        self._surge = Identifying(weak_form.rows)
+        doubts = RudderWatch(found), GyroWatch(found)
+        for signals in self._on_clock("one clock", holding.watch, *(d.add for d in doubts)):
+            gauging.add(holding.held(signals))
+            yaw_rows, surge_rows = weak_form.step(signals, gauging.fastest)
+            self._yaw.fit(yaw_rows)
+            self._surge.fit(surge_rows)
+        self.usual = gauging.result()
+        _require_outputs(log, self.usual)
+        warnings += doubtful(found, NEEDED)
+        warnings += [said for doubt in doubts if (said := doubt.warning())]
+        warnings += [*silent_ends(found, self.clock, NEEDED), *holding.said()]
+
+        on_step("model", 0.0)
+        self.vessel, self.model_origin = stated or (
+            fit_first_model(self._yaw, self._surge, self.usual, log.name),
+            FITTED,
         )
-    residuals = tuple(_judged(log, estimates, noise, i) for i in range(len(OUTPUTS)))
+        model = self.vessel.coefficients
+        if not stated and not (model.a < 0 and model.g <= 0 and model.h >= 0):
+            warnings.append(
+                "the model fitted to this log is no ship's: too little moves in it to tell"
+            )
+        settings = _averaged(self.vessel.filter, found, self.clock.dt_secs)
+        self.noise = noise_of(self.usual, model, settings)
+        self._warnings = tuple(warnings)
+        self._findings: Findings | None = None
 
-    on_step("disturbance")
-    disturbance = observe_disturbance(known, model, noise)
+    def slabs(self) -> Iterator[Slab]:
+        """Replay the trial, once.
 
-    on_step("coefficients")
-    yaw_rows, surge_rows = weak_form(signals, model)
-    yaw, surge = identify(yaw_rows, constant=True), identify(surge_rows)
-    track = find_track(log, signals, *(estimates.states[:, i] for i in OUTPUT_STATES))
-    return Analysis(
-        log, vessel, origin, signals, noise, estimates, residuals, disturbance, yaw, surge, track,
-        tuple(warnings),
-    )  # fmt: skip
+        Raises `LogError` where the model does not fit it at all.
+        """
+        model, holding = self.vessel.coefficients, Holding(self.clock)
+        filtering = Filter(model, self.noise, self.usual)
+        observing = self._observing()
+        judging = [self._judging(output) for output in range(len(OUTPUTS))]
+        weak_form = self._weak_form(model)
+        tracking = Tracking(self.clock, self.survey.get("position"))
+        on_clock = self._on_clock("replay", holding.watch, tracking.watch)
+        for signals, held, following in held_throughout(on_clock, holding):
+            estimates = filtering.step(held, following)
+            if not np.all(np.isfinite(estimates.states)):
+                raise self._runs_away()
+            for i, of_output in enumerate(judging):
+                of_output.add(estimates.innovations[:, i], estimates.innovation_stds[:, i])
+            disturbance = observing.step(held, following)
+            yaw_rows, surge_rows = weak_form.step(signals, self.usual.fastest)
+            yaw, surge = self._yaw.step(yaw_rows), self._surge.step(surge_rows)
+            track = tracking.step(signals, *(estimates.states[:, i] for i in OUTPUT_STATES))
+            yield Slab(signals, estimates, disturbance, yaw, surge, track)
+        self._findings = Findings(
+            survey=self.survey,
+            metadata=dict(self._log.metadata),
+            clock=self.clock,
+            vessel=self.vessel,
+            model_origin=self.model_origin,
+            usual=self.usual,
+            noise=self.noise,
+            residuals=tuple(of_output.result() for of_output in judging),
+            courses=observing.courses(),
+            yaw=self._yaw.result(),
+            surge=self._surge.result(),
+            track_origin=tracking.origin,
+            warnings=self._warnings,
+        )
+
+    @property
+    def findings(self) -> Findings:
+        """What the replay came to. Raises `ValueError` before its slabs were gone through."""
+        if self._findings is None:
+            raise ValueError("go through the slabs first")
+        return self._findings
+
+    def _on_clock(
+        self, step: str, *watches: Callable[[tuple[Channel, ...]], None]
+    ) -> Iterator[Signals]:
+        """The signals; each slab of the log is shown to the watches before it is placed."""
+
+        def watched() -> Iterator[tuple[Channel, ...]]:
+            for slab in self._log.slabs():
+                for watch in watches:
+                    watch(slab)
+                yield slab
+
+        self._tell(step, 0.0)
+        for signals in on_clock(watched(), self.clock):
+            yield signals
+            self._tell(step, (signals.first + len(signals)) / self.clock.count)
+
+    def _weak_form(self, model: Coefficients) -> WeakForm:
+        clock = self.clock
+        longest = {
+            name: longest_step_secs(max(clock.channels[name].usual_known_secs, clock.dt_secs))
+            for name in NEEDED
+        }
+        return WeakForm(model, clock.count, clock.dt_secs, longest)
+
+    def _observing(self) -> Observing:
+        try:
+            return Observing(self.vessel.coefficients, self.noise, self.usual)
+        except UsageError as error:  # one of the model's modes is beyond any gain
+            raise self._runs_away() from error
+
+    def _judging(self, output: int) -> Judging:
+        step = float(self.usual.interval_secs[output]) / self.clock.dt_secs
+        unit = self.survey[OUTPUTS[output]].unit
+        return Judging(OUTPUTS[output], unit, step, noise_measured=self.noise.measured[output])
+
+    def _runs_away(self) -> LogError:
+        return LogError(
+            f"the filter runs away: the model does not fit this log ({self.model_origin}); "
+            f"give the ship's own with --vessel: {self._log.name}"
+        )
 
 
-def _model(log: TrialLog, given: Vessel | None, signals: Signals) -> tuple[Vessel, str]:
+def _stated_model(log: Log, given: Vessel | None) -> tuple[Vessel, str] | None:
     if given is not None:
         return given, "given"
     if log.vessel_toml is not None:
         return parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}"), "carried by the log"
-    return fit_first_model(signals, log.name), FITTED
+    return None
 
 
-def _require_outputs(log: TrialLog, signals: Signals) -> None:
-    for name in OUTPUTS:
-        count = int(np.isfinite(signals[name]).sum())
+def _require_outputs(log: Log, usual: Gauge) -> None:
+    for name, count in zip(OUTPUTS, usual.measured, strict=True):
         if count < FEWEST:
             raise LogError(
                 f"channel {name!r} has {count} samples while the others are there too, "
@@ -113,49 +253,10 @@ def _require_outputs(log: TrialLog, signals: Signals) -> None:
             )
 
 
-def _averaged(settings: FilterSettings, log: TrialLog, dt_secs: float) -> FilterSettings:
+def _averaged(settings: FilterSettings, found: Survey, dt_secs: float) -> FilterSettings:
     """The noise stated for one sample, as it is in the mean of those that share an instant."""
     stds = []
     for name, std in zip(OUTPUTS, (settings.yaw_rate_std, settings.speed_std), strict=True):
-        together = max(1.0, dt_secs / usual_period_secs(log[name]))
+        together = max(1.0, dt_secs / found[name].usual_secs)
         stds.append(None if std is None else std / sqrt(together))
     return replace(settings, yaw_rate_std=stds[0], speed_std=stds[1])
-
-
-def _judged(log: TrialLog, estimates: Estimates, noise: Noise, output: int) -> OutputResiduals:
-    name = OUTPUTS[output]
-    return judge(
-        name,
-        log[name].unit,
-        estimates.innovations[:, output],
-        estimates.innovation_stds[:, output],
-        noise_measured=noise.measured[output],
-    )
-
-
-def _hold_inputs(log: TrialLog, signals: Signals) -> tuple[Signals, list[str]]:
-    """Rudder and revolutions at their last known value wherever they were not measured.
-
-    A filter cannot predict without them; what it predicts then is said to be a guess.
-    """
-    values, said = dict(signals.values), []
-    for name in INPUTS:
-        missing = np.isnan(values[name])
-        if missing.any():
-            last = np.maximum.accumulate(np.where(missing, 0, np.arange(len(missing))))
-            held = values[name][last]
-            if np.isnan(held[0]):  # the clock begins in the midst of a gap
-                held = np.where(np.isnan(held), _last_before(log, name, signals), held)
-            values[name] = held
-            said.append(
-                f"{name}: not measured for {missing.sum() * signals.dt_secs:.1f} s in all; "
-                "held at its last value there, so that the estimates there are guesses"
-            )
-    return replace(signals, values=values), said
-
-
-def _last_before(log: TrialLog, name: str, signals: Signals) -> float:
-    """What was known of an input when the clock began."""
-    channel = log[name]
-    earlier = np.isfinite(channel.values) & (channel.measured_ns <= signals.start_ns)
-    return float(channel.values[earlier][np.argmax(channel.measured_ns[earlier])])

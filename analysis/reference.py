@@ -11,9 +11,11 @@ from shiplog import Channel, TrialLog
 from shiplog.ship import COEFFICIENT_UNITS
 from shiplog.types import FloatArray, TimeArray
 
-from .kalman import OUTPUTS, STATES
+from .gauge import OUTPUTS
+from .identification import Identification
+from .kalman import STATES
 from .pipeline import Analysis
-from .sliding import Identification
+from .sliding import History
 
 BLOCK_SECS = 4.0
 
@@ -60,12 +62,12 @@ def make_reference(analysis: Analysis) -> TrialLog:
         *_measured(analysis),
         *_assumed(analysis),
         *_estimated(analysis),
-        *_identified(analysis, analysis.yaw),
-        *_identified(analysis, analysis.surge),
+        *_identified(analysis, analysis.yaw, analysis.yaw_history),
+        *_identified(analysis, analysis.surge, analysis.surge_history),
         *_tracked(analysis),
     ]
-    metadata = {"reference_of": analysis.log.name, "model": analysis.model_origin}
-    return TrialLog(analysis.log.name, tuple(channels), metadata)
+    metadata = {"reference_of": analysis.name, "model": analysis.model_origin}
+    return TrialLog(analysis.name, tuple(channels), metadata)
 
 
 def _measured(analysis: Analysis) -> Iterator[Channel]:
@@ -98,17 +100,13 @@ def _estimated(analysis: Analysis) -> Iterator[Channel]:
         yield _single(analysis, f"{name}_squared", "verdict", judged.normalised_squared)
         yield _single(analysis, f"{name}_expected", "verdict", judged.expected[1])
         yield _single(analysis, f"{name}_whiteness", "verdict", judged.whiteness_p)
-    for name, values, std in (
-        ("yaw_disturbance", found.yaw, found.yaw_std),
-        ("rudder_disturbance", found.rudder, found.rudder_std),
-        ("surge_disturbance", found.surge, found.surge_std),
-    ):
-        yield _blocks(analysis, name, "estimate", values)
-        yield _single(analysis, name, "std", std)
+    for kind, values in (("yaw", found.yaw), ("rudder", found.rudder), ("surge", found.surge)):
+        yield _blocks(analysis, f"{kind}_disturbance", "estimate", values)
+        yield _single(analysis, f"{kind}_disturbance", "std", analysis.courses[kind].std)
 
 
-def _identified(analysis: Analysis, found: Identification) -> Iterator[Channel]:
-    history, at = found.history, found.history.time_secs
+def _identified(analysis: Analysis, found: Identification, history: History) -> Iterator[Channel]:
+    at = history.time_secs
     for i, (name, whole) in enumerate(found.coefficients.items()):
         yield _single(analysis, name, "whole", whole.value)
         yield _single(analysis, name, "whole_std", whole.std)

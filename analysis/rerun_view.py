@@ -8,6 +8,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from hashlib import sha256
 from typing import IO
 
@@ -20,20 +22,11 @@ from shiplog.files import replacing
 from shiplog.types import FloatArray
 
 from .chart import Chart, draw_track
-from .panels import (
-    CYAN,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    Panel,
-    Series,
-    coefficient_panels,
-    decimated,
-    equation_panels,
-)
-from .pipeline import Analysis
+from .drawing import CYAN, GREEN, GREY, ORANGE, RED, Series, Sketch
+from .panels import Panel, coefficient_panels, equation_panels
+from .pipeline import Analysis, Findings, Replay, Slab
 
+ROWS_SENT = 1 << 16  # at once
 VIEWER_SECS = 20.0  # within which a viewer listens, or never will
 WHOLE_RUN = rrb.TimeAxis(
     view_range=rr.TimeRange(
@@ -50,23 +43,75 @@ A gap: not measured, or a window that cannot tell.*
 """
 
 
-def write_review(analysis: Analysis, path: str | os.PathLike[str], *, text: str) -> None:
-    """Write the review to an .rrd file; `text` is its page of words, in Markdown.
+class Review:
+    """A review that is drawn as the slabs of a replay come; made by `reviewing`."""
 
-    Raises `ShiplogError` where `path` cannot be written to, or not to the end.
+    def __init__(
+        self, replay: Replay | Analysis, recording: rr.RecordingStream, *, full: bool
+    ) -> None:
+        self._recording, self._full = recording, full
+        self._start_ns = replay.clock.start_ns
+        self._sketch = Sketch(replay.clock, replay.usual)
+
+    def add(self, slab: Slab) -> None:
+        """Draw the next slab."""
+        dense = self._sketch.add(slab)
+        if self._full:
+            for entity, series in dense.items():
+                _send_points(self._recording, entity, series, self._start_ns)
+
+    def finish(self, findings: Findings, text: str) -> None:
+        """Draw what is known at the end; `text` is the page of words, in Markdown."""
+        recording, start_ns = self._recording, self._start_ns
+        drawn = self._sketch.drawn()
+        yaw, surge = equation_panels(findings, drawn)
+        coefficients, chart = coefficient_panels(findings, drawn), draw_track(findings, drawn)
+        rr.send_blueprint(_blueprint(yaw, surge, coefficients, chart), recording=recording)
+        _send_properties(recording, findings)
+        page = rr.TextDocument(KEY + text, media_type=rr.MediaType.MARKDOWN)
+        recording.log("summary", page, static=True)
+        for panel in (*yaw, *surge, *coefficients):
+            for series in panel.series:
+                entity = f"{panel.name}/{series.name}"
+                _send_style(recording, entity, series)
+                if not (self._full and series is drawn.get(entity)):
+                    _send_points(recording, entity, series, start_ns)
+        _send_chart(recording, chart, start_ns)
+        recording.flush()
+
+
+@contextmanager
+def reviewing(
+    replay: Replay | Analysis, path: str | os.PathLike[str], *, full: bool = False
+) -> Iterator[Review]:
+    """A review that becomes the .rrd file `path` when it was finished.
+
+    Of a long trial the series are thinned to what a screen can show, with every extreme kept;
+    `full` keeps every sample. Raises `ShiplogError` where `path` cannot be written to, or not to
+    the end.
     """
     with replacing(path) as part:
-        recording = _recording(analysis)
+        recording = _recording(replay)
         try:
             recording.save(part)
-            _send(recording, analysis, text)
+            yield Review(replay, recording, full=full)
         except RuntimeError as error:  # what Rerun makes of a full disk
             raise ShiplogError(f"cannot finish the review; is the disk full? {path}") from error
-        recording.disconnect()
+        finally:
+            recording.disconnect()
 
 
-def view_review(analysis: Analysis, *, text: str) -> None:
-    """Open the review in a viewer of its own, which listens to this computer only.
+def write_review(
+    analysis: Analysis, path: str | os.PathLike[str], *, text: str, full: bool = False
+) -> None:
+    """Write the review of a whole analysis to an .rrd file; as `reviewing`."""
+    with reviewing(analysis, path, full=full) as review:
+        review.add(analysis)
+        review.finish(analysis, text)
+
+
+def view_review(path: str | os.PathLike[str]) -> None:
+    """Open a review in a viewer of its own, which listens to this computer only.
 
     The viewer stays open when the caller ends. Raises `ShiplogError` where none can start, for
     want of a screen as a rule.
@@ -74,16 +119,13 @@ def view_review(analysis: Analysis, *, text: str) -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    command = [sys.executable, "-m", "rerun_cli", "--bind", "127.0.0.1", "--port", str(port)]
+    listening = ["--bind", "127.0.0.1", "--port", str(port)]
+    command = [sys.executable, "-m", "rerun_cli", *listening, os.fspath(path)]
     with tempfile.TemporaryFile() as said:
         viewer = subprocess.Popen(  # noqa: S603 - our own interpreter
             command, stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
         )
         _await(viewer, port, said)
-        recording = _recording(analysis)
-        recording.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy")
-        _send(recording, analysis, text)
-        recording.disconnect()
 
 
 def _await(viewer: subprocess.Popen[bytes], port: int, said: IO[bytes]) -> None:
@@ -113,15 +155,17 @@ def _end(viewer: subprocess.Popen[bytes]) -> None:
     viewer.wait()
 
 
-def _recording(analysis: Analysis) -> rr.RecordingStream:
-    """A stream whose names depend on the analysis alone.
+def _recording(replay: Replay | Analysis) -> rr.RecordingStream:
+    """A stream whose names depend on the log, the model and the noise alone.
 
     Each log is an application of its own to Rerun, which shares one layout among the recordings
     of an application; the axes of another ship would be wrong for this one.
     """
-    name = analysis.log.name
-    digest = sha256(f"{name} {analysis.signals.start_ns} {analysis.vessel!r}".encode())
-    digest.update(np.ascontiguousarray(analysis.estimates.states).tobytes())
+    name, usual, noise = replay.survey.name, replay.usual, replay.noise
+    known = (name, replay.clock.start_ns, replay.clock.count, replay.vessel, usual.measured)
+    digest = sha256(repr(known).encode())
+    for array in (usual.spread, noise.measurement_std, noise.process_ratio):
+        digest.update(np.ascontiguousarray(array).tobytes())
     return rr.RecordingStream(
         re.sub(r"[^A-Za-z0-9_-]+", "-", f"shiplog {name}"),
         recording_id=digest.hexdigest()[:32],
@@ -129,48 +173,37 @@ def _recording(analysis: Analysis) -> rr.RecordingStream:
     )
 
 
-def _send(recording: rr.RecordingStream, analysis: Analysis, text: str) -> None:
-    yaw, surge = equation_panels(analysis)
-    coefficients, drawn = coefficient_panels(analysis), draw_track(analysis)
-    rr.send_blueprint(_blueprint(yaw, surge, coefficients, drawn), recording=recording)
-    _send_properties(recording, analysis)
-    page = rr.TextDocument(KEY + text, media_type=rr.MediaType.MARKDOWN)
-    recording.log("summary", page, static=True)
-    for panel in (*yaw, *surge, *coefficients):
-        for series in panel.series:
-            entity = f"{panel.name}/{series.name}"
-            _send_series(recording, entity, decimated(series), analysis.signals.start_ns)
-    _send_chart(recording, drawn, analysis.signals.start_ns)
-    recording.flush()
-
-
-def _send_properties(recording: rr.RecordingStream, analysis: Analysis) -> None:
-    recording.send_recording_name(analysis.log.name)
-    rr.send_recording_start_time_nanos(analysis.signals.start_ns, recording=recording)
+def _send_properties(recording: rr.RecordingStream, findings: Findings) -> None:
+    recording.send_recording_name(findings.name)
+    rr.send_recording_start_time_nanos(findings.clock.start_ns, recording=recording)
     trial = rr.AnyValues(
-        vessel=analysis.vessel.name,
-        model=analysis.model_origin,
-        duration_secs=analysis.log.duration_secs,
-        dt_secs=analysis.signals.dt_secs,
-        samples=len(analysis.signals),
-        warnings=list(analysis.warnings) or ["none"],
+        vessel=findings.vessel.name,
+        model=findings.model_origin,
+        duration_secs=findings.survey.duration_secs,
+        dt_secs=findings.clock.dt_secs,
+        samples=findings.clock.count,
+        warnings=list(findings.warnings) or ["none"],
     )
     recording.send_property("trial", trial)
 
 
-def _send_series(recording: rr.RecordingStream, entity: str, series: Series, start_ns: int) -> None:
-    lines = series.lines
+def _send_style(recording: rr.RecordingStream, entity: str, series: Series) -> None:
     style = rr.SeriesLines(
-        names=[line.name for line in lines],
-        colors=[line.colour for line in lines],
-        widths=[line.width for line in lines],
+        names=[line.name for line in series.lines],
+        colors=[line.colour for line in series.lines],
+        widths=[line.width for line in series.lines],
         aggregation_policy="MinMax" if series.spiky else "Average",
     )
     recording.log(entity, style, static=True)
-    values = np.column_stack([line.values for line in lines])
-    recording.send_columns(
-        entity, _times(series.time_secs, start_ns), rr.Scalars.columns(scalars=values)
-    )
+
+
+def _send_points(recording: rr.RecordingStream, entity: str, series: Series, start_ns: int) -> None:
+    """Send a series in slabs of a size that Rerun likes."""
+    values = np.column_stack([line.values for line in series.lines])
+    for start in range(0, len(values), ROWS_SENT):
+        part = slice(start, start + ROWS_SENT)
+        times = _times(series.time_secs[part], start_ns)
+        recording.send_columns(entity, times, rr.Scalars.columns(scalars=values[part]))
 
 
 def _times(time_secs: FloatArray, start_ns: int) -> list[rr.TimeColumn]:

@@ -4,9 +4,13 @@ from dataclasses import dataclass
 from math import isnan, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from shiplog.compiled import compiled
 from shiplog.types import FloatArray
+
+from .moments import Moments
 
 LAGS = 20
 FEWEST = 40  # measurements, or pairs of them at a lag, to tell anything
@@ -43,6 +47,40 @@ class OutputResiduals:
         return low <= self.normalised_squared <= high
 
 
+class Judging:
+    """Judges one output's innovations as they come.
+
+    `usual_step` is the median number of instants from one measurement to the next.
+    `noise_measured` says that the noise expected was taken from the same log, by its third
+    differences (`gauge.NoiseLevel`), so that it is itself uncertain.
+    """
+
+    def __init__(self, name: str, unit: str, usual_step: float, *, noise_measured: bool) -> None:
+        self._name, self._unit, self._noise_measured = name, unit, noise_measured
+        self._innovations, self._normalised = Moments(), Moments()
+        self._products = _Products(usual_step)
+
+    def add(self, innovations: FloatArray, innovation_stds: FloatArray) -> None:
+        """Take the next innovations, (n,) with NaN where nothing was measured."""
+        self._innovations.add(innovations)
+        self._normalised.add(innovations / innovation_stds)
+        self._products.add(innovations)
+
+    def result(self) -> OutputResiduals:
+        """The verdict on all of them."""
+        count = self._innovations.count
+        half = 2.576 * sqrt((MEASURED_NOISE if self._noise_measured else STATED_NOISE) / count)
+        return OutputResiduals(
+            self._name,
+            self._unit,
+            count,
+            sqrt(self._innovations.mean_square),
+            self._normalised.mean_square,
+            (1 - half, 1 + half),
+            self._products.whiteness(self._innovations.mean, count),
+        )
+
+
 def judge(
     name: str,
     unit: str,
@@ -51,28 +89,16 @@ def judge(
     *,
     noise_measured: bool,
 ) -> OutputResiduals:
-    """Judge one output's innovations, (n,) with NaN where nothing was measured.
-
-    `noise_measured` says that the noise expected was taken from the same log, by its third
-    differences (`kalman.noise_level`), so that it is itself uncertain.
-    """
-    seen = np.isfinite(innovations)
-    e, count = innovations[seen], int(seen.sum())
-    squared = (e / innovation_stds[seen]) ** 2
-    half = 2.576 * sqrt((MEASURED_NOISE if noise_measured else STATED_NOISE) / count)
-    return OutputResiduals(
-        name,
-        unit,
-        count,
-        float(np.sqrt(np.mean(e**2))),
-        float(np.mean(squared)),
-        (1 - half, 1 + half),
-        whiteness(innovations),
-    )
+    """Judge one output's innovations that are all there, (n,); as `Judging`."""
+    steps = np.diff(np.flatnonzero(np.isfinite(innovations)))
+    usual_step = float(np.median(steps)) if len(steps) else 1.0
+    judging = Judging(name, unit, usual_step, noise_measured=noise_measured)
+    judging.add(innovations, innovation_stds)
+    return judging.result()
 
 
-def whiteness(innovations: FloatArray, lags: int = LAGS) -> float:
-    """The p-value of a portmanteau test for autocorrelation up to `lags` measurements.
+def whiteness(innovations: FloatArray) -> float:
+    """The p-value of a portmanteau test for autocorrelation up to `LAGS` measurements.
 
     Each autocovariance is scaled by its own sampling error, sum(e_t^2 e_{t-k}^2), so that noise
     that is white but not equally strong throughout (a share of the yaw rate, say) is not called
@@ -83,14 +109,71 @@ def whiteness(innovations: FloatArray, lags: int = LAGS) -> float:
     at = np.flatnonzero(np.isfinite(innovations))
     if len(at) < FEWEST:
         return float("nan")
-    e = innovations[at] - np.mean(innovations[at])
-    usual = float(np.median(np.diff(at)))
-    statistic, used = 0.0, 0
-    for lag in range(1, lags + 1):
-        near = at[lag:] - at[:-lag] <= 1.5 * lag * usual
-        products = (e[lag:] * e[:-lag])[near]
-        spread = float(np.sum(products**2))
-        if len(products) >= FEWEST and spread > 0:
-            statistic += float(np.sum(products)) ** 2 / spread
-            used += 1
-    return float(chi2.sf(statistic, used)) if used else float("nan")
+    products = _Products(float(np.median(np.diff(at))))
+    products.add(innovations)
+    return products.whiteness(float(np.mean(innovations[at])), len(at))
+
+
+class _Products:
+    """Sums over pairs of measurements at each lag, before their mean is known.
+
+    With it, the sums of (a - m) (b - m) and of its square follow from those of ab, a + b, their
+    squares and their product.
+    """
+
+    def __init__(self, usual_step: float) -> None:
+        self._usual = usual_step
+        self._sums = np.zeros((LAGS, 6))
+        self._last, self._numbers = np.zeros(LAGS), np.zeros(LAGS, np.int64)  # ring of measurements
+        self._measured = self._count = 0
+
+    def add(self, innovations: FloatArray) -> None:
+        """Take the next innovations."""
+        self._measured = _add_products(
+            np.ascontiguousarray(innovations), self._count, self._measured, self._usual,
+            self._last, self._numbers, self._sums,
+        )  # fmt: skip
+        self._count += len(innovations)
+
+    def whiteness(self, m: float, count: int) -> float:
+        """The test's p-value for innovations of that mean; NaN if too few."""
+        if count < FEWEST:
+            return float("nan")
+        pairs, ab, a_plus_b, ab_squared, a_plus_b_squared, both = self._sums.T
+        covariance = ab - m * a_plus_b + m**2 * pairs
+        spread = (
+            ab_squared + m**2 * a_plus_b_squared + m**4 * pairs
+            - 2 * m * both + 2 * m**2 * ab - 2 * m**3 * a_plus_b
+        )  # fmt: skip
+        used = (pairs >= FEWEST) & (spread > 0)
+        statistic = float(np.sum(covariance[used] ** 2 / spread[used]))
+        return float(chi2.sf(statistic, np.count_nonzero(used))) if used.any() else float("nan")
+
+
+@compiled
+def _add_products(
+    innovations: FloatArray,
+    first: int,
+    measured: int,
+    usual: float,
+    last: FloatArray,
+    numbers: NDArray[np.int64],
+    sums: FloatArray,
+) -> int:
+    """How many were measured so far; each is paired with those in the ring before it."""
+    for k in range(len(innovations)):
+        e = innovations[k]
+        if np.isfinite(e):
+            for lag in range(1, min(measured, LAGS) + 1):
+                before = (measured - lag) % LAGS
+                if first + k - numbers[before] <= 1.5 * lag * usual:
+                    product, total = e * last[before], e + last[before]
+                    sums[lag - 1, 0] += 1
+                    sums[lag - 1, 1] += product
+                    sums[lag - 1, 2] += total
+                    sums[lag - 1, 3] += product**2
+                    sums[lag - 1, 4] += total**2
+                    sums[lag - 1, 5] += product * total
+            last[measured % LAGS], numbers[measured % LAGS] = e, first + k
+            measured += 1
+    return measured

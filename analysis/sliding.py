@@ -3,6 +3,9 @@
 Burylin's eq. (7) by least squares over a window that slides along the trial, each equation in
 its integral form (`weak_form`). Columns are scaled to unit length before anything is solved or
 any condition number is told.
+
+Rows may come in slabs, and how they are parted changes no result: `Windows` takes them once, the
+whole trial's fit twice, once for the values (`Regression`) and once for the errors (`Errors`).
 """
 
 from dataclasses import dataclass
@@ -10,31 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shiplog.compiled import compiled
-from shiplog.ship import COEFFICIENT_UNITS
 from shiplog.types import FloatArray
 
-from .weak_form import Rows, with_constant
+from .newey_west import add_runs, no_runs, variances, window_variances
+from .triangles import Solutions, solve_one
+from .two_stack import no_rows, push, rotate_all
+from .weak_form import Rows
 
 WINDOW_SECS = 200.0
 RICHEST = 400.0  # condition of a window beyond which it is blank: in a steady turn it is so
 WORST_CONDITION = 1e4  # the same of a whole trial, of which each coefficient is judged by itself:
 WORST_INFLATION = 150.0  # how much less sure than alone, for what the others can do in its place
 CORRELATED = 1 / 3  # of a bump's width: over this its curvature keeps its sign
-
-
-@dataclass(frozen=True)
-class Coefficient:
-    """One coefficient, with its standard deviation and its unit."""
-
-    value: float
-    std: float
-    unit: str
-
-    @property
-    def determined(self) -> bool:
-        """Whether the data tell at least its sign, at two standard deviations."""
-        return bool(np.isfinite(self.std) and abs(self.value) > 2 * self.std)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,42 +39,12 @@ class History:
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
-    """One equation's coefficients from the whole trial, and their history."""
-
-    coefficients: dict[str, Coefficient]
-    condition: float  # of the column-scaled regressors over the whole trial
-    history: History
-
-
-@dataclass(frozen=True, eq=False)
 class Fit:
     """Least squares over some rows."""
 
     values: FloatArray  # (p,), NaN for a column that is zero throughout, or if nothing can be told
     stds: FloatArray  # (p,)
     condition: float  # of the column-scaled regressors
-
-
-def identify(
-    rows: Rows, *, constant: bool = False, window_secs: float = WINDOW_SECS
-) -> Identification:
-    """The coefficients of one equation over the whole trial and over each window.
-
-    With `constant`, a constant is estimated beside those of the whole trial: a steady moment, or
-    the rudder's zero. A gyro's bias it takes up in part only, for that stands in w|w| and w^3 too.
-    Within one window no constant can be told from the rest. A trial shorter than the window is
-    one window.
-    """
-    whole = fit(with_constant(rows) if constant else rows)
-    return Identification(
-        {
-            name: Coefficient(float(value), float(std), COEFFICIENT_UNITS[name])
-            for name, value, std in zip(rows.names, whole.values, whole.stds, strict=False)
-        },
-        whole.condition,
-        _history(rows, window_secs),
-    )
 
 
 def fit(rows: Rows) -> Fit:
@@ -97,123 +57,149 @@ def fit(rows: Rows) -> Fit:
     rows cannot tell is NaN: where nothing moved, or where other coefficients can do what
     one does.
     """
-    values, stds, conditions = _fits(rows, len(rows.target), WORST_CONDITION)
-    return Fit(values[0], stds[0], float(conditions[0]))
+    regression = Regression(rows)
+    regression.add(rows)
+    errors = Errors(regression.solve())
+    errors.add(rows)
+    return errors.fit()
 
 
-def _history(rows: Rows, window_secs: float) -> History:
-    count = len(rows.centres_secs)
-    length = max(1, min(count, round((window_secs - rows.bump_secs) / rows.stride_secs) + 1))
-    values, stds, conditions = _fits(rows, length, RICHEST)
-    ends = rows.centres_secs[length - 1 :] + rows.bump_secs / 2
-    return History(rows.names, ends[: len(values)], values, stds, conditions)
+class Windows:
+    """The history of a trial whose rows come in slabs."""
+
+    def __init__(self, rows: Rows, count: int, window_secs: float = WINDOW_SECS) -> None:
+        """Of `count` rows in all, which are like `rows`, any of them."""
+        reach = round((window_secs - rows.bump_secs) / rows.stride_secs) + 1
+        self._length = max(1, min(count, reach))
+        self._stacks = no_rows(self._length, len(rows.names))
+        self._known: FloatArray = np.empty((0, len(rows.names) + 1))  # rows of the next windows
+
+    def step(self, rows: Rows) -> History:
+        """The windows that end in the next rows: none, before there are enough."""
+        found, tallies = push(self._stacks, rows.regressors, rows.target, rows.excitation)
+        conditions, told, enlarged = _judge(found, tallies, rows, RICHEST)
+        new, known = _known(rows)
+        ends = len(self._known) + np.cumsum(known)[len(known) - len(tallies) :]
+        held = np.concatenate((self._known, new))
+        self._known = held[len(held) - min(len(held), self._length) :].copy()
+        spans = np.column_stack((ends - tallies[:, 0].astype(np.int64), ends))
+        wanted = np.asarray(told.any(axis=0))
+        stds = enlarged * np.sqrt(
+            window_variances(
+                held.T.copy(), spans, wanted, found.values, found.inverses, rows.overlap
+            )
+        )
+        return History(
+            rows.names,
+            rows.centres_secs[len(known) - len(tallies) :] + rows.bump_secs / 2,
+            np.where(told, found.values, np.nan).T.copy(),
+            np.where(told, stds, np.nan).T.copy(),
+            conditions,
+        )
 
 
-def _fits(
-    rows: Rows, length: int, worst_condition: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Values (k, p), standard deviations (k, p) and condition (k,) of each run of rows."""
-    X, y = np.ascontiguousarray(rows.regressors), np.ascontiguousarray(rows.target)
-    count, p = max(len(y) - length + 1, 1), X.shape[1]
-    values, stds = np.full((count, p), np.nan), np.full((count, p), np.nan)
-    conditions = np.full(count, np.inf)
-    known = np.isfinite(y) & np.isfinite(X).all(axis=1)
-    excitation = np.ascontiguousarray(rows.excitation)
-    _slide(
-        X, y, excitation, rows.least_excitation, known, length, rows.overlap, worst_condition,
-        values, stds, conditions,
-    )  # fmt: skip
-    return values, stds, conditions
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What the first pass over a whole trial finds, and what the second needs of it."""
+
+    values: FloatArray  # (p,) zero for a column that is zero throughout
+    condition: float
+    told: NDArray[np.bool_]  # (p,) whether the rows can tell the value
+    inverse: FloatArray  # (p, p) of X'X
+    enlarged: float  # the errors, for the freedom taken and the few rows
+    overlap: int
 
 
-@compiled
-def _slide(
-    X: FloatArray,
-    y: FloatArray,
-    excitation: FloatArray,
-    least: float,
-    known: NDArray[np.bool_],
-    length: int,
-    overlap: int,
-    worst_condition: float,
-    values: FloatArray,
-    stds: FloatArray,
-    conditions: FloatArray,
-) -> None:
-    for k in range(len(values)):
-        rows = k + np.flatnonzero(known[k : k + length])
-        scale = np.sqrt((X[rows] ** 2).sum(axis=0))
-        kept = np.flatnonzero(scale > 0)
-        # rows overlap: what counts is how many of them could differ
-        independent = len(rows) / (overlap * CORRELATED)
-        freedom = independent - len(kept)
-        if len(kept) == 0 or freedom <= 0 or len(rows) < len(kept):
-            continue
-        if np.max(excitation[rows]) - np.min(excitation[rows]) < least:
-            continue
-        A = X[rows][:, kept] / scale[kept]
-        R, projected = _triangular(A, y[rows])
-        singular = np.linalg.svd(R)[1]
-        conditions[k] = singular[0] / singular[-1] if singular[-1] > 0 else np.inf
-        if conditions[k] > worst_condition:
-            continue
-        inverse = np.linalg.inv(R)
-        scaled = inverse @ projected
-        S = _neighbours_products(A, y[rows] - A @ scaled, overlap)
-        inverse = inverse @ inverse.T  # of A'A
-        covariance = inverse @ S @ inverse * (independent / freedom)
-        few = _few_rows(overlap / len(rows))
-        for i in range(len(kept)):
-            if inverse[i, i] <= WORST_INFLATION**2:
-                values[k, kept[i]] = scaled[i] / scale[kept[i]]
-                stds[k, kept[i]] = few * np.sqrt(covariance[i, i]) / scale[kept[i]]
+class Regression:
+    """The first pass over a whole trial whose rows come in slabs: the values."""
+
+    def __init__(self, rows: Rows) -> None:
+        """Of rows that are like `rows`, any of them."""
+        p = len(rows.names)
+        self._like = rows
+        self._factor = np.zeros((p, p + 1))
+        self._tally = np.array([0.0, np.inf, -np.inf])  # rows, least and greatest excitation
+
+    def add(self, rows: Rows) -> None:
+        """The next rows."""
+        new, known = _known(rows)
+        self._like, moved = rows, rows.excitation[known]
+        rotate_all(self._factor, new)
+        count, least, greatest = self._tally
+        self._tally = np.array(
+            [count + len(new), np.min(moved, initial=least), np.max(moved, initial=greatest)]
+        )
+
+    def solve(self, names: tuple[str, ...] | None = None) -> Solution:
+        """The values over the rows so far, as if there were no regressors but those of `names`."""
+        factor = self._factor
+        if names is not None:
+            columns = [self._like.names.index(name) for name in names]
+            factor = np.zeros((len(names), len(names) + 1))
+            rotate_all(factor, self._factor[:, [*columns, -1]].copy())
+        found = solve_one(factor)
+        conditions, told, enlarged = _judge(
+            found, self._tally[None, :], self._like, WORST_CONDITION
+        )
+        return Solution(
+            found.values[:, 0].copy(),
+            float(conditions[0]),
+            told[:, 0],
+            found.inverses[:, :, 0].copy(),
+            float(enlarged[0]),
+            self._like.overlap,
+        )
 
 
-@compiled
-def _few_rows(b: float) -> float:
+class Errors:
+    """The second pass, over the same rows in slabs: the errors."""
+
+    def __init__(self, solution: Solution) -> None:
+        self._solution = solution
+        self._runs = no_runs(solution.overlap, len(solution.values))
+        self._count = 0
+
+    def add(self, rows: Rows) -> None:
+        """The next rows."""
+        new, _ = _known(rows)
+        add_runs(self._runs, new, self._count, self._solution.values, self._solution.inverse)
+        self._count += len(new)
+
+    def fit(self) -> Fit:
+        """The values and their errors, when all rows have come twice."""
+        of = self._solution
+        stds = of.enlarged * np.sqrt(variances(self._runs, self._count))
+        return Fit(
+            np.where(of.told, of.values, np.nan), np.where(of.told, stds, np.nan), of.condition
+        )
+
+
+def _judge(
+    found: Solutions, tallies: FloatArray, rows: Rows, worst_condition: float
+) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
+    """Conditions (k,), inf where none counts; what is told (p, k); what enlarges errors (k,)."""
+    known, moved = tallies[:, 0], tallies[:, 2] - tallies[:, 1]
+    kept = np.count_nonzero(found.inflations > 0, axis=0)
+    # rows overlap: what counts is how many of them could differ
+    independent = known / (rows.overlap * CORRELATED)
+    freedom = independent - kept
+    tells = (kept > 0) & (freedom > 0) & (known >= kept) & (moved >= rows.least_excitation)
+    conditions = np.where(tells, found.conditions, np.inf)
+    sure = (found.inflations > 0) & (found.inflations <= WORST_INFLATION)
+    enlarged = np.full(len(known), np.nan)
+    few = _few_rows(rows.overlap / known[tells])
+    enlarged[tells] = few * np.sqrt(independent[tells] / freedom[tells])
+    return conditions, sure & (conditions <= worst_condition), enlarged
+
+
+def _few_rows(b: FloatArray) -> FloatArray:
     """The 95 % point of Kiefer and Vogelsang over the Gaussian's, b the overlap over the rows."""
-    b = min(b, 1.0)
-    return (1.96 + 2.9694 * b + 0.4160 * b**2 - 0.5324 * b**3) / 1.96
+    b = np.minimum(b, 1.0)
+    return np.asarray((1.96 + b * (2.9694 + b * (0.4160 - b * 0.5324))) / 1.96)
 
 
-@compiled
-def _triangular(A: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """R of A = Q R, and Q'y, by Householder's reflections."""
-    m, p = A.shape
-    W = np.column_stack((A, y))
-    for j in range(p):
-        norm = np.sqrt((W[j:, j] ** 2).sum())
-        if norm == 0:
-            continue
-        pivot = -norm if W[j, j] > 0 else norm
-        W[j, j] -= pivot
-        for k in range(j + 1, p + 1):
-            along = 0.0
-            for i in range(j, m):
-                along += W[i, j] * W[i, k]
-            along /= pivot * W[j, j]
-            for i in range(j, m):
-                W[i, k] += along * W[i, j]
-        W[j, j] = pivot
-    return np.triu(W[:p, :p]), W[:p, p].copy()
-
-
-@compiled
-def _neighbours_products(A: FloatArray, residual: FloatArray, overlap: int) -> FloatArray:
-    """Newey and West's sum of autocovariances of the scores under Bartlett's weights, (p, p).
-
-    It is the sum of the products of the scores' sums over every run of `overlap` rows, those
-    reaching over the ends too, over `overlap`.
-    """
-    n, p = A.shape
-    run, products = np.zeros(p), np.zeros((p, p))
-    for end in range(n + overlap - 1):
-        for i in range(p):
-            if end < n:
-                run[i] += A[end, i] * residual[end]
-            if end >= overlap:
-                run[i] -= A[end - overlap, i] * residual[end - overlap]
-        for i in range(p):
-            for j in range(p):
-                products[i, j] += run[i] * run[j]
-    return products / overlap
+def _known(rows: Rows) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """[X y] of the rows that are known, and which they are."""
+    every = np.column_stack((rows.regressors, rows.target))
+    known = np.isfinite(every).all(axis=1)
+    return every[known], known

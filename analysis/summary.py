@@ -8,69 +8,67 @@ from typing import Any
 
 import numpy as np
 
-from shiplog import Channel, __version__
-from shiplog.clock import gaps, usual_period_secs
+from shiplog import __version__
 from shiplog.ship import COEFFICIENT_UNITS
-from shiplog.types import FloatArray
+from shiplog.survey import ChannelSurvey
 from shiplog.units import CATALOGUE, factor
 
-from .pipeline import FITTED, Analysis
+from .disturbance import Course
+from .identification import Identification
+from .pipeline import FITTED, Findings
 from .residuals import OutputResiduals
-from .sliding import Identification
 
 Summary = dict[str, Any]
 
 
-def summarise(analysis: Analysis) -> Summary:
+def summarise(findings: Findings) -> Summary:
     """The summary as plain numbers in SI, ready for JSON; what is not a number is None."""
-    log = analysis.log
-    start_ns, _ = log.span_ns
+    survey, clock = findings.survey, findings.clock
+    start_ns, _ = survey.span_ns
     summary = {
         "shiplog": __version__,
         "log": {
-            "name": log.name,
+            "name": findings.name,
             "start": datetime.fromtimestamp(start_ns * 1e-9, UTC).isoformat(),
-            "duration_secs": log.duration_secs,
-            "dt_secs": analysis.signals.dt_secs,
-            "samples": len(analysis.signals),
-            "provenance": dict(log.metadata),
-            "channels": {channel.topic: _channel(channel) for channel in log},
+            "duration_secs": survey.duration_secs,
+            "dt_secs": clock.dt_secs,
+            "samples": clock.count,
+            "provenance": findings.metadata,
+            "channels": {channel.topic: _channel(channel) for channel in survey},
         },
         "model": {
-            "name": analysis.vessel.name,
-            "origin": analysis.model_origin,
+            "name": findings.vessel.name,
+            "origin": findings.model_origin,
             "coefficients": {
                 name: {"value": value, "unit": COEFFICIENT_UNITS[name]}
-                for name, value in analysis.vessel.coefficients._asdict().items()
+                for name, value in findings.vessel.coefficients._asdict().items()
             },
         },
         "filter": {
-            residuals.name: _residuals(analysis, i)
-            for i, residuals in enumerate(analysis.residuals)
+            residuals.name: _residuals(findings, i)
+            for i, residuals in enumerate(findings.residuals)
         },
-        "disturbance": _disturbance(analysis),
-        "coefficients": _coefficients(analysis.yaw) | _coefficients(analysis.surge),
-        "windows": {"yaw": _windows(analysis.yaw), "surge": _windows(analysis.surge)},
-        "track": analysis.track.origin,
-        "warnings": list(analysis.warnings),
+        "disturbance": _disturbance(findings),
+        "coefficients": _coefficients(findings.yaw) | _coefficients(findings.surge),
+        "windows": {"yaw": _windows(findings.yaw), "surge": _windows(findings.surge)},
+        "track": findings.track_origin,
+        "warnings": list(findings.warnings),
     }
     return _without_nan(summary)  # type: ignore[no-any-return]
 
 
-def _channel(channel: Channel) -> Summary:
-    period = usual_period_secs(channel)
-    silences = gaps(channel)
+def _channel(channel: ChannelSurvey) -> Summary:
     return {
         "unit": channel.unit,
-        "samples": len(channel),
-        "rate_hz": 1 / period if period else None,
-        "gaps": len(silences),
-        "longest_gap_secs": max((length for _, length in silences), default=0.0),
+        "samples": channel.samples,
+        "rate_hz": 1 / channel.usual_secs if channel.usual_secs else None,
+        "gaps": len(channel.gaps),
+        "longest_gap_secs": max((length for _, length in channel.gaps), default=0.0),
     }
 
 
-def _residuals(analysis: Analysis, output: int) -> Summary:
-    residuals = analysis.residuals[output]
+def _residuals(findings: Findings, output: int) -> Summary:
+    residuals, noise = findings.residuals[output], findings.noise
     return {
         "unit": residuals.unit,
         "innovations": residuals.count,
@@ -79,45 +77,28 @@ def _residuals(analysis: Analysis, output: int) -> Summary:
         "expected": list(residuals.expected),
         "whiteness_p": residuals.whiteness_p,
         "white": residuals.white,
-        "measurement_std": float(analysis.noise.measurement_std[output]),
-        "measurement_std_origin": "the log"
-        if analysis.noise.measured[output]
-        else "the vessel file",
-        "process_ratio": float(analysis.noise.process_ratio[output]),
-        "process_ratio_origin": (
-            "likeliest for the log" if analysis.noise.tuned else "the vessel file"
-        ),
+        "measurement_std": float(noise.measurement_std[output]),
+        "measurement_std_origin": "the log" if noise.measured[output] else "the vessel file",
+        "process_ratio": float(noise.process_ratio[output]),
+        "process_ratio_origin": "likeliest for the log" if noise.tuned else "the vessel file",
     }
 
 
-def _disturbance(analysis: Analysis) -> Summary:
-    found, dt = analysis.disturbance, analysis.signals.dt_secs
-    yaw, surge = found.yaw_settling_secs, found.surge_settling_secs
-    return {
-        "yaw": _course(found.yaw, found.yaw_std, "rad/s³", yaw, dt),
-        "yaw_as_rudder": _course(found.rudder, found.rudder_std, "rad", yaw, dt),
-        "surge": _course(found.surge, found.surge_std, "m/s²", surge, dt),
-    }
+def _disturbance(findings: Findings) -> Summary:
+    names = {"yaw": "yaw", "yaw_as_rudder": "rudder", "surge": "surge"}
+    return {key: _course(findings.courses[name]) for key, name in names.items()}
 
 
-def _course(values: FloatArray, std: float, unit: str, settling_secs: float, dt: float) -> Summary:
-    """A disturbance over the trial, its first transient left out; `last` is a mean at the end."""
-    settling = int(settling_secs / dt)
-    values = np.where(np.isfinite(values), values, np.nan)
-    settled = values[settling:] if len(values) > 2 * settling else values
-    if np.isnan(settled).all():
-        return dict.fromkeys(("mean", "rms", "lowest", "highest", "last")) | {
-            "sensor_noise_std": std, "settling_secs": settling_secs, "unit": unit
-        }  # fmt: skip
+def _course(course: Course) -> Summary:
     return {
-        "mean": float(np.nanmean(settled)),
-        "rms": float(np.sqrt(np.nanmean(settled**2))),
-        "lowest": float(np.nanmin(settled)),
-        "highest": float(np.nanmax(settled)),
-        "last": float(np.nanmean(values[-max(settling, 1) :])),
-        "sensor_noise_std": std,
-        "settling_secs": settling_secs,
-        "unit": unit,
+        "mean": course.mean,
+        "rms": course.rms,
+        "lowest": course.lowest,
+        "highest": course.highest,
+        "last": course.last,
+        "sensor_noise_std": course.std,
+        "settling_secs": course.settling_secs,
+        "unit": course.unit,
     }
 
 
@@ -136,15 +117,15 @@ def _coefficients(found: Identification) -> Summary:
 
 def _windows(found: Identification) -> Summary:
     """How well the sliding windows could tell: their condition numbers, and how many are blank."""
-    conditions = found.history.conditions
+    conditions = found.window_conditions
     known = conditions[np.isfinite(conditions)]
     return {
         "count": len(conditions),
-        "blank": int(np.isnan(found.history.values).all(axis=1).sum()),
+        "blank": found.blank_windows,
         "condition_median": float(np.median(known)) if len(known) else None,
         "condition_worst": float(np.max(known)) if len(known) else None,
         "conditions": conditions.tolist(),
-        "time_secs": found.history.time_secs.tolist(),
+        "time_secs": found.window_ends_secs.tolist(),
     }
 
 
@@ -166,25 +147,25 @@ class Section:
     remarks: tuple[str, ...] = ()
 
 
-def sections(analysis: Analysis) -> tuple[Section, ...]:
+def sections(findings: Findings) -> tuple[Section, ...]:
     """The summary as tables, in the units people use, and its verdicts in words."""
     return (
-        _log_section(analysis),
-        _filter_section(analysis),
-        _disturbance_section(analysis),
-        _coefficient_section(analysis),
+        _log_section(findings),
+        _filter_section(findings),
+        _disturbance_section(findings),
+        _coefficient_section(findings),
     )
 
 
-def markdown(analysis: Analysis) -> str:
+def markdown(findings: Findings) -> str:
     """The summary as a page of text."""
-    blocks = [f"# {analysis.log.name}"]
-    log, *found = sections(analysis)
+    blocks = [f"# {findings.name}"]
+    log, *found = sections(findings)
     for section in (*found, log):  # what was found first: a page is read from its top
         blocks += [f"## {section.title}", _markdown_table(section.columns, section.rows)]
         blocks += [f"*{remark}*" for remark in section.remarks]
-    if analysis.warnings:
-        blocks += ["## Warnings", "\n".join(f"- {warning}" for warning in analysis.warnings)]
+    if findings.warnings:
+        blocks += ["## Warnings", "\n".join(f"- {warning}" for warning in findings.warnings)]
     return "\n\n".join(blocks) + "\n"
 
 
@@ -194,25 +175,25 @@ def _markdown_table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> st
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def _log_section(analysis: Analysis) -> Section:
-    log, rows = analysis.log, []
-    for channel in log:
+def _log_section(findings: Findings) -> Section:
+    survey, rows = findings.survey, []
+    for channel in survey:
         said = _channel(channel)
         rate = f"{said['rate_hz']:.3g} Hz" if said["rate_hz"] else ""
         gaps_said = "none"
         if said["gaps"]:
             gaps_said = f"{said['gaps']}, the longest {said['longest_gap_secs']:.1f} s"
-        rows.append((channel.topic, f"{len(channel)}", rate, gaps_said))
-    start = np.datetime64(log.span_ns[0], "ns").astype("M8[s]")
-    title = f"Log, {log.duration_secs:.0f} s from {start} UTC"
+        rows.append((channel.topic, f"{channel.samples}", rate, gaps_said))
+    start = np.datetime64(survey.span_ns[0], "ns").astype("M8[s]")
+    title = f"Log, {survey.duration_secs:.0f} s from {start} UTC"
     return Section(title, ("channel", "samples", "rate", "gaps"), tuple(rows))
 
 
-def _filter_section(analysis: Analysis) -> Section:
-    fitted = analysis.model_origin == FITTED
-    model = FITTED if fitted else f"{analysis.vessel.name} ({analysis.model_origin})"
+def _filter_section(findings: Findings) -> Section:
+    fitted = findings.model_origin == FITTED
+    model = FITTED if fitted else f"{findings.vessel.name} ({findings.model_origin})"
     rows, remarks = [], [f"Model: {model}."]
-    for residuals in analysis.residuals:
+    for residuals in findings.residuals:
         unit = CATALOGUE[residuals.name].display_unit
         rms = residuals.rms * factor(residuals.unit, unit)
         rows.append(
@@ -243,18 +224,17 @@ def _verdict(residuals: OutputResiduals) -> str:
     )
 
 
-def _disturbance_section(analysis: Analysis) -> Section:
-    found = _disturbance(analysis)
+def _disturbance_section(findings: Findings) -> Section:
     rows = []
-    for label, key, scale, unit in (
-        ("yaw, as rudder", "yaw_as_rudder", degrees(1), "deg"),
+    for label, name, scale, unit in (
+        ("yaw, as rudder", "rudder", degrees(1), "deg"),
         ("yaw", "yaw", degrees(1) * 1e3, "0.001 deg/s³"),
         ("surge", "surge", 1e3, "mm/s²"),
     ):
-        course = found[key]
-        values = [course[k] for k in ("mean", "rms", "last", "sensor_noise_std")]
+        course = findings.courses[name]
+        values = (course.mean, course.rms, course.last, course.std)
         rows.append(
-            (f"{label} [{unit}]", *("" if v is None else f"{v * scale:.3g}" for v in values))
+            (f"{label} [{unit}]", *(f"{v * scale:.3g}" if isfinite(v) else "" for v in values))
         )
     columns = ("disturbance", "mean", "rms", "at the end", "std by noise")
     caution = (
@@ -262,24 +242,24 @@ def _disturbance_section(analysis: Analysis) -> Section:
         "The std is by sensor noise alone; an error of the model counts as a disturbance."
     )
     remarks = [caution]
-    if analysis.model_origin == FITTED:
+    if findings.model_origin == FITTED:
         remarks.append("The model was fitted to this log: this is what it leaves unexplained.")
     return Section("Disturbance observed", columns, tuple(rows), tuple(remarks))
 
 
-def _coefficient_section(analysis: Analysis) -> Section:
-    model, rows = analysis.vessel.coefficients._asdict(), []
-    for found in (analysis.yaw, analysis.surge):
+def _coefficient_section(findings: Findings) -> Section:
+    model, rows = findings.vessel.coefficients._asdict(), []
+    for found in (findings.yaw, findings.surge):
         for name, coefficient in found.coefficients.items():
             value, std = f"{coefficient.value:.4g}", f"{coefficient.std:.2g}"
             if not coefficient.determined:
                 value, std = "not determined", f"{coefficient.std:.2g}" if std != "nan" else ""
             rows.append((name, value, std, coefficient.unit, f"{model[name]:.4g}"))
-    if analysis.model_origin == FITTED:  # beside itself it would only seem confirmed
+    if findings.model_origin == FITTED:  # beside itself it would only seem confirmed
         rows = [(*row[:-1], "") for row in rows]
     remark = (
-        f"Condition of the scaled regressors: yaw {analysis.yaw.condition:.0f}, "
-        f"surge {analysis.surge.condition:.0f}. "
+        f"Condition of the scaled regressors: yaw {findings.yaw.condition:.0f}, "
+        f"surge {findings.surge.condition:.0f}. "
         "Not determined: the log cannot tell it from the others, or not even its sign. "
         "Two standard deviations are about a 95 % interval, less where a few seconds tell all. "
         "A gyro's bias goes into b1, b2, b3 and e."

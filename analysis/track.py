@@ -4,9 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog import Channel, TrialLog
+from shiplog import Channel
+from shiplog.clock import Clock
 from shiplog.schema import GEOGRAPHIC
+from shiplog.survey import ChannelSurvey
 from shiplog.types import FloatArray, Signals
+
+from .stacking import stacked
 
 EARTH_RADIUS = 6_371_008.8  # m, mean
 
@@ -18,35 +22,101 @@ class Track:
     time_secs: FloatArray  # (k,) since the signals' start
     north: FloatArray  # (k,)
     east: FloatArray  # (k,)
-    origin: str  # how it is known, in words
 
 
-def find_track(log: TrialLog, signals: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
-    """The positions recorded, or else dead reckoning from heading and speed ahead.
+NOWHERE = Track(np.zeros(0), np.zeros(0), np.zeros(0))
 
-    `yaw_rate` and `speed` are the filter's, (n,) on the signals' clock; where there is no heading
-    the yaw rate is integrated.
+
+class Tracking:
+    """Follows the ship in slabs: the positions recorded, or else dead reckoning.
+
+    The latter is from heading and speed ahead; where there is no heading the yaw rate is
+    integrated, which also bridges where the compass was silent.
     """
-    position = log.get("position")
-    if position is not None and np.isfinite(position.values).all(axis=1).sum() > 1:
-        return _recorded(position, signals)
-    heading = np.cumsum(yaw_rate) * signals.dt_secs
-    origin = "dead reckoning from yaw rate and speed ahead"
-    known = np.isfinite(signals["heading"]) if "heading" in signals else np.zeros(0, bool)
-    if known.any():  # the yaw rate bridges where the compass was silent
-        at = np.arange(len(signals))
-        heading = heading + np.interp(at, at[known], (signals["heading"] - heading)[known])
-        origin = "dead reckoning from heading and speed ahead"
-    north = np.cumsum(speed * np.cos(heading)) * signals.dt_secs
-    east = np.cumsum(speed * np.sin(heading)) * signals.dt_secs
-    return Track(signals.time_secs, north - north[0], east - east[0], origin)
+
+    def __init__(self, clock: Clock, position: ChannelSurvey | None) -> None:
+        self._recorded = position if position is not None and position.known > 1 else None
+        self._start_ns, self._reckoning = clock.start_ns, _Reckoning(clock)
+        self._fixes: list[Track] = []  # since the last step
+        self._datum: FloatArray | None = None  # the first position
+
+    @property
+    def origin(self) -> str:
+        """How the track is known, in words, once it all is."""
+        if self._recorded:
+            return "positions recorded"
+        heading = "heading" if self._reckoning.by_compass else "yaw rate"
+        return f"dead reckoning from {heading} and speed ahead"
+
+    def watch(self, slab: tuple[Channel, ...]) -> None:
+        """Look at the samples themselves for the positions recorded."""
+        channel = self._recorded.of(slab) if self._recorded else None
+        if channel is None:
+            return
+        known = np.isfinite(channel.values).all(axis=1)
+        if known.any():
+            at = (channel.measured_ns[known] - self._start_ns) * 1e-9
+            north, east = self._in_metres(channel, channel.values[known, :2]).T
+            self._fixes.append(Track(at, north, east))
+
+    def step(self, slab: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
+        """The track as far as it is known by now; the filter's rates on the slab, (n,)."""
+        if not self._recorded:
+            return self._reckoning.step(slab, yaw_rate, speed)
+        fixes, self._fixes = self._fixes, []
+        return stacked([NOWHERE, *fixes])
+
+    def _in_metres(self, channel: Channel, positions: FloatArray) -> FloatArray:
+        """North and east of the first position, (n, 2)."""
+        if self._datum is None:
+            self._datum = positions[0]
+        if channel.fields != GEOGRAPHIC:
+            return positions - self._datum
+        per_radian = np.array([EARTH_RADIUS, EARTH_RADIUS * np.cos(np.radians(self._datum[0]))])
+        return np.asarray(np.radians(positions) * per_radian - np.radians(self._datum) * per_radian)
 
 
-def _recorded(position: Channel, signals: Signals) -> Track:
-    known = np.isfinite(position.values).all(axis=1)
-    first, second = position.values[known, 0], position.values[known, 1]
-    if position.fields == GEOGRAPHIC:
-        second = np.radians(second) * EARTH_RADIUS * np.cos(np.radians(first[0]))
-        first = np.radians(first) * EARTH_RADIUS
-    at = (position.measured_ns[known] - signals.start_ns) * 1e-9
-    return Track(at, first - first[0], second - second[0], "positions recorded")
+class _Reckoning:
+    """Dead reckoning in slabs; what follows the last heading known waits for the next."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock, self._compass = clock, "heading" in clock.channels
+        self._waiting = np.zeros((0, 2))  # rows of how far she turned and of her speed
+        self._reckoned = 0  # instants
+        self._turned, self._made_good = 0.0, np.zeros(2)  # running sums of rates and of speeds
+        self._off = np.zeros((0, 2))  # rows of instant, heading less what was turned until then
+        self._start: FloatArray | None = None
+
+    @property
+    def by_compass(self) -> bool:
+        """Whether there was a heading."""
+        return len(self._off) > 0
+
+    def step(self, slab: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
+        """The track as far as the heading is known by now."""
+        dt, end = slab.dt_secs, slab.first + len(slab)
+        sums = np.cumsum(np.concatenate(([self._turned], yaw_rate)))[1:]
+        self._turned, turned = float(sums[-1]), sums * dt
+        self._waiting = np.concatenate((self._waiting, np.column_stack((turned, speed))))
+        if self._compass:
+            known = np.flatnonzero(np.isfinite(slab["heading"]))
+            off = np.column_stack((known + slab.first, slab["heading"][known] - turned[known]))
+            self._off = np.concatenate((self._off, off))
+        until = end if end == self._clock.count or not self._compass else self._known_until()
+        at = np.arange(self._reckoned, until)
+        turned, speed = self._waiting[: len(at)].T
+        self._waiting, self._reckoned = self._waiting[len(at) :], until
+        heading = turned + np.interp(at, *self._off.T) if len(self._off) else turned
+        self._off = self._off[-1:]
+        steps = np.column_stack((speed * np.cos(heading), speed * np.sin(heading)))
+        made_good = np.cumsum(np.vstack((self._made_good, steps)), axis=0)[1:]
+        if not len(at):
+            return NOWHERE
+        self._made_good = made_good[-1]
+        positions = made_good * dt
+        self._start = positions[0] if self._start is None else self._start
+        north, east = (positions - self._start).T
+        return Track(at * dt, north, east)
+
+    def _known_until(self) -> int:
+        return int(self._off[-1, 0]) + 1 if len(self._off) else 0

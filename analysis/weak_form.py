@@ -12,15 +12,17 @@ integrated by parts: the derivatives go over to phi,
 and only what was measured remains. One bump gives one row of a linear regression.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import upfirdn
 
-from shiplog.clock import longest_step_secs, usual_interval_secs
-from shiplog.ship import Coefficients, rudder_effects
+from shiplog.compiled import compiled
+from shiplog.ship import SURGE_COEFFICIENTS, YAW_COEFFICIENTS, Coefficients, rudder_effects
+from shiplog.survey import longest_step_secs
 from shiplog.types import FloatArray, Signals
 
+NAMES = ("yaw_rate", "speed", "rudder", "rpm")
 BUMP_SECS = 60.0  # long against the noise, short against the ship's turning
 STRIDE_SECS = 1.0
 LEAST_RUDDER = np.radians(2.0)  # a rudder that moves less tells nothing of yaw,
@@ -46,50 +48,135 @@ class Rows:
         """How many rows on either side share a bump's data."""
         return max(1, int(self.bump_secs / self.stride_secs))
 
+    def part(self, start: int, stop: int) -> "Rows":
+        """The rows from `start` to before `stop`."""
+        cut = slice(start, stop)
+        return replace(
+            self,
+            centres_secs=self.centres_secs[cut],
+            target=self.target[cut],
+            regressors=self.regressors[cut],
+            excitation=self.excitation[cut],
+        )
+
 
 def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
-    """The rows of the yaw and of the surge equation; of `model` only the alphas are used.
+    """The rows of the yaw and of the surge equation of signals that are all there.
 
-    `signals` must have NaN in `rudder` and `rpm` too where they were not measured.
+    Of `model` only the alphas are used. `signals` must have NaN in `rudder` and `rpm` too where
+    they were not measured.
     """
     dt = signals.dt_secs
-    w, v, delta, n = (
-        _bridged(signals[name], dt) for name in ("yaw_rate", "speed", "rudder", "rpm")
-    )
-    ks = rudder_effects(model, v, n)
-    delta_dot = np.gradient(delta, dt)
-    half = max(2, round(min(BUMP_SECS, len(signals) * dt / 5) / dt / 2))
-    stride = max(1, round(STRIDE_SECS / dt))
-    bump, slope, curvature = _bump(half, dt)
+    intervals = (np.diff(np.flatnonzero(np.isfinite(signals[name]))) for name in NAMES)
+    usual = (float(np.median(steps)) * dt if len(steps) else dt for steps in intervals)
+    longest = {n: longest_step_secs(secs) for n, secs in zip(NAMES, usual, strict=True)}
+    fastest = float(np.nanmax(np.abs(signals["speed"])))
+    return WeakForm(model, len(signals), dt, longest).step(signals, fastest)
 
-    def integral(values: FloatArray, weight: FloatArray) -> FloatArray:
-        return _strided(values, weight * dt, stride)
 
-    yaw = (
-        ("a", -integral(w, slope)),
-        ("b1", integral(w, bump)),
-        ("b2", integral(w * np.abs(w), bump)),
-        ("b3", integral(w**3, bump)),
-        ("d", integral(ks * delta, bump)),
-        ("e", integral(ks * delta_dot, bump)),
-    )
-    surge = (
-        ("f", integral(w**2, bump)),
-        ("g", integral(v**2, bump)),
-        ("h", integral(n, bump)),
-    )
-    rows = []
-    for columns, target, moved, least in (
-        (yaw, integral(w, curvature), integral(delta, bump), LEAST_RUDDER),
-        (surge, -integral(v, slope), integral(v, bump), LEAST_SPEED * float(np.nanmax(np.abs(v)))),
-    ):
-        names, values = zip(*columns, strict=True)
-        centres = (half + stride * np.arange(len(target))) * dt
-        regressors = np.column_stack(values)
-        rows.append(
-            Rows(names, centres, target, regressors, stride * dt, 2 * half * dt, moved, least)
+class WeakForm:
+    """Makes rows of signals that come in slabs, `count` instants in all.
+
+    `longest_secs` is how far apart two samples of a channel may stand without a gap.
+    """
+
+    def __init__(
+        self, model: Coefficients, count: int, dt: float, longest_secs: Mapping[str, float]
+    ) -> None:
+        self._model, self._count, self._dt = model, count, dt
+        self._longest = {name: longest_secs[name] / dt for name in NAMES}
+        self._reach = int(max(self._longest.values())) + 2  # over which a sample has influence
+        self._half = max(2, round(min(BUMP_SECS, count * dt / 5) / dt / 2))
+        self._stride = max(1, round(STRIDE_SECS / dt))
+        self._bump = _bump(self._half, dt)
+        self._row, self._first = 0, 0  # the next row, and the first sample that is kept for it
+        self._kept = {name: np.zeros(0) for name in NAMES}
+
+    @property
+    def rows(self) -> int:
+        """How many rows there will be in all."""
+        return max(0, (self._count - self._width) // self._stride + 1)
+
+    def step(self, slab: Signals, fastest: float) -> tuple[Rows, Rows]:
+        """The rows of yaw and of surge that the next slab makes possible.
+
+        `fastest` is the greatest speed of the trial, m/s.
+        """
+        self._kept = {n: np.concatenate((kept, slab[n])) for n, kept in self._kept.items()}
+        end = self._first + len(self._kept["speed"])
+        settled = end if end == self._count else end - self._reach
+        until = max(self._row, (settled - self._width) // self._stride + 1)
+        first = self._row
+        sums = self._integrals(first * self._stride - self._first, until - first)
+        self._row = until
+        drop = max(until * self._stride - self._reach - self._first, 0)
+        self._kept = {name: kept[drop:] for name, kept in self._kept.items()}
+        self._first += drop
+        centres = (self._half + self._stride * np.arange(first, until)) * self._dt
+        common = (centres, self._stride * self._dt, 2 * self._half * self._dt)
+        return (
+            _as_rows(YAW_COEFFICIENTS, sums[:, :8], LEAST_RUDDER, *common),
+            _as_rows(SURGE_COEFFICIENTS, sums[:, 8:], LEAST_SPEED * fastest, *common),
         )
-    return rows[0], rows[1]
+
+    @property
+    def _width(self) -> int:
+        return 2 * self._half + 1
+
+    def _integrals(self, start: int, count: int) -> FloatArray:
+        """The integrals of `_integrated` over `count` bumps, the first from sample `start` on."""
+        if not count:
+            return np.zeros((0, 13))
+        w, v, delta, n = (_bridged(self._kept[name], self._longest[name]) for name in NAMES)
+        delta_dot = np.gradient(delta, self._dt)
+        needed = slice(start, start + (count - 1) * self._stride + self._width)
+        w, v, delta, delta_dot, n = (x[needed] for x in (w, v, delta, delta_dot, n))
+        ks = rudder_effects(self._model, v, n)
+        return _integrated(
+            w, v, delta, n, ks * delta, ks * delta_dot, *self._bump, self._stride, count
+        )
+
+
+@compiled
+def _integrated(
+    w: FloatArray,
+    v: FloatArray,
+    delta: FloatArray,
+    n: FloatArray,
+    steering: FloatArray,
+    steering_rate: FloatArray,
+    phi: FloatArray,
+    slope: FloatArray,
+    curvature: FloatArray,
+    stride: int,
+    count: int,
+) -> FloatArray:
+    """The two equations' integrals over each bump, (count, 13): targets, excitation, regressors.
+
+    NaN where anything integrated is.
+    """
+    rows = np.empty((count, 13))
+    for k in range(count):
+        yaw = yaw_moved = a = b1 = b2 = b3 = d = e = 0.0
+        surge = surge_moved = f = g = h = 0.0
+        for j in range(len(phi)):
+            i = stride * k + j
+            square = w[i] * w[i]
+            yaw += curvature[j] * w[i]
+            yaw_moved += phi[j] * delta[i]
+            a -= slope[j] * w[i]
+            b1 += phi[j] * w[i]
+            b2 += phi[j] * (w[i] * abs(w[i]))
+            b3 += phi[j] * (square * w[i])
+            d += phi[j] * steering[i]
+            e += phi[j] * steering_rate[i]
+            surge -= slope[j] * v[i]
+            surge_moved += phi[j] * v[i]
+            f += phi[j] * square
+            g += phi[j] * (v[i] * v[i])
+            h += phi[j] * n[i]
+        rows[k] = (yaw, yaw_moved, a, b1, b2, b3, d, e, surge, surge_moved, f, g, h)
+    return rows
 
 
 def with_constant(rows: Rows) -> Rows:
@@ -100,44 +187,49 @@ def with_constant(rows: Rows) -> Rows:
     )
 
 
+def _as_rows(
+    names: tuple[str, ...],
+    integrals: FloatArray,
+    least: float,
+    centres_secs: FloatArray,
+    stride_secs: float,
+    bump_secs: float,
+) -> Rows:
+    """Rows of one equation's integrals: target, excitation, regressors."""
+    return Rows(
+        names=names,
+        centres_secs=centres_secs,
+        target=integrals[:, 0],
+        regressors=integrals[:, 2:],
+        stride_secs=stride_secs,
+        bump_secs=bump_secs,
+        excitation=integrals[:, 1],
+        least_excitation=least,
+    )
+
+
 def _bump(half: int, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """phi, phi' and phi'' on 2 half + 1 samples, of unit area."""
+    """phi, phi' and phi'' on 2 half + 1 samples, of unit area; times dt, to sum as an integral."""
     s = np.arange(-half, half + 1) / half
     width = half * dt
     p, base = BUMP_POWER, 1 - s**2
     phi = base**p
     first = -2 * p * s * base ** (p - 1) / width
     second = (-2 * p * base ** (p - 1) + 4 * p * (p - 1) * s**2 * base ** (p - 2)) / width**2
-    area = np.sum(phi) * dt
-    return phi / area, first / area, second / area
+    per_area = 1 / np.sum(phi)
+    return phi * per_area, first * per_area, second * per_area
 
 
-def _strided(values: FloatArray, weight: FloatArray, stride: int) -> FloatArray:
-    """sum_j weight[j] values[k + j] at every `stride`-th k, NaN where any of them is."""
-    known = np.isfinite(values)
-    count = max(0, (len(values) - len(weight)) // stride + 1)
-    start = len(weight) - 1  # of what does not reach beyond the ends
+def _bridged(values: FloatArray, longest: float) -> FloatArray:
+    """The signal with the instants between a sensor's samples filled in, its gaps left open.
 
-    def filtered(x: FloatArray, h: FloatArray) -> FloatArray:
-        lead = -start % stride  # so that a multiple of the stride falls on `start`
-        padded = np.concatenate((np.zeros(lead), x))
-        out = np.asarray(upfirdn(h[::-1], padded, down=stride))
-        first = (start + lead) // stride
-        return out[first : first + count]
-
-    sums = filtered(np.where(known, values, 0.0), weight)
-    if known.all():
-        return sums
-    missing = filtered(1.0 - known, np.ones(len(weight)))
-    return np.where(missing > 0.5, np.nan, sums)
-
-
-def _bridged(values: FloatArray, dt: float) -> FloatArray:
-    """The signal with the instants between a sensor's samples filled in, its gaps left open."""
+    A gap is more than `longest` instants from sample to sample.
+    """
     at = np.flatnonzero(np.isfinite(values))
+    if len(at) == len(values):
+        return values
     if len(at) < 2:
         return np.full(len(values), np.nan)
-    longest = longest_step_secs(usual_interval_secs(values, dt)) / dt
     filled = np.interp(np.arange(len(values)), at, values[at])
     for i in np.flatnonzero(np.diff(at) > longest):
         filled[at[i] + 1 : at[i + 1]] = np.nan

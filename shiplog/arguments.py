@@ -101,6 +101,9 @@ def _add_replay(verbs: Any) -> None:  # noqa: ANN401
     replay.add_argument(
         "-o", "--output", metavar="FILE", help="the review (default: LOG's name with .rrd, here)"
     )
+    replay.add_argument(
+        "--full", action="store_true", help="every sample in the review, not what a screen can show"
+    )
     replay.add_argument("--json", metavar="FILE", help="the summary as JSON, - for stdout")
     replay.add_argument("--view", action="store_true", help="open the review in the Rerun viewer")
     replay.set_defaults(verb="replay")

@@ -21,7 +21,7 @@ from .files import is_device, replacing
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from analysis.pipeline import Analysis
+    from analysis.pipeline import Findings
 FINE, FAILURE, USAGE, DATA_LOST = 0, 1, 2, 3
 
 
@@ -114,10 +114,10 @@ def _run_info(arguments: argparse.Namespace) -> int:
 
 def _run_replay(arguments: argparse.Namespace) -> int:
     _require_ours("analysis")
-    from analysis.pipeline import analyse
+    from analysis.pipeline import Replay
     from analysis.summary import markdown, summarise
 
-    from .reader import read
+    from .log_file import open_log
     from .vessel import load_vessel
 
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
@@ -126,21 +126,27 @@ def _run_replay(arguments: argparse.Namespace) -> int:
     chosen = sources(arguments.source)
     with _progress("analysis") as tell:
         tell("read")
-        log = read(arguments.log).preferring(chosen)
-        _warn(log.warnings)  # now: they may explain why the replay fails
-        analysis = analyse(log, vessel, on_step=tell)
-        tell("review")
-        from analysis.rerun_view import view_review, write_review
+        log = open_log(arguments.log).preferring(chosen)
+        try:
+            replay = Replay(log, vessel, on_step=tell)
+        except ShiplogError:
+            _warn(log.warnings)  # they may explain it
+            raise
+        from analysis.rerun_view import reviewing, view_review
 
-        page = markdown(analysis)
-        write_review(analysis, output, text=page)
+        with reviewing(replay, output, full=arguments.full) as review:
+            for slab in replay.slabs():
+                review.add(slab)
+            findings = replay.findings
+            tell("review")
+            review.finish(findings, markdown(findings))
     if arguments.json:
-        _write_json(summarise(analysis), arguments.json)
-    _print_tables(analysis, to_stderr=arguments.json == "-")
-    _warn(analysis.warnings[len(log.warnings) :])
+        _write_json(summarise(findings), arguments.json)
+    _print_tables(findings, to_stderr=arguments.json == "-")
+    _warn(findings.warnings)
     print(f"review: {output} (open it with: rerun {output})", file=sys.stderr)
     if arguments.view:
-        view_review(analysis, text=page)
+        view_review(output)
     return DATA_LOST if log.data_lost else FINE
 
 
@@ -216,27 +222,33 @@ def _require_ours(package: str) -> None:
 
 
 @contextmanager
-def _progress(package: str | None = None) -> Iterator["Callable[[str], None]"]:
-    """Show on a terminal what is being done; the callable names the next step.
+def _progress(package: str | None = None) -> Iterator["Callable[..., None]"]:
+    """Show on a terminal what is being done; the callable is told the step, and the share done.
 
     Where the loops of `package` were never compiled on this computer, it says so.
     """
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     console, note = Console(stderr=True), ""
     if package:
         from .compiled import is_compiled
 
         note = "" if is_compiled(package) else " (first run: compiling the loops, once)"
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    bar = BarColumn(bar_width=24)
+    columns = (SpinnerColumn(), bar, TimeElapsedColumn(), TextColumn("{task.description}"))
     shown = console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
-        task = progress.add_task("")
-        yield lambda step: progress.update(task, description=f"{step}{note}")
+        task = progress.add_task("", total=None)
+
+        def tell(step: str, share: float | None = None) -> None:
+            total = None if share is None else 1.0
+            progress.update(task, description=f"{step}{note}", total=total, completed=share or 0.0)
+
+        yield tell
 
 
-def _print_tables(analysis: "Analysis", *, to_stderr: bool) -> None:
+def _print_tables(findings: "Findings", *, to_stderr: bool) -> None:
     from rich.box import SIMPLE
     from rich.console import Console
     from rich.table import Table
@@ -244,7 +256,7 @@ def _print_tables(analysis: "Analysis", *, to_stderr: bool) -> None:
     from analysis.summary import sections
 
     console = Console(stderr=to_stderr, highlight=False, markup=False)  # [deg] is a unit
-    for section in sections(analysis):
+    for section in sections(findings):
         table = Table(title=section.title, title_justify="left", title_style="bold", box=SIMPLE)
         for i, column in enumerate(section.columns):
             table.add_column(column, justify="left" if i == 0 else "right", overflow="fold")

@@ -5,21 +5,39 @@ averaged; where nothing was measured there is NaN. What is commanded (rudder, rp
 its samples too and is interpolated, but not across a gap.
 """
 
-from math import inf
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from math import floor, inf
 
 import numpy as np
 
 from .errors import LogError, UsageError
-from .types import Channel, FloatArray, Signals, TrialLog
+from .probe import known_samples
+from .survey import ChannelSurvey, Survey, survey
+from .types import Channel, FloatArray, Log, Signals, joined
 from .units import CATALOGUE
 
-GAP_PERIODS = 5.0  # a silence of so many usual periods is a gap
-GAP_SECS = 1.0  # but nothing shorter than this
-MAX_SAMPLES = 20_000_000  # of a grid: beyond it the times are wrong, not the trial long
+MAX_SAMPLES = 20_000_000  # of a grid that hardly anything stands on: beyond it the times are wrong
+SPARSEST = 20  # instants of such a grid to a sample
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """A uniform grid, and the channels that are to stand on it."""
+
+    start_ns: int
+    dt_secs: float
+    count: int
+    channels: Mapping[str, ChannelSurvey]
+
+    @property
+    def end_ns(self) -> int:
+        """The last instant."""
+        return self.start_ns + round((self.count - 1) * self.dt_secs * 1e9)
 
 
 def resample(
-    log: TrialLog,
+    log: Log,
     dt_secs: float | None = None,
     channels: tuple[str, ...] | None = None,
     optional: tuple[str, ...] = (),
@@ -33,76 +51,61 @@ def resample(
     Raises `LogError` where a channel is missing or has fewer than two samples, or where the
     channels have no time in common.
     """
-    names = channels or tuple(c.name for c in log if not c.fields)
+    return joined(on_clock(log.slabs(), set_clock(log, survey(log), dt_secs, channels, optional)))
+
+
+def set_clock(
+    log: Log,
+    found: Survey,
+    dt_secs: float | None = None,
+    channels: tuple[str, ...] | None = None,
+    optional: tuple[str, ...] = (),
+) -> Clock:
+    """The clock for a log that was surveyed; all else as `resample` has it."""
+    names = channels or tuple(c.name for c in found if not c.fields)
     if not names:
         raise LogError(f"no channel to resample; choose a log that has samples: {log.name}")
-    used = {name: log[name] for name in names}
+    used = {name: found[name] for name in names}
     for name, channel in used.items():
         _require_samples(log, name, channel)
-    dt = usual_period_secs(used[names[0]]) if dt_secs is None else dt_secs
+    leader = used[names[0]]
+    dt = leader.usual_secs if dt_secs is None else dt_secs
     if not 0 < dt < inf:
         raise UsageError(f"the time step must be positive, got {dt} s")
     start_ns, end_ns = _common_span(log, list(used.values()))
     steps = (end_ns - start_ns) * 1e-9 / dt + 1e-6
-    if steps > MAX_SAMPLES:
+    if steps > MAX_SAMPLES and steps > SPARSEST * leader.known:
         raise LogError(
             f"its times span {(end_ns - start_ns) / 8.64e13:.4g} days, too many steps of {dt:g} s; "
             f"correct the clock of one of {', '.join(names)}: {log.name}"
         )
-    grid = np.arange(int(steps) + 1) * dt
-    used |= {name: log[name] for name in optional if name in log and _measured(log[name]) > 1}
-    values = {}
-    for name, channel in used.items():
-        at = (channel.measured_ns - start_ns) * 1e-9
-        kind = CATALOGUE.get(channel.name)
-        place = _interpolated if kind and (kind.commanded or kind.circular) else _binned
-        values[name] = place(at, channel, grid, dt)
-    return Signals(start_ns, dt, values)
+    also = {name: found[name] for name in optional if name in found and found[name].known > 1}
+    return Clock(start_ns, dt, int(steps) + 1, used | also)
 
 
-def usual_period_secs(channel: Channel) -> float:
-    """The median interval between a channel's samples."""
-    steps = np.diff(np.sort(channel.measured_ns))
-    steps = steps[steps > 0]
-    return float(np.median(steps)) * 1e-9 if len(steps) else 0.0
+def on_clock(slabs: Iterable[tuple[Channel, ...]], clock: Clock) -> Iterator[Signals]:
+    """A log that comes in slabs on the clock, in consecutive slabs from first instant to last."""
+    placing = {name: _placing(channel, clock) for name, channel in clock.channels.items()}
+    done = 0
+    for slab in slabs:
+        for place in placing.values():
+            place.add(slab)
+        ready = min(clock.count, *(place.ready for place in placing.values()))
+        if ready > done:
+            values = {name: place.placed(done, ready) for name, place in placing.items()}
+            yield Signals(clock.start_ns, clock.dt_secs, values, done)
+            done = ready
 
 
-def gap_threshold_secs(channel: Channel) -> float:
-    """The silence beyond which a channel was not measured, rather than between two samples."""
-    return longest_step_secs(usual_period_secs(channel))
-
-
-def longest_step_secs(usual_secs: float) -> float:
-    """How far apart two samples of a sensor of that usual period may stand without a gap."""
-    return max(GAP_PERIODS * usual_secs, GAP_SECS)
-
-
-def usual_interval_secs(values: FloatArray, dt_secs: float) -> float:
-    """The median time between two measurements of a channel on a clock; NaN is none."""
-    steps = np.diff(np.flatnonzero(np.isfinite(values)))
-    return float(np.median(steps)) * dt_secs if len(steps) else dt_secs
-
-
-def gaps(channel: Channel) -> list[tuple[float, float]]:
-    """Where a channel fell silent: start and length in seconds from its first sample."""
-    times = np.sort(channel.measured_ns)
-    steps = np.diff(times) * 1e-9
-    return [
-        (float((times[i] - times[0]) * 1e-9), float(steps[i]))
-        for i in np.flatnonzero(steps > gap_threshold_secs(channel))
-    ]
-
-
-def _require_samples(log: TrialLog, name: str, channel: Channel) -> None:
+def _require_samples(log: Log, name: str, channel: ChannelSurvey) -> None:
     if channel.fields:
         raise UsageError(
             f"channel {name!r} has components ({', '.join(channel.fields)}), "
             f"and a clock takes one value a sample; name others: {log.name}"
         )
-    measured = _measured(channel)
-    if measured < 2 or usual_period_secs(channel) == 0:
+    if channel.known < 2 or channel.usual_secs == 0:
         has = {0: "no measured value", 1: "one sample"}.get(
-            measured, "all its samples at one instant"
+            channel.known, "all its samples at one instant"
         )
         raise LogError(
             f"channel {name!r} has {has}, and a replay needs it over time; "
@@ -110,56 +113,117 @@ def _require_samples(log: TrialLog, name: str, channel: Channel) -> None:
         )
 
 
-def _measured(channel: Channel) -> int:
-    return int(np.isfinite(channel.values).sum())
-
-
-def _common_span(log: TrialLog, channels: list[Channel]) -> tuple[int, int]:
+def _common_span(log: Log, channels: list[ChannelSurvey]) -> tuple[int, int]:
     """From where all are known, on a sample of the first, to where the inputs cease."""
-    begun = max(_known_span(channel)[0] for channel in channels)
+    begun = max(channel.known_span_ns[0] for channel in channels)
     inputs: list[int] = []
     others: list[int] = []
     for channel in channels:
         commanded = channel.name in CATALOGUE and CATALOGUE[channel.name].commanded
-        (inputs if commanded else others).append(_known_span(channel)[1])
+        (inputs if commanded else others).append(channel.known_span_ns[1])
     end = min([max(others or inputs), *inputs])
-    leader = channels[0].measured_ns[np.isfinite(channels[0].values)]
-    on_sample = leader[leader >= begun]
-    start = int(on_sample.min()) if len(on_sample) else begun
+    start = _first_sample(log, channels[0], begun)
     if end <= start:
         names = ", ".join(c.name for c in channels)
         raise LogError(f"{names} were never recorded at the same time: {log.name}")
     return start, end
 
 
-def _known_span(channel: Channel) -> tuple[int, int]:
-    """The first and the last instant at which something was measured."""
-    times = channel.measured_ns[np.isfinite(channel.values)]
-    return int(times.min()), int(times.max())
+def _first_sample(log: Log, leader: ChannelSurvey, begun: int) -> int:
+    """The first instant from `begun` on at which something was measured; `begun` if never."""
+    for slab in log.slabs():
+        channel = leader.of(slab)
+        if channel is not None:
+            known = channel.measured_ns[np.isfinite(channel.values)]
+            if np.any(known >= begun):
+                return int(known[known >= begun].min())
+    return begun
 
 
-def _binned(at: FloatArray, channel: Channel, grid: FloatArray, dt: float) -> FloatArray:
+def _placing(channel: ChannelSurvey, clock: Clock) -> "_Binning | _Interpolation":
+    kind = CATALOGUE.get(channel.name)
+    between = kind is not None and (kind.commanded or kind.circular)
+    return (_Interpolation if between else _Binning)(channel, clock)
+
+
+class _Placing:
+    """Known samples of a channel on their way to the clock."""
+
+    def __init__(self, channel: ChannelSurvey, clock: Clock) -> None:
+        self._channel, self._clock = channel, clock
+        self._times, self._values = np.zeros(0), np.zeros(0)  # that are not done with
+        self._seen = 0
+
+    def add(self, slab: tuple[Channel, ...]) -> None:
+        """Take the next samples."""
+        channel = self._channel.of(slab)
+        if channel is not None:
+            times, values = known_samples(channel, self._clock.start_ns)
+            if np.any(times[1:] < times[:-1]):
+                order = np.argsort(times, kind="stable")
+                times, values = times[order], values[order]
+            self._seen += len(times)
+            self._times = np.concatenate((self._times, times))
+            self._values = np.concatenate((self._values, self._prepared(values)))
+
+    @property
+    def ready(self) -> int:
+        """Before which instant of the clock no sample can change anything any more."""
+        if self._seen == self._channel.known:
+            return self._clock.count
+        return floor(self._times[-1] / self._clock.dt_secs) if len(self._times) else 0
+
+    def _prepared(self, values: FloatArray) -> FloatArray:
+        return values
+
+    def _drop(self, count: int) -> None:
+        self._times, self._values = self._times[count:], self._values[count:]
+
+
+class _Binning(_Placing):
     """The mean of the samples nearest each instant; NaN where there is none."""
-    cell = np.floor(at / dt + 0.5).astype(np.int64)
-    good = np.isfinite(channel.values) & (cell >= 0) & (cell < len(grid))
-    count = np.bincount(cell[good], minlength=len(grid))
-    total = np.bincount(cell[good], weights=channel.values[good], minlength=len(grid))
-    with np.errstate(invalid="ignore"):
-        mean: FloatArray = total / count
-    return mean
+
+    def placed(self, first: int, end: int) -> FloatArray:
+        """The values at the instants from `first` to before `end`, which must be ready."""
+        cell = np.floor(self._times / self._clock.dt_secs + 0.5).astype(np.int64)
+        before, upto = np.searchsorted(cell, (first, end))
+        cell, values = cell[before:upto] - first, self._values[before:upto]
+        self._drop(int(upto))
+        count = np.bincount(cell, minlength=end - first)
+        total = np.bincount(cell, weights=values, minlength=end - first)
+        with np.errstate(invalid="ignore"):
+            mean: FloatArray = total / count
+        return mean
 
 
-def _interpolated(at: FloatArray, channel: Channel, grid: FloatArray, dt: float) -> FloatArray:
+class _Interpolation(_Placing):
     """Linear between samples, NaN inside a gap and beyond the ends."""
-    good = np.isfinite(channel.values)
-    order = np.argsort(at[good], kind="stable")
-    times, values = at[good][order], channel.values[good][order]
-    if channel.name in CATALOGUE and CATALOGUE[channel.name].circular:
-        values = np.unwrap(values)
-    placed = np.interp(grid, times, values)
-    after = np.searchsorted(times, grid - 1e-6 * dt)
-    inside = (after > 0) & (after < len(times))
-    left, right = times[np.clip(after - 1, 0, None)], times[np.clip(after, None, len(times) - 1)]
-    on_sample = np.abs(right - grid) <= 1e-6 * dt
-    known = on_sample | (inside & (right - left <= gap_threshold_secs(channel)))
-    return np.where(known, placed, np.nan)
+
+    _last, _turns = 0.0, 0.0
+
+    def placed(self, first: int, end: int) -> FloatArray:
+        """The values at the instants from `first` to before `end`, which must be ready."""
+        dt, times = self._clock.dt_secs, self._times
+        grid = np.arange(first, end) * dt
+        placed = np.interp(grid, times, self._values)
+        after = np.searchsorted(times, grid - 1e-6 * dt)
+        inside = (after > 0) & (after < len(times))
+        left, right = (
+            times[np.clip(after - 1, 0, None)],
+            times[np.clip(after, None, len(times) - 1)],
+        )
+        on_sample = np.abs(right - grid) <= 1e-6 * dt
+        known = on_sample | (inside & (right - left <= self._channel.gap_threshold_secs))
+        self._drop(max(int(after[-1]) - 1, 0))
+        return np.where(known, placed, np.nan)
+
+    def _prepared(self, values: FloatArray) -> FloatArray:
+        """The values, angles without their jumps by a full turn."""
+        kind = CATALOGUE.get(self._channel.name)
+        if kind is None or not kind.circular or not len(values):
+            return values
+        first = values[0] if self._seen == len(values) else self._last
+        steps = np.diff(values, prepend=first)
+        turns = self._turns + np.cumsum(np.round(steps / (2 * np.pi)))
+        self._last, self._turns = float(values[-1]), float(turns[-1])
+        return values - 2 * np.pi * turns

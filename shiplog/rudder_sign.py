@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from .clock import gap_threshold_secs, usual_period_secs
-from .types import Channel, FloatArray, TimeArray, TrialLog
+from .probe import Probe, known_samples
+from .survey import ChannelSurvey, Survey, survey
+from .types import Channel, FloatArray, Log
 
 WINDOW_SECS = 10.0  # over which the rudder's effect on the yaw rate is looked at
 WINDOWS = 12  # at least so many of them must fit into a record
@@ -12,7 +13,7 @@ SIGNIFICANT = 3.0  # standard errors
 MAX_CONDITION = 1e6  # beyond it rudder and yaw rate cannot be told apart
 
 
-def rudder_sign_warning(log: TrialLog) -> str | None:
+def rudder_sign_warning(log: Log) -> str | None:
     """A sentence if the data say that a positive rudder turns the bow to port, else None.
 
     Over windows of length W, r(t + W) - r(t) = a ∫U r + b ∫U² δ + c W is solved for a, b and c by
@@ -22,66 +23,67 @@ def rudder_sign_warning(log: TrialLog) -> str | None:
     into account (Newey and West, 1987). None where a channel is missing, or the rudder moved too
     little to tell.
     """
-    rudder, yaw_rate = log.get("rudder"), log.get("yaw_rate")
-    if rudder is None or yaw_rate is None:
-        return None
-    grid = _common_grid(rudder, yaw_rate, log.get("speed"))
-    if grid is None:
-        return None
-    dt, r, delta, speed = grid
-    window = min(WINDOW_SECS, len(r) * dt / WINDOWS)
-    effect = _rudder_effect(dt, r, delta, speed, max(round(window / dt), 1))
-    if effect is None or effect[0] > -SIGNIFICANT * effect[1]:
-        return None
-    return (
-        f"{rudder.topic}: its sign is contrary, positive turns the bow to port, "
-        f"by {-effect[0] / effect[1]:.0f} standard errors; "
-        "set the rudder's sign = -1 in the layout, or turn it in the recorder"
-    )
+    watch = RudderWatch(survey(log))
+    for slab in log.slabs():
+        watch.add(slab)
+    return watch.warning()
 
 
-Grid = tuple[float, FloatArray, FloatArray, FloatArray]
+class RudderWatch:
+    """Looks at rudder, yaw rate and speed as they come, and gives `rudder_sign_warning`'s answer.
+
+    `found` is the survey of the log that comes.
+    """
+
+    def __init__(self, found: Survey) -> None:
+        self._rudder, yaw_rate = found.get("rudder"), found.get("yaw_rate")
+        self._probes: dict[ChannelSurvey, Probe] = {}
+        if self._rudder is None or yaw_rate is None:
+            return
+        if min(yaw_rate.known, self._rudder.known) < 2 * WINDOWS:
+            return
+        start = max(yaw_rate.known_span_ns[0], self._rudder.known_span_ns[0])
+        span = (min(yaw_rate.known_span_ns[1], self._rudder.known_span_ns[1]) - start) * 1e-9
+        dt = max(yaw_rate.usual_secs, WINDOW_SECS / 100, span / 100_000)
+        if span < 2 * WINDOWS * dt:
+            return
+        self._dt, self._start, at = dt, start, np.arange(int(span / dt) + 1) * dt
+        self._probes = {
+            channel: Probe(at, channel.gap_threshold_secs) for channel in (yaw_rate, self._rudder)
+        }
+        speed = found.get("speed")
+        if speed is not None and speed.known:
+            self._probes[speed] = Probe(at)
+
+    def add(self, slab: tuple[Channel, ...]) -> None:
+        """Take the next samples."""
+        for surveyed, probe in self._probes.items():
+            channel = surveyed.of(slab)
+            if channel is not None:
+                probe.add(*known_samples(channel, self._start))
+
+    def warning(self) -> str | None:
+        """What there is to say, once all samples were added."""
+        if not self._probes or self._rudder is None:
+            return None
+        r, delta, *speed = (probe.values() for probe in self._probes.values())
+        relative = _relative(speed[0]) if speed else np.ones_like(r)
+        window = min(WINDOW_SECS, len(r) * self._dt / WINDOWS)
+        length = max(round(window / self._dt), 1)
+        effect = _rudder_effect(self._dt, r, delta, relative, length)
+        if effect is None or effect[0] > -SIGNIFICANT * effect[1]:
+            return None
+        return (
+            f"{self._rudder.topic}: its sign is contrary, positive turns the bow to port, "
+            f"by {-effect[0] / effect[1]:.0f} standard errors; "
+            "set the rudder's sign = -1 in the layout, or turn it in the recorder"
+        )
 
 
-def _common_grid(rudder: Channel, yaw_rate: Channel, speed: Channel | None) -> Grid | None:
-    """A step, yaw rate and rudder at it, NaN in gaps, and relative speed; None for too little."""
-    rate_at, rates = _measured(yaw_rate)
-    rudder_at, angles = _measured(rudder)
-    if min(len(rates), len(angles)) < 2 * WINDOWS:
-        return None
-    start, end = max(rate_at[0], rudder_at[0]), min(rate_at[-1], rudder_at[-1])
-    span = (end - start) * 1e-9
-    dt = max(usual_period_secs(yaw_rate), WINDOW_SECS / 100, span / 100_000)
-    if span < 2 * WINDOWS * dt:
-        return None
-    at = np.arange(int(span / dt) + 1) * dt
-    r = _between(at, (rate_at - start) * 1e-9, rates, gap_threshold_secs(yaw_rate))
-    delta = _between(at, (rudder_at - start) * 1e-9, angles, gap_threshold_secs(rudder))
-    return dt, r, delta, _relative_speed(at, start, speed)
-
-
-def _measured(channel: Channel) -> tuple[TimeArray, FloatArray]:
-    """The times and values of the samples that were measured, in order."""
-    good = np.isfinite(channel.values)
-    order = np.argsort(channel.measured_ns[good], kind="stable")
-    return channel.measured_ns[good][order], channel.values[good][order]
-
-
-def _between(at: FloatArray, times: FloatArray, values: FloatArray, gap_secs: float) -> FloatArray:
-    """Linear between the samples, NaN in gaps."""
-    after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
-    gap = times[after] - times[after - 1] > gap_secs
-    return np.where(gap, np.nan, np.interp(at, times, values))
-
-
-def _relative_speed(at: FloatArray, start: np.int64, speed: Channel | None) -> FloatArray:
-    """The speed over its median; 1 where it is not known, or the ship did not make way."""
-    if speed is None or not np.isfinite(speed.values).any():
-        return np.ones_like(at)
-    times, values = _measured(speed)
-    placed = np.interp(at, (times - start) * 1e-9, values)
-    usual = float(np.median(placed))
-    return np.clip(placed / usual, 0.1, 10.0) if usual > 0 else np.ones_like(at)
+def _relative(speed: FloatArray) -> FloatArray:
+    """The speed over its median; 1 where the ship did not make way."""
+    usual = float(np.median(speed))
+    return np.clip(speed / usual, 0.1, 10.0) if usual > 0 else np.ones_like(speed)
 
 
 def _rudder_effect(

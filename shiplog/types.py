@@ -1,15 +1,17 @@
 """What a trial is: channels of samples, and the same on one clock."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import LogError
 from .units import did_you_mean
+
+SLAB_SAMPLES = 1 << 16  # of the fastest channel, about: what fits the processor's cache
 
 FloatArray = NDArray[np.floating[Any]]
 TimeArray = NDArray[np.int64]
@@ -60,18 +62,103 @@ class Channel:
         """The number of samples."""
         return len(self.measured_ns)
 
+    def part(self, start: int, stop: int) -> "Channel":
+        """Its samples from `start` to before `stop`."""
+        cut = slice(start, stop)
+        return replace(
+            self,
+            measured_ns=self.measured_ns[cut],
+            received_ns=self.received_ns[cut],
+            values=self.values[cut],
+        )
+
     def __repr__(self) -> str:
         """What it is, not all that it holds."""
         return f"Channel({self.topic} [{self.unit}], {len(self)} samples)"
 
 
-@dataclass(frozen=True, eq=False)
-class TrialLog:
-    """A recorded trial, as it was: each channel with its own times.
+class Named(Protocol):
+    """What is of one quantity from one source."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def source(self) -> str: ...  # noqa: D102
+
+
+C_co = TypeVar("C_co", bound=Named, covariant=True)
+
+
+class ByName(Generic[C_co]):
+    """Channels, or what is said of them, found by name.
 
     `log["yaw_rate"]` is the first source of that quantity in the file, `log["yaw_rate/gyro"]`
     the one asked for.
     """
+
+    name: str
+    channels: tuple[C_co, ...]
+
+    def __getitem__(self, key: str) -> C_co:
+        """The channel of that name, or of that name and source; `LogError` where there is none."""
+        found = self.get(key)
+        if found is None:
+            has = sorted({channel.name for channel in self.channels})
+            raise LogError(
+                f"no channel {key!r} in {self.name}; it has {', '.join(has) or 'none'}"
+                f"{did_you_mean(key, has)}"
+            )
+        return found
+
+    def get(self, key: str) -> C_co | None:
+        """As `log[key]`, with None where there is no such channel."""
+        name, _, source = key.strip("/").partition("/")
+        for channel in self.channels:
+            if channel.name == name and source in ("", channel.source):
+                return channel
+        return None
+
+    def __contains__(self, key: str) -> bool:
+        """Whether there is such a channel."""
+        return self.get(key) is not None
+
+    def __iter__(self) -> Iterator[C_co]:
+        """The channels in the order of the file."""
+        return iter(self.channels)
+
+
+class Log(Protocol):
+    """A trial that can be gone through, as often as it takes, whether or not memory holds it.
+
+    What it says of itself is complete once it was gone through.
+    """
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def metadata(self) -> Mapping[str, str]: ...  # noqa: D102
+
+    @property
+    def vessel_toml(self) -> str | None: ...  # noqa: D102
+
+    @property
+    def warnings(self) -> tuple[str, ...]: ...  # noqa: D102
+
+    @property
+    def data_lost(self) -> bool: ...  # noqa: D102
+
+    def slabs(self) -> Iterator[tuple[Channel, ...]]:
+        """The samples in slabs, those of each topic in the order in which they were received."""
+
+    def preferring(self, sources: Mapping[str, str]) -> Self:
+        """The same log with one source only for each name given, the one given."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrialLog(ByName[Channel]):
+    """A recorded trial, as it was: each channel with its own times."""
 
     name: str
     channels: tuple[Channel, ...]
@@ -86,33 +173,6 @@ class TrialLog:
         if len(set(topics)) < len(topics):
             raise ValueError(f"{self.name}: two channels of one topic; merge them: {topics}")
 
-    def __getitem__(self, key: str) -> Channel:
-        """The channel of that name, or of that name and source; `LogError` where there is none."""
-        found = self.get(key)
-        if found is None:
-            has = sorted({channel.name for channel in self.channels})
-            raise LogError(
-                f"no channel {key!r} in {self.name}; it has {', '.join(has) or 'none'}"
-                f"{did_you_mean(key, has)}"
-            )
-        return found
-
-    def get(self, key: str) -> Channel | None:
-        """As `log[key]`, with None where there is no such channel."""
-        name, _, source = key.strip("/").partition("/")
-        for channel in self.channels:
-            if channel.name == name and source in ("", channel.source):
-                return channel
-        return None
-
-    def __contains__(self, key: str) -> bool:
-        """Whether there is such a channel."""
-        return self.get(key) is not None
-
-    def __iter__(self) -> Iterator[Channel]:
-        """The channels in the order of the file."""
-        return iter(self.channels)
-
     def preferring(self, sources: Mapping[str, str]) -> "TrialLog":
         """The same log with one source only for each name given, the one given.
 
@@ -121,6 +181,19 @@ class TrialLog:
         preferred = [self[f"{name}/{source}"] for name, source in sources.items()]
         others = [channel for channel in self.channels if channel.name not in sources]
         return replace(self, channels=(*preferred, *others))
+
+    def slabs(self) -> Iterator[tuple[Channel, ...]]:
+        """The samples in slabs of some hours, each channel cut at the same times of reception."""
+        leader = max(self.channels, key=len, default=None)
+        times = [] if leader is None else leader.received_ns[SLAB_SAMPLES::SLAB_SAMPLES].tolist()
+        if not all(_ascending(c.received_ns) and _ascending(c.measured_ns) for c in self.channels):
+            times = []  # in no order: one slab
+        cuts = [[0, *np.searchsorted(c.received_ns, times), len(c)] for c in self.channels]
+        for number in range(len(times) + 1):
+            yield tuple(
+                channel.part(ends[number], ends[number + 1])
+                for channel, ends in zip(self.channels, cuts, strict=True)
+            )
 
     @property
     def span_ns(self) -> tuple[int, int]:
@@ -137,13 +210,21 @@ class TrialLog:
         return (end - start) * 1e-9
 
 
+def _ascending(times: TimeArray) -> bool:
+    return bool(np.all(times[1:] >= times[:-1]))
+
+
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """Channels on one uniform clock: sample k was at `start_ns` + k·dt. NaN: not measured."""
+    """Channels on one uniform clock, or a slab of them. NaN: not measured.
+
+    Sample k was at `start_ns` + (first + k)·dt.
+    """
 
     start_ns: int
     dt_secs: float
     values: Mapping[str, FloatArray]  # each (n,)
+    first: int = 0  # the number of the slab's first sample
 
     def __post_init__(self) -> None:
         views = {name: frozen(values, np.float64) for name, values in self.values.items()}
@@ -164,9 +245,21 @@ class Signals:
     @property
     def time_secs(self) -> FloatArray:
         """(n,) seconds since the clock's start."""
-        return np.arange(len(self)) * self.dt_secs
+        return np.arange(self.first, self.first + len(self)) * self.dt_secs
 
     @property
     def stamps_ns(self) -> TimeArray:
         """(n,) nanoseconds since 1970-01-01 UTC."""
         return self.start_ns + np.round(self.time_secs * 1e9).astype(np.int64)
+
+    def part(self, start: int, stop: int) -> "Signals":
+        """The samples from `start` to before `stop`, counted within these."""
+        values = {name: array[start:stop] for name, array in self.values.items()}
+        return replace(self, values=values, first=self.first + start)
+
+
+def joined(slabs: Iterable[Signals]) -> Signals:
+    """Consecutive slabs, one at least, as one."""
+    parts = list(slabs)
+    values = {name: np.concatenate([part[name] for part in parts]) for name in parts[0].values}
+    return replace(parts[0], values=values)

@@ -129,7 +129,9 @@ def test_every_number_of_the_summary_is_watched(
         "/rudder_disturbance/estimate": replace(
             a, disturbance=replace(found, rudder=found.rudder * 2)
         ),
-        "/yaw_disturbance/std": replace(a, disturbance=replace(found, yaw_std=0.0)),
+        "/yaw_disturbance/std": replace(
+            a, courses=a.courses | {"yaw": replace(a.courses["yaw"], std=0.0)}
+        ),
         "/b1/whole_std": replace(
             a,
             yaw=replace(
@@ -137,7 +139,7 @@ def test_every_number_of_the_summary_is_watched(
             ),
         ),
         "/a/history_std": replace(
-            a, yaw=replace(a.yaw, history=replace(a.yaw.history, stds=a.yaw.history.stds * 1.01))
+            a, yaw_history=replace(a.yaw_history, stds=a.yaw_history.stds * 1.01)
         ),
         "/east/track": replace(a, track=replace(a.track, east=-a.track.east)),
     }

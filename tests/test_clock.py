@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shiplog import Channel, LogError, TrialLog, UsageError, resample
-from shiplog.clock import gap_threshold_secs, gaps, usual_period_secs
+from shiplog.survey import survey
 
 START = 1_700_000_000_000_000_000
 SEC = 1_000_000_000
@@ -87,7 +87,7 @@ def test_what_is_measured_is_the_mean_of_the_nearest_samples(seed: int, dt_ns: i
 def test_what_is_commanded_is_interpolated_but_not_across_a_gap(seed: int, dt_ns: int) -> None:
     commanded = scattered("rudder", np.random.default_rng(seed), 40, 60.0)
     signals = resample(log_of(commanded), dt_ns * 1e-9)
-    gap_ns = gap_threshold_secs(commanded) * 1e9
+    gap_ns = survey(log_of(commanded))[commanded.name].gap_threshold_secs * 1e9
     expected = interpolated_by_force(commanded, signals.start_ns, dt_ns, len(signals), gap_ns)
     np.testing.assert_allclose(signals["rudder"], expected, rtol=1e-9, atol=1e-12)
 
@@ -161,7 +161,7 @@ def test_jittered_times_keep_the_usual_period_and_lose_no_sample() -> None:
     rng = np.random.default_rng(3)
     seconds = np.arange(500) * 0.1 + rng.uniform(-0.02, 0.02, 500)
     jittered = channel("yaw_rate", seconds, np.arange(500.0))
-    assert usual_period_secs(jittered) == pytest.approx(0.1, abs=0.005)
+    assert survey(log_of(jittered))[jittered.name].usual_secs == pytest.approx(0.1, abs=0.005)
     signals = resample(log_of(jittered), 0.1)
     assert np.nanmax(np.abs(np.diff(signals["yaw_rate"]))) <= 2
     assert np.isfinite(signals["yaw_rate"]).mean() > 0.9
@@ -256,10 +256,3 @@ def test_times_years_apart_are_an_error_and_not_a_want_of_memory(dt_secs: float)
 def test_a_step_that_is_none_is_refused(dt_secs: float) -> None:
     with pytest.raises(UsageError, match="time step must be positive"):
         resample(log_of(channel("rudder", [0, 1], [0, 0])), dt_secs)
-
-
-def test_gaps_are_told_by_when_and_how_long() -> None:
-    silent = channel("speed", [0, 1, 2, 10, 11, 12, 30], np.zeros(7))
-    assert gaps(silent) == [(2.0, 8.0), (12.0, 18.0)]
-    assert gaps(channel("speed", [0, 1, 2], np.zeros(3))) == []
-    assert gaps(channel("speed", [], [])) == []

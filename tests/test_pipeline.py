@@ -1,9 +1,10 @@
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import as_log
+from conftest import InSlabs, as_log
 from faults import bias, dropout, freeze, spike
 
 from analysis.pipeline import NEEDED, STEPS, Analysis, analyse
@@ -23,9 +24,12 @@ def without(log: TrialLog, name: str) -> TrialLog:
 
 
 def test_the_steps_are_told_in_their_order(zigzag_log: TrialLog) -> None:
-    told: list[str] = []
-    analyse(zigzag_log, on_step=told.append)
-    assert tuple(told) == STEPS
+    told: list[tuple[str, float]] = []
+    analyse(zigzag_log, on_step=lambda step, share: told.append((step, share)))
+    assert tuple(dict.fromkeys(step for step, _ in told)) == STEPS
+    shares = [share for step, share in told if step == "replay"]
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
 
 
 def test_a_log_replays_alone_with_the_model_it_carries(
@@ -260,6 +264,43 @@ def test_the_order_of_the_channels_does_not_matter(
 ) -> None:
     turned = analyse(replace(zigzag_log, channels=zigzag_log.channels[::-1]))
     assert np.array_equal(turned.estimates.states, zigzag_analysis.estimates.states)
+
+
+def flat(result: object, name: str = "") -> dict[str, str | np.ndarray]:
+    """Every number of a result, by its place."""
+    if isinstance(result, np.ndarray):
+        return {name: result}
+    if isinstance(result, Mapping):
+        parts = list(result.items())
+    elif is_dataclass(result):
+        parts = [(field.name, getattr(result, field.name)) for field in fields(result)]
+    else:
+        return {name: repr(result)}
+    return {k: v for key, part in parts for k, v in flat(part, f"{name}.{key}").items()}
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("model", ["carried", "fitted"])
+def test_the_slabs_of_a_log_change_nothing_to_the_last_bit(
+    zigzag_log: TrialLog, model: str, seed: int
+) -> None:
+    """Gaps across the cuts, slabs of a few samples and of thousands, channels of many rates."""
+    rng = np.random.default_rng(seed)
+    log = dropout("rudder", 150.0, 20.0)(dropout("yaw_rate", 0.0, 7.0)(zigzag_log))
+    log = dropout("heading", 300.0, 40.0)(dropout("speed", 400.0, 9.0)(log))
+    if seed:
+        log = without(log, "position")
+    if model == "fitted":
+        log = replace(log, vessel_toml=None)
+    edges = {0: [6.9, 150.0, 150.1, 169.9, 410.0], 1: np.arange(1.0, 500.0, 1.3).tolist()}
+    cuts = edges.get(seed, np.sort(rng.uniform(0, 500, 9)).tolist())
+    whole, parted = flat(analyse(log)), flat(analyse(InSlabs(log, cuts)))
+    assert whole.keys() == parted.keys()
+    for place, numbers in whole.items():
+        if isinstance(numbers, np.ndarray):
+            assert np.array_equal(numbers, parted[place], equal_nan=True), place
+        else:
+            assert numbers == parted[place], place
 
 
 KVLCC2 = Path(__file__).parents[2] / "shared" / "data" / "kvlcc2"

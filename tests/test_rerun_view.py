@@ -1,7 +1,7 @@
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
 from math import pi
 from pathlib import Path
@@ -13,19 +13,14 @@ from rerun.chunk import RrdReader
 
 import shiplog
 from analysis.chart import draw_track
-from analysis.panels import (
-    POINTS,
-    Line,
-    Series,
-    coefficient_panels,
-    decimated,
-    equation_panels,
-    limits,
-    without_blanks,
-)
-from analysis.pipeline import Analysis, analyse
+from analysis.disturbance import Disturbance
+from analysis.drawing import Line, Series, Sketch, Thinning, _Samples
+from analysis.kalman import Estimates
+from analysis.panels import Drawn, coefficient_panels, equation_panels, limits
+from analysis.pipeline import Analysis, Slab, analyse
 from analysis.rerun_view import view_review, write_review
 from analysis.sliding import History
+from analysis.track import NOWHERE
 from recorders.sensors import suite
 from recorders.simulate import simulate
 from shiplog.errors import ShiplogError
@@ -47,6 +42,26 @@ def replayed(**sensors: float) -> Analysis:
         vessel_toml=text,
     )
     return analyse(shiplog.TrialLog("zigzag_20_20.mcap", trial.channels, {}, text))
+
+
+def part_of(analysis: Analysis, start: int, stop: int) -> Slab:
+    """A slab of the trial, though what was identified and the track are whole in each."""
+    cut = slice(start, stop)
+    estimates, found = analysis.estimates, analysis.disturbance
+    return Slab(
+        analysis.signals.part(start, stop),
+        Estimates(*(getattr(estimates, f.name)[cut] for f in fields(estimates))),
+        Disturbance(*(getattr(found, f.name)[cut] for f in fields(found))),
+        analysis.yaw_history,
+        analysis.surge_history,
+        analysis.track,
+    )
+
+
+def drawn_of(analysis: Analysis) -> Drawn:
+    sketch = Sketch(analysis.clock, analysis.usual)
+    sketch.add(analysis)
+    return sketch.drawn()
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +137,9 @@ def test_inputs_disturbances_and_residuals(review: Path, analysis: Analysis) -> 
     _, _, surge = columns(review, "disturbance_surge/observed")
     np.testing.assert_allclose(surge[:, 0], found.surge * 1000, rtol=1e-12)
     _, _, band = columns(review, "disturbance_surge/bounds")
-    np.testing.assert_allclose(band[0], np.array([2, -2]) * found.surge_std * 1000, rtol=1e-12)
+    np.testing.assert_allclose(
+        band[0], np.array([2, -2]) * analysis.courses["surge"].std * 1000, rtol=1e-12
+    )
     _, _, residual = columns(review, "residual_speed/normalised")
     expected = analysis.estimates.innovations[:, 1] / analysis.estimates.innovation_stds[:, 1]
     np.testing.assert_allclose(residual[:, 0], expected, rtol=1e-12)
@@ -130,7 +147,7 @@ def test_inputs_disturbances_and_residuals(review: Path, analysis: Analysis) -> 
 
 def test_coefficients_stand_beside_the_model(review: Path, analysis: Analysis) -> None:
     at, _, drawn = columns(review, "coefficient_d/window")
-    history = analysis.yaw.history
+    history = analysis.yaw_history
     column = history.names.index("d")
     shown = np.isfinite(drawn[:, 2])
     value, std = history.values[shown, column], history.stds[shown, column]
@@ -223,23 +240,34 @@ def test_a_gap_is_not_drawn(gappy: Analysis, tmp_path: Path) -> None:
             assert not drawn[inside].any()
 
 
-def test_a_slow_sensor_is_one_line() -> None:
-    at = np.arange(100) * 0.1
+def measured_only(values: np.ndarray, cuts: tuple[int, ...] = ()) -> tuple[list[int], list[float]]:
+    """Instants and values that are drawn of a sensor, its values given in slabs."""
+    steps = np.diff(np.flatnonzero(np.isfinite(values)))
+    samples = _Samples(max(5.0 * np.median(steps), 10.0) if len(steps) else 10.0)
+    found = [
+        samples.step(first, part[:, None])
+        for first, part in zip((0, *cuts), np.split(values, cuts), strict=True)
+    ]
+    rows, columns = zip(*found, strict=True)
+    return np.concatenate(rows).tolist(), np.concatenate(columns)[:, 0].tolist()
+
+
+@pytest.mark.parametrize("cuts", [(), (25,), (40, 41, 69, 90)])
+def test_a_slow_sensor_is_one_line(cuts: tuple[int, ...]) -> None:
     values = np.full(100, np.nan)
     values[::10] = 1.0
     values[40:70] = np.nan
-    times, seen = without_blanks(at, values, 0.1)
+    rows, seen = measured_only(values, cuts)
     assert np.isnan(seen).sum() == 0  # three seconds are four periods of this sensor
-    np.testing.assert_allclose(times, [0, 1, 2, 3, 7, 8, 9])
+    assert rows == [0, 10, 20, 30, 70, 80, 90]
     values[30:90] = np.nan
-    times, seen = without_blanks(at, values, 0.1)
-    assert np.isnan(seen).sum() == 1
-    assert 2 < times[np.isnan(seen)][0] < 9
+    rows, seen = measured_only(values, cuts)
+    assert np.isnan(seen).tolist() == [False, False, False, True, False]
+    assert rows[3] == 21
 
 
 def test_nothing_measured_is_nothing_drawn() -> None:
-    times, seen = without_blanks(np.arange(5.0), np.full(5, np.nan), 1.0)
-    assert len(times) == len(seen) == 0
+    assert measured_only(np.full(5, np.nan)) == ([], [])
 
 
 def test_decimation_keeps_extremes_gaps_and_ends() -> None:
@@ -250,26 +278,55 @@ def test_decimation_keeps_extremes_gaps_and_ends() -> None:
     first[12_345], second[67_890] = 50.0, -60.0
     first[40_000:40_020] = np.nan  # shorter than a bucket
     second[50_000:60_000] = np.nan
-    series = Series("s", at, (Line("first", first, GREY), Line("second", second, BLUE)))
-    thin = decimated(series, points)
-    assert len(thin.time_secs) <= points + 6
-    for line, whole in zip(thin.lines, (first, second), strict=True):
-        rows = np.round(thin.time_secs / 0.1).astype(int)
-        np.testing.assert_array_equal(line.values, whole[rows])
-        size = -(-count // (points // 4))
-        for start in range(0, count, size):
-            bucket = whole[start : start + size]
-            kept = line.values[(rows >= start) & (rows < start + size)]
-            if np.isfinite(bucket).any():
-                assert np.nanmax(kept) == np.nanmax(bucket)
-                assert np.nanmin(kept) == np.nanmin(bucket)
-            assert np.isnan(kept).any() == np.isnan(bucket).any()
-    assert (thin.time_secs[0], thin.time_secs[-1]) == (at[0], at[-1])
+    size = -(-count // (points // 4))
+    for cuts in ((), (1, 12_345, 40_010, 70_000)):
+        thinning = Thinning(size * 0.1)
+        for part in np.split(np.column_stack((at, first, second)), cuts):
+            lines = Line("first", part[:, 1], GREY), Line("second", part[:, 2], BLUE)
+            thinning.add(Series("s", part[:, 0], lines))
+        thin = thinning.kept()
+        assert len(thin.time_secs) <= points + 6
+        for line, whole in zip(thin.lines, (first, second), strict=True):
+            rows = np.round(thin.time_secs / 0.1).astype(int)
+            assert np.all(np.diff(rows) > 0)
+            np.testing.assert_array_equal(line.values, whole[rows])
+            for start in range(0, count, size):
+                bucket = whole[start : start + size]
+                kept = line.values[(rows >= start) & (rows < start + size)]
+                if np.isfinite(bucket).any():
+                    assert np.nanmax(kept) == np.nanmax(bucket)
+                    assert np.nanmin(kept) == np.nanmin(bucket)
+                assert np.isnan(kept).any() == np.isnan(bucket).any()
+        assert (thin.time_secs[0], thin.time_secs[-1]) == (at[0], at[-1])
 
 
-def test_a_short_series_is_drawn_whole() -> None:
-    series = Series("s", np.arange(POINTS * 1.0), (Line("x", np.zeros(POINTS), GREY),))
-    assert decimated(series) is series
+def test_a_long_trial_is_thinned_and_in_full_it_is_not(
+    analysis: Analysis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("analysis.drawing.POINTS", 500)
+    for full in (False, True):
+        path = tmp_path / f"{full}.rrd"
+        write_review(analysis, path, text="", full=full)
+        at, _, drawn = columns(path, "yaw_rate/state")
+        value = np.degrees(analysis.estimates.states[:, 0])
+        assert (len(at) == len(value)) == full
+        assert len(at) > 100
+        assert (drawn[:, 2].min(), drawn[:, 2].max()) == pytest.approx((value.min(), value.max()))
+        assert static(path, "yaw_rate/state", "SeriesLines:names") == ["±2σ", "±2σ", "estimate"]
+
+
+def test_a_review_drawn_in_slabs_is_the_same(analysis: Analysis) -> None:
+    whole = drawn_of(analysis)
+    sketch = Sketch(analysis.clock, analysis.usual)
+    count = len(analysis.signals)
+    for start in range(0, count, 777):
+        sketch.add(part_of(analysis, start, min(start + 777, count)))
+    for entity, series in sketch.drawn().items():
+        if entity.startswith(("coefficient", "track")):
+            continue  # given whole
+        np.testing.assert_array_equal(series.time_secs, whole[entity].time_secs)
+        for line, other in zip(series.lines, whole[entity].lines, strict=True):
+            np.testing.assert_array_equal(line.values, other.values)
 
 
 def test_wild_values_do_not_squeeze_an_axis() -> None:
@@ -284,17 +341,17 @@ def test_wild_values_do_not_squeeze_an_axis() -> None:
 
 
 def test_wild_windows_do_not_squeeze_a_coefficient(analysis: Analysis) -> None:
-    history = analysis.yaw.history
+    history = analysis.yaw_history
     values, stds = history.values.copy(), history.stds.copy()
     values[:40] *= -1e4
     stds[:40] *= 1e4
-    wild = replace(analysis.yaw, history=replace(history, values=values, stds=stds))
-    usual, drawn = (coefficient_panels(a)[0] for a in (analysis, replace(analysis, yaw=wild)))
+    wild = replace(analysis, yaw_history=replace(history, values=values, stds=stds))
+    usual, drawn = (coefficient_panels(a, drawn_of(a))[0] for a in (analysis, wild))
     assert np.diff(drawn.limits) < 3 * np.diff(usual.limits)
 
 
 def test_a_single_window_is_a_line_all_the_same(analysis: Analysis) -> None:
-    history = analysis.yaw.history
+    history = analysis.yaw_history
     only = History(
         history.names,
         history.time_secs[:1],
@@ -302,27 +359,23 @@ def test_a_single_window_is_a_line_all_the_same(analysis: Analysis) -> None:
         history.stds[:1],
         history.conditions[:1],
     )
-    single = replace(analysis, yaw=replace(analysis.yaw, history=only))
-    for panel in coefficient_panels(single)[:6]:
+    single = replace(analysis, yaw_history=only)
+    for panel in coefficient_panels(single, drawn_of(single))[:6]:
         _, window = panel.series
         assert window.time_secs.tolist() == [0.0, analysis.signals.time_secs[-1]]
         assert all(len(line.values) == 2 for line in window.lines)
 
 
 def test_what_no_window_can_tell_is_left_out(analysis: Analysis, tmp_path: Path) -> None:
-    history = analysis.yaw.history
+    history = analysis.yaw_history
     values = history.values.copy()
     values[:, 1] = np.nan
     empty = History(("f", "g", "h"), *(np.empty(s) for s in (0, (0, 3), (0, 3), 0)))
-    some = replace(
-        analysis,
-        yaw=replace(analysis.yaw, history=replace(history, values=values)),
-        surge=replace(analysis.surge, history=empty),
-    )
-    names = [panel.name for panel in coefficient_panels(some)]
+    some = replace(analysis, yaw_history=replace(history, values=values), surge_history=empty)
+    names = [panel.name for panel in coefficient_panels(some, drawn_of(some))]
     assert names == [f"coefficient_{name}" for name in ("a", "b2", "b3", "d", "e")]
     write_review(some, tmp_path / "some.rrd", text="")
-    none = replace(some, yaw=replace(analysis.yaw, history=replace(empty, names=("a",))))
+    none = replace(some, yaw_history=replace(history, values=np.full_like(values, np.nan)))
     write_review(none, tmp_path / "none.rrd", text="")
     assert len(layout(tmp_path / "none.rrd", "ViewBlueprint:display_name")) == 10
 
@@ -332,19 +385,18 @@ def test_the_chart_has_east_right_and_north_up(review: Path, analysis: Analysis)
     expected = np.column_stack((analysis.track.east, -analysis.track.north))
     np.testing.assert_allclose(line, expected, rtol=1e-5, atol=1e-3)
     assert static(review, "track/ends", "Points2D:labels") == ["start", "end"]
-    drawn = draw_track(analysis)
+    drawn = draw_track(analysis, drawn_of(analysis))
     assert drawn is not None
     bow, stern = drawn.ships[0][0], drawn.ships[0][2:4].mean(axis=0)
     assert bow[1] < stern[1]  # headed north at first, and y points down
     length, unit = drawn.scale_label.split()
     assert drawn.scale[1, 0] - drawn.scale[0, 0] == float(length) * {"m": 1, "km": 1000}[unit]
-    nowhere = replace(analysis.track, north=np.empty(0), east=np.empty(0))
-    log = shiplog.TrialLog("x", tuple(c for c in analysis.log if c.name != "position"))
-    assert draw_track(replace(analysis, track=nowhere, log=log)) is None
+    nowhere = replace(analysis, track=NOWHERE)
+    assert draw_track(nowhere, drawn_of(nowhere)) is None
 
 
 def test_left_and_right_panels_belong_together(analysis: Analysis) -> None:
-    yaw, surge = equation_panels(analysis)
+    yaw, surge = equation_panels(analysis, drawn_of(analysis))
     assert len(yaw) == len(surge)
 
 
@@ -357,10 +409,8 @@ def test_an_unwritable_path_leaves_nothing(name: str, analysis: Analysis, tmp_pa
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a screen cannot be taken away")
-def test_without_a_screen_the_viewer_says_so(
-    analysis: Analysis, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_screen_the_viewer_says_so(review: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(ShiplogError, match="viewer cannot start here"):
-        view_review(analysis, text="")
+        view_review(review)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from analysis.kalman import noise_level
+from analysis.gauge import noise_level
 from analysis.residuals import judge, whiteness
 
 

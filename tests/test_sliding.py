@@ -3,7 +3,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.sliding import WORST_CONDITION, Coefficient, fit, identify
+from analysis.identification import Coefficient, identify
+from analysis.sliding import (
+    WORST_CONDITION,
+    Errors,
+    History,
+    Regression,
+    Windows,
+    fit,
+)
+from analysis.stacking import stacked
 from analysis.weak_form import Rows, weak_form
 from recorders.sensors import suite
 from recorders.simulate import simulate
@@ -28,7 +37,7 @@ def off(vessel: Vessel, name: str, value: float) -> float:
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "zigzag-10-10", "pseudo-random"])
 def test_from_clean_data_the_coefficients_come_back(vessel: Vessel, manoeuvre: str) -> None:
     for rows in rows_of(vessel, manoeuvre):
-        for name, found in identify(rows).coefficients.items():
+        for name, found in identify(rows)[0].coefficients.items():
             assert off(vessel, name, found.value) < 1e-3, name
 
 
@@ -41,7 +50,7 @@ def test_under_the_papers_noise_the_errors_are_those_of_the_weak_form(
     vessel: Vessel, name: str, percent: float
 ) -> None:
     yaw, surge = rows_of(vessel, noise="paper")
-    found = identify(yaw).coefficients | identify(surge).coefficients
+    found = identify(yaw)[0].coefficients | identify(surge)[0].coefficients
     assert 100 * off(vessel, name, found[name].value) < percent
     assert abs(found[name].value - getattr(vessel.coefficients, name)) < 4 * found[name].std
 
@@ -55,12 +64,12 @@ def test_nothing_of_the_assumed_model_comes_back(vessel: Vessel) -> None:
     for right_rows, wrong_rows in zip(
         weak_form(signals, c), weak_form(signals, wrong), strict=True
     ):
-        assert identify(right_rows).coefficients == identify(wrong_rows).coefficients
+        assert identify(right_rows)[0].coefficients == identify(wrong_rows)[0].coefficients
 
 
 def test_a_window_is_the_same_regression_as_numpys_on_its_rows(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, "pseudo-random", noise="paper")
-    history = identify(yaw).history
+    history = identify(yaw)[1]
     k = 120
     inside = (yaw.centres_secs + 30 <= history.time_secs[k] + 1e-6) & (
         yaw.centres_secs - 30 >= history.time_secs[k] - 200 - 1e-6
@@ -73,14 +82,14 @@ def test_a_window_is_the_same_regression_as_numpys_on_its_rows(vessel: Vessel) -
 
 def test_histories_end_where_the_windows_do(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
-    history = identify(yaw, window_secs=150.0).history
+    history = identify(yaw, window_secs=150.0)[1]
     assert history.time_secs[0] == pytest.approx(150.0)
     assert history.time_secs[-1] == pytest.approx(500.0, abs=1.0)
 
 
 def test_a_trial_shorter_than_the_window_is_one_window(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, duration=120.0)
-    assert identify(yaw).history.values.shape == (1, 6)
+    assert identify(yaw)[1].values.shape == (1, 6)
 
 
 def test_a_column_of_zeros_is_dropped_and_has_no_value(vessel: Vessel) -> None:
@@ -97,9 +106,9 @@ def test_windows_that_cannot_tell_are_blank(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
     twins = yaw.regressors.copy()
     twins[:, 3] = twins[:, 2] * (1 + 1e-9)
-    found = identify(replace(yaw, regressors=twins))
+    found, history = identify(replace(yaw, regressors=twins))
     assert found.condition > WORST_CONDITION
-    assert np.isnan(found.history.values).all()
+    assert np.isnan(history.values).all()
     assert all(not c.determined for c in found.coefficients.values())
 
 
@@ -107,8 +116,73 @@ def test_missing_rows_are_left_out(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
     target = yaw.target.copy()
     target[100:140] = np.nan
-    for name, found in identify(replace(yaw, target=target)).coefficients.items():
+    for name, found in identify(replace(yaw, target=target))[0].coefficients.items():
         assert off(vessel, name, found.value) < 1e-3
+
+
+def parted(rows: Rows, seed: int) -> list[Rows]:
+    rng = np.random.default_rng(seed)
+    cuts = np.sort(rng.integers(0, len(rows.target) + 1, 12)).tolist()
+    return [
+        rows.part(start, stop)
+        for start, stop in zip([0, *cuts], [*cuts, len(rows.target)], strict=True)
+    ]
+
+
+def with_gaps(rows: Rows) -> Rows:
+    target = rows.target.copy()
+    target[100:140] = target[300::11] = np.nan
+    return replace(rows, target=target)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_windows_of_rows_in_slabs_are_those_of_the_whole_to_the_last_bit(
+    vessel: Vessel, seed: int
+) -> None:
+    for rows in rows_of(vessel, "pseudo-random", "paper"):
+        holed = with_gaps(rows)
+        windows = Windows(holed, len(holed.target))
+        found = stacked([windows.step(slab) for slab in parted(holed, seed)])
+        expected = identify(holed)[1]
+        assert np.isfinite(expected.stds).any()
+        for name in ("time_secs", "values", "stds", "conditions"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_fit_of_rows_in_slabs_is_that_of_the_whole_to_the_last_bit(
+    vessel: Vessel, seed: int
+) -> None:
+    for rows in rows_of(vessel, "pseudo-random", "paper"):
+        holed = with_gaps(rows)
+        regression = Regression(holed)
+        for slab in parted(holed, seed):
+            regression.add(slab)
+        errors = Errors(regression.solve())
+        for slab in parted(holed, seed + 10):
+            errors.add(slab)
+        found, expected = errors.fit(), fit(holed)
+        assert (found.values == expected.values).all()
+        assert (found.stds == expected.stds).all()
+        assert found.condition == expected.condition
+
+
+def test_one_pass_gives_the_values_of_fewer_regressors_too(vessel: Vessel) -> None:
+    yaw, _ = rows_of(vessel, noise="paper")
+    regression = Regression(yaw)
+    regression.add(yaw)
+    kept = [0, 1, 4]
+    found = regression.solve(tuple(yaw.names[i] for i in kept))
+    expected = np.linalg.lstsq(yaw.regressors[:, kept], yaw.target, rcond=1e-16)[0]
+    assert found.values == pytest.approx(expected, rel=1e-9)
+    assert found.told.all()
+
+
+def test_windows_without_rows_are_none(vessel: Vessel) -> None:
+    yaw, _ = rows_of(vessel)
+    history: History = Windows(yaw, len(yaw.target)).step(yaw.part(0, 10))
+    assert history.values.shape == history.stds.shape == (0, 6)
+    assert history.time_secs.shape == history.conditions.shape == (0,)
 
 
 def test_errors_allow_for_overlapping_rows() -> None:
@@ -141,14 +215,14 @@ def test_two_standard_deviations_hold_the_truth_as_often_as_they_say(
             trial = simulate(vessel, manoeuvre, duration_secs=500.0, seed=seed, sensors=sensors)
             signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
             yaw, surge = weak_form(signals, vessel.coefficients)
-            for found in (identify(yaw, constant=True), identify(surge)):
-                true = np.array([getattr(vessel.coefficients, n) for n in found.history.names])
+            for found, history in (identify(yaw, constant=True), identify(surge)):
+                true = np.array([getattr(vessel.coefficients, n) for n in history.names])
                 for name, c in found.coefficients.items():
                     if np.isfinite(c.std):
                         away = c.value - getattr(vessel.coefficients, name)
                         inside["whole"].append(abs(away) < 2 * c.std)
-                known = np.isfinite(found.history.stds)
-                held = np.abs(found.history.values - true) < 2 * found.history.stds
+                known = np.isfinite(history.stds)
+                held = np.abs(history.values - true) < 2 * history.stds
                 inside["windows"] += held[known].tolist()
     assert np.mean(inside["whole"]) > 0.9
     assert np.mean(inside["windows"]) > 0.9
@@ -156,8 +230,8 @@ def test_two_standard_deviations_hold_the_truth_as_often_as_they_say(
 
 def test_in_a_steady_turn_windows_are_blank_and_b1_b2_are_not_told(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, "turning-circle", "paper")
-    found = identify(yaw, constant=True)
-    assert np.isnan(found.history.values).all()
+    found, history = identify(yaw, constant=True)
+    assert np.isnan(history.values).all()
     assert not found.coefficients["b1"].determined
     assert not found.coefficients["b2"].determined
     assert found.coefficients["a"].determined
@@ -167,7 +241,7 @@ def test_a_straight_run_tells_nothing_of_yaw(vessel: Vessel) -> None:
     still = simulate(vessel, "turning-circle", duration_secs=10.0, sensors=suite("paper"))
     signals = resample(TrialLog("still", still.channels), channels=NAMES)
     yaw, _ = weak_form(signals, vessel.coefficients)
-    assert not any(c.determined for c in identify(yaw).coefficients.values())
+    assert not any(c.determined for c in identify(yaw)[0].coefficients.values())
 
 
 def test_a_coefficient_is_determined_two_standard_deviations_from_zero() -> None:

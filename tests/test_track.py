@@ -3,28 +3,41 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.track import EARTH_RADIUS, find_track
+from analysis.track import EARTH_RADIUS, Track, Tracking
 from recorders.simulate import SimulatedTrial
 from shiplog import Channel, Signals, TrialLog, resample
+from shiplog.clock import Clock
+from shiplog.survey import survey
+
+
+def tracked(
+    log: TrialLog, signals: Signals, yaw_rate: np.ndarray, speed: np.ndarray
+) -> tuple[Track, str]:
+    found = survey(log)
+    channels = {name: found[name] for name in signals.values if name in found}
+    clock = Clock(signals.start_ns, signals.dt_secs, len(signals), channels)
+    tracking = Tracking(clock, found.get("position"))
+    tracking.watch(log.channels)
+    return tracking.step(signals, yaw_rate, speed), tracking.origin
 
 
 def test_recorded_positions_are_the_track(zigzag: SimulatedTrial, zigzag_log: TrialLog) -> None:
     signals = resample(zigzag_log, channels=("yaw_rate", "heading"))
-    track = find_track(zigzag_log, signals, signals["yaw_rate"], signals["yaw_rate"])
-    assert track.origin == "positions recorded"
+    track, origin = tracked(zigzag_log, signals, signals["yaw_rate"], signals["yaw_rate"])
+    assert origin == "positions recorded"
     truth = zigzag.trajectory.at(np.arange(501.0))["position"]
     assert np.column_stack((track.north, track.east)) == pytest.approx(truth, abs=1e-6)
 
 
 def test_without_positions_the_track_is_dead_reckoned(zigzag: SimulatedTrial) -> None:
     channels = tuple(c for c in zigzag.channels if c.name != "position")
-    for left_out, origin in ((), "heading"), (("heading",), "yaw rate"):
+    for left_out, by in ((), "heading"), (("heading",), "yaw rate"):
         log = TrialLog("x", tuple(c for c in channels if c.name not in left_out))
         names = ("yaw_rate", "rudder", *(() if left_out else ("heading",)))
         signals = resample(log, channels=names)
         truth = zigzag.trajectory.at(signals.time_secs)
-        track = find_track(log, signals, truth["yaw_rate"], truth["speed"])
-        assert origin in track.origin
+        track, origin = tracked(log, signals, truth["yaw_rate"], truth["speed"])
+        assert by in origin
         away = np.hypot(track.north - truth["position"][:, 0], track.east - truth["position"][:, 1])
         assert away.max() < 5  # m, of four kilometres
 
@@ -37,7 +50,7 @@ def test_the_yaw_rate_bridges_where_the_compass_was_silent(zigzag: SimulatedTria
         heading = signals["heading"].copy()
         heading[silent] = np.nan
         partly = Signals(0, signals.dt_secs, dict(signals.values) | {"heading": heading})
-        track = find_track(log, partly, truth["yaw_rate"], truth["speed"])
+        track, _ = tracked(log, partly, truth["yaw_rate"], truth["speed"])
         away = np.hypot(track.north - truth["position"][:, 0], track.east - truth["position"][:, 1])
         assert away.max() < 10
 
@@ -48,8 +61,8 @@ def test_positions_that_were_never_measured_are_no_track(zigzag_log: TrialLog) -
     )
     signals = resample(zigzag_log, channels=("yaw_rate", "heading"))
     rate = signals["yaw_rate"]
-    track = find_track(TrialLog("x", blank), signals, rate, np.full(len(rate), 8.0))
-    assert "dead reckoning" in track.origin
+    _, origin = tracked(TrialLog("x", blank), signals, rate, np.full(len(rate), 8.0))
+    assert "dead reckoning" in origin
 
 
 def test_positions_on_the_globe_become_metres() -> None:
@@ -59,7 +72,7 @@ def test_positions_on_the_globe_become_metres() -> None:
         "position", "gnss", "deg", stamps, stamps, values, ("latitude", "longitude", "altitude")
     )
     signals = Signals(0, 1.0, {"yaw_rate": np.zeros(3)})
-    track = find_track(TrialLog("x", (fix,)), signals, np.zeros(3), np.zeros(3))
+    track, _ = tracked(TrialLog("x", (fix,)), signals, np.zeros(3), np.zeros(3))
     metre = np.pi / 180 * EARTH_RADIUS
     assert track.north == pytest.approx([0, 0.001 * metre, 0.001 * metre])
     assert track.east == pytest.approx([0, 0, 0.001 * metre], rel=1e-3)

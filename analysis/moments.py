@@ -1,0 +1,61 @@
+"""Mean, variance and extremes of a stream, the same to the last bit however it is cut."""
+
+import numpy as np
+
+from shiplog.compiled import compiled
+from shiplog.types import FloatArray
+
+_COUNT, _MEAN, _SQUARES, _LOWEST, _HIGHEST = range(5)
+
+
+class Moments:
+    """Of the finite values of a stream. Source: Welford, "Note on a method ...", 1962."""
+
+    def __init__(self) -> None:
+        self._sums = np.array([0.0, 0.0, 0.0, np.inf, -np.inf])
+
+    def add(self, values: FloatArray) -> None:
+        """Take the next values, (n,)."""
+        _accumulate(np.ascontiguousarray(values), self._sums)
+
+    @property
+    def count(self) -> int:
+        """How many were finite."""
+        return int(self._sums[_COUNT])
+
+    @property
+    def mean(self) -> float:
+        """The mean, NaN of none."""
+        return float(self._sums[_MEAN]) if self.count else np.nan
+
+    @property
+    def std(self) -> float:
+        """The standard deviation about the mean, NaN of none."""
+        return float(np.sqrt(self._sums[_SQUARES] / self.count)) if self.count else np.nan
+
+    @property
+    def mean_square(self) -> float:
+        """The mean of the squares, NaN of none."""
+        return float(self._sums[_SQUARES] / self.count + self.mean**2) if self.count else np.nan
+
+    @property
+    def lowest(self) -> float:
+        """The least value, NaN of none."""
+        return float(self._sums[_LOWEST]) if self.count else np.nan
+
+    @property
+    def highest(self) -> float:
+        """The greatest value, NaN of none."""
+        return float(self._sums[_HIGHEST]) if self.count else np.nan
+
+
+@compiled
+def _accumulate(values: FloatArray, sums: FloatArray) -> None:
+    for value in values:
+        if np.isfinite(value):
+            sums[_COUNT] += 1.0
+            away = value - sums[_MEAN]
+            sums[_MEAN] += away / sums[_COUNT]
+            sums[_SQUARES] += away * (value - sums[_MEAN])
+            sums[_LOWEST] = min(sums[_LOWEST], value)
+            sums[_HIGHEST] = max(sums[_HIGHEST], value)
