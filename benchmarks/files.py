@@ -1,0 +1,141 @@
+"""Reading, writing and asking: mcap's own reader and writer, one message after the other."""
+
+import struct
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import zstandard
+from mcap.reader import make_reader
+from mcap.writer import Writer
+
+from shiplog import LogWriter, TrialLog, read
+from shiplog.schema import encode, schema_for
+from shiplog.writer import channel_metadata
+
+from .bench import Bench
+from .logs import require_room, write_repeated
+from .measure import Line, run, timed
+
+
+def lines(bench: Bench) -> list[Line]:
+    """Read and write."""
+    ours, theirs = bench.folder / "ours.mcap", bench.folder / "theirs.mcap"
+    return [
+        Line(
+            "read to arrays, CRCs on",
+            "mcap's reader, and decode",
+            timed(partial(read, bench.path)),
+            timed(partial(read_messages, bench.path)),
+            at_least=80,
+            same=partial(_same_read, bench),
+        ),
+        Line(
+            "read to arrays, CRCs on",
+            "zstd alone",
+            timed(partial(read, bench.path)),
+            timed(partial(inflate, bench.path)),
+            at_most=2.5,
+        ),
+        Line(
+            "write",
+            "mcap's writer",
+            timed(partial(write_ours, bench.log, ours)),
+            timed(partial(write_messages, bench.log, theirs)),
+            at_least=8,
+            same=partial(_same_written, bench.log, ours, theirs),
+        ),
+    ]
+
+
+def info_line(bench: Bench) -> list[Line]:
+    """Whole processes, the start of Python included."""
+    days = f"{bench.info_hours / 24:.3g} days"
+    path = bench.folder / "info.mcap"
+
+    def written() -> None:
+        require_room(bench.folder, bench.info_hours)
+        write_repeated(bench.log, bench.info_hours, path)
+
+    return [
+        Line(
+            f"`shiplog info` of {days}",
+            '`python -c "import numpy"`',
+            lambda: run([sys.executable, "-m", "shiplog", "info", str(path)]).secs,
+            lambda: run([sys.executable, "-c", "import numpy"]).secs,
+            at_most=3,
+            note="whole processes",
+            same=written,
+        )
+    ]
+
+
+def read_messages(path: Path) -> dict[str, tuple[list[int], list[float]]]:
+    """The times and the values of each topic."""
+    found: dict[str, tuple[list[int], list[float]]] = {}
+    with path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            (value,) = struct.unpack_from("<d", message.data, 1)
+            times, values = found.setdefault(channel.topic, ([], []))
+            times.append(message.publish_time)
+            values.append(value)
+    return found
+
+
+def inflate(path: Path) -> int:
+    """What zstd alone takes: no reader can be faster."""
+    inflater, total, data = zstandard.ZstdDecompressor(), 0, memoryview(path.read_bytes())
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    for index in summary.chunk_indexes if summary else ():
+        end = index.chunk_start_offset + index.chunk_length
+        body = data[end - index.compressed_size : end]
+        total += len(inflater.decompress(body, index.uncompressed_size))
+    return total
+
+
+def write_ours(log: TrialLog, path: Path) -> None:
+    """By columns."""
+    with LogWriter(path) as writer:
+        writer.write(*log)
+
+
+def write_messages(log: TrialLog, path: Path) -> None:
+    """One message after the other, in the order of reception."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        scalar = schema_for(())
+        schema_id = writer.register_schema(scalar.name, "protobuf", scalar.descriptor_set)
+        messages = []
+        for channel in log:
+            said = channel_metadata(channel)
+            channel_id = writer.register_channel(channel.topic, "protobuf", schema_id, said)
+            stamps = zip(channel.received_ns.tolist(), channel.measured_ns.tolist(), strict=True)
+            messages += [
+                (received, channel_id, measured, data)
+                for (received, measured), data in zip(stamps, encode(channel), strict=True)
+            ]
+        messages.sort(key=lambda message: message[0])
+        for received, channel_id, measured, data in messages:
+            writer.add_message(channel_id, received, data, measured)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _same_read(bench: Bench) -> None:
+    theirs = read_messages(bench.path)
+    for channel in read(bench.path):
+        times, values = theirs[channel.topic]
+        np.testing.assert_array_equal(channel.measured_ns, times)
+        np.testing.assert_array_equal(channel.values, values)
+
+
+def _same_written(log: TrialLog, ours: Path, theirs: Path) -> None:
+    write_ours(log, ours)
+    write_messages(log, theirs)
+    for one, other in zip(read(ours), read(theirs), strict=True):
+        assert one.topic == other.topic  # noqa: S101 - this is what is verified
+        np.testing.assert_array_equal(one.measured_ns, other.measured_ns)
+        np.testing.assert_array_equal(one.received_ns, other.received_ns)
+        np.testing.assert_array_equal(one.values, other.values)
