@@ -33,6 +33,7 @@ from .with_filterpy import filter_in_filterpy
 
 DT = 0.1
 WINDOW = 2000  # samples: 200 s
+STRIDE = 10  # samples from one window to the next: a second, as ours
 YAW_FREQUENCY, SURGE_FREQUENCY = 0.05, 0.02  # rad/s, of the observers
 DEGREES, KNOTS = 180 / pi, 3600 / 1852
 
@@ -89,13 +90,13 @@ def replay(path: Path, out: Path, c: Coefficients, minutes: float | None = None)
         stage.done, stage.whole = len(signals), whole
     with _stage(stages, "coefficients") as stage:
         coefficients, stds = identify(signals, filtered.states, c)
-        stage.done, stage.whole = len(coefficients), max(1, whole - WINDOW + 1)
+        stage.done, stage.whole = len(coefficients), windows_of(whole)
     found = Replay(signals, filtered, disturbance, coefficients, stds, stages)
     with _stage(stages, "review") as stage:
         per_sample = log_all(found, out)
-        windows = coefficients.shape[1]
-        stage.done = len(signals) * per_sample + len(coefficients) * windows
-        stage.whole = whole * per_sample + max(1, whole - WINDOW + 1) * windows
+        each = coefficients.shape[1]
+        stage.done = len(signals) * per_sample + len(coefficients) * each
+        stage.whole = whole * per_sample + windows_of(whole) * each
     return found
 
 
@@ -199,13 +200,18 @@ def identify(
     ks_delta_dot = ks * np.gradient(delta, DT)
     yaw = np.column_stack((w_dot, w, w * np.abs(w), w**3, ks * delta, ks_delta_dot))
     surge = np.column_stack((w**2, v**2, n))
-    count = max(0, len(w) - WINDOW + 1)
+    count = windows_of(len(w))
     values, stds = np.empty((count, 9)), np.empty((count, 9))
     for k in range(count):
-        window = slice(k, k + WINDOW)
+        window = slice(STRIDE * k, STRIDE * k + WINDOW)
         values[k, :6], stds[k, :6] = least_squares(yaw[window], w_ddot[window])
         values[k, 6:], stds[k, 6:] = least_squares(surge[window], v_dot[window])
     return values, stds
+
+
+def windows_of(samples: int) -> int:
+    """How many windows fit."""
+    return max(0, (samples - WINDOW) // STRIDE + 1)
 
 
 def least_squares(X: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -225,7 +231,6 @@ def log_all(found: Replay, out: Path) -> int:
     east = np.cumsum(states[:, 3] * np.sin(heading)) * DT
     recording = rr.RecordingStream("obvious replay")
     recording.save(out)
-    first = len(signals) - len(found.coefficients)
     for k, t in enumerate(signals.time_secs):
         recording.set_time("time", duration=t)
         recording.set_time("stamp", timestamp=signals.start_ns * 1e-9 + t)
@@ -246,8 +251,9 @@ def log_all(found: Replay, out: Path) -> int:
         recording.log("rudder/measured", rr.Scalars(signals["rudder"][k] * DEGREES))
         recording.log("rpm/measured", rr.Scalars(signals["rpm"][k]))
         recording.log("track/now", rr.Points2D([[east[k], -north[k]]]))
-        if k >= first:
-            log_coefficients(recording, found.coefficients[k - first], found.stds[k - first])
+        window, within = divmod(k - WINDOW + 1, STRIDE)
+        if window >= 0 and within == 0:
+            log_coefficients(recording, found.coefficients[window], found.stds[window])
     recording.log("track/line", rr.LineStrips2D([np.column_stack((east, -north))]), static=True)
     recording.flush()
     recording.disconnect()

@@ -9,6 +9,7 @@ __version__ = "0.1.0"
 
 from .clock import resample
 from .errors import LayoutError, LogError, ShiplogError, UsageError, VesselError
+from .log_file import LogFile, open_log
 from .reader import read
 from .types import Channel, Signals, TrialLog
 from .vessel import Vessel, load_vessel
@@ -18,6 +19,7 @@ __all__ = [
     "Channel",
     "LayoutError",
     "LogError",
+    "LogFile",
     "LogWriter",
     "ShiplogError",
     "Signals",
@@ -26,6 +28,7 @@ __all__ = [
     "Vessel",
     "VesselError",
     "load_vessel",
+    "open_log",
     "read",
     "resample",
     "write",

@@ -65,8 +65,8 @@ class LogFile:
     def slabs(self) -> Iterator[tuple[Channel, ...]]:
         """The samples in the order of the file, about `SLAB_SAMPLES` at a time.
 
-        A slab has a channel for each topic with samples in it, as `read` would give them: those
-        of a topic, one after the other, are what `read` gives.
+        Each slab has every channel, though some may have no samples in it; those of a channel,
+        one slab after the other, are what `read` gives.
 
         Raises `LogError` as `read` does.
         """
@@ -74,18 +74,15 @@ class LogFile:
         with open_mcap(self.path) as stream:
             for _ in scan(stream, contents):
                 if contents.held >= SLAB_SAMPLES:
-                    yield from self._chosen(trial_log(self.path, contents))
+                    yield self._chosen(trial_log(self.path, contents))
         rest = trial_log(self.path, contents)
-        yield from self._chosen(rest)
+        yield self._chosen(rest)
         self.known = replace(rest, channels=self.known.channels)
 
-    def _chosen(self, slab: TrialLog) -> Iterator[tuple[Channel, ...]]:
-        """A slab's channels that have samples, in the order of those asked for; if there are."""
-        by_topic = {(c.topic, c.fields): c for c in slab if len(c)}
-        keys = [(c.topic, c.fields) for c in self.known]
-        channels = tuple(by_topic[key] for key in keys if key in by_topic)
-        if channels:
-            yield channels
+    def _chosen(self, slab: TrialLog) -> tuple[Channel, ...]:
+        """A slab's channels, in the order of those asked for."""
+        found = {(c.topic, c.fields): c for c in slab}
+        return tuple(found.get((c.topic, c.fields), c) for c in self.known)
 
 
 def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:

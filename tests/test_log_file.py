@@ -62,9 +62,7 @@ def whole(slabs: Iterator[tuple[Channel, ...]]) -> dict[Any, Channel]:
     """The slabs of each topic, one after the other."""
     parts: dict[Any, list[Channel]] = defaultdict(list)
     for slab in slabs:
-        assert slab
         for part in slab:
-            assert len(part)
             parts[part.topic, part.fields].append(part)
     return {
         key: replace(
@@ -82,7 +80,7 @@ def described(c: Channel) -> tuple[object, ...]:
 
 
 def assert_as_read(log: LogFile, read_whole: TrialLog) -> None:
-    found = whole(log.slabs())
+    found = {key: c for key, c in whole(log.slabs()).items() if len(c)}
     expected = {(c.topic, c.fields): c for c in read_whole if len(c)}
     assert found.keys() == expected.keys()
     for key, c in expected.items():
@@ -162,8 +160,7 @@ def test_a_slab_has_about_as_many_samples_as_it_should_and_its_channels_in_order
     for slab in slabs[:-1]:
         assert SLAB <= sum(map(len, slab)) <= SLAB + 4000 // 40
     for slab in slabs:
-        here = [c.topic for c in slab]
-        assert here == sorted(here, key=topics.index)
+        assert [c.topic for c in slab] == topics
 
 
 def test_what_is_known_before_the_first_pass_is_what_the_summary_says(path: Path) -> None:
@@ -268,7 +265,7 @@ def test_a_chosen_source_stands_alone_and_first_in_every_slab(path: Path) -> Non
     log = in_its_file(path).preferring(chosen)
     for slab in log.slabs():
         topics = [c.topic for c in slab]
-        assert topics in (["/yaw_rate/imu", "/speed/test"], ["/speed/test"], ["/yaw_rate/imu"])
+        assert topics == ["/yaw_rate/imu", "/speed/test"]
     assert_as_read(log, read(path).preferring(chosen))
 
 
