@@ -110,43 +110,51 @@ class Replay:
         self, log: Log, vessel: Vessel | None = None, *, on_step: Tell = lambda _step, _share: None
     ) -> None:
         self._log, self._tell = log, on_step
-        on_step("check", 0.0)
-        self.survey = found = survey(log, strict=True)
-        also = tuple(name for name in ("heading", "position") if name in found)
-        warnings = [*log.warnings, *faults(found, (*NEEDED, *also))]
-        self.clock = set_clock(log, found, channels=NEEDED, optional=("heading",))
-
+        self._findings: Findings | None = None
+        self._warnings: list[str] = []
+        self.survey, self.clock = self._surveyed()
         stated = _stated_model(log, vessel)
-        alphas = stated[0].coefficients if stated else BARE
+        self.usual, self._yaw, self._surge = self._gauged(
+            stated[0].coefficients if stated else BARE
+        )
+        on_step("model", 0.0)
+        self.vessel, self.model_origin = stated or (self._first_model(), FITTED)
+        settings = _averaged(self.vessel.filter, self.survey, self.clock.dt_secs)
+        self.noise = noise_of(self.usual, self.vessel.coefficients, settings)
+
+    def _surveyed(self) -> tuple[Survey, Clock]:
+        """The first time through the log."""
+        self._tell("check", 0.0)
+        found = survey(self._log, strict=True)
+        also = tuple(name for name in ("heading", "position") if name in found)
+        self._warnings += [*self._log.warnings, *faults(found, (*NEEDED, *also))]
+        return found, set_clock(self._log, found, channels=NEEDED, optional=("heading",))
+
+    def _gauged(self, alphas: Coefficients) -> tuple[Gauge, Identifying, Identifying]:
+        """The second time: what is usual, and the whole trial's yaw and surge equations."""
         gauging, holding, weak_form = Gauging(alphas), Holding(self.clock), self._weak_form(alphas)
-        self._yaw = Identifying(weak_form.rows, constant=True)
-        self._surge = Identifying(weak_form.rows)
-        doubts = RudderWatch(found), GyroWatch(found)
+        yaw, surge = Identifying(weak_form.rows, constant=True), Identifying(weak_form.rows)
+        doubts = RudderWatch(self.survey), GyroWatch(self.survey)
         for signals in self._on_clock("one clock", holding.watch, *(d.add for d in doubts)):
             gauging.add(holding.held(signals))
             yaw_rows, surge_rows = weak_form.step(signals, gauging.fastest)
-            self._yaw.fit(yaw_rows)
-            self._surge.fit(surge_rows)
-        self.usual = gauging.result()
-        _require_outputs(log, self.usual)
-        warnings += doubtful(found, NEEDED)
-        warnings += [said for doubt in doubts if (said := doubt.warning())]
-        warnings += [*silent_ends(found, self.clock, NEEDED), *holding.said()]
+            yaw.fit(yaw_rows)
+            surge.fit(surge_rows)
+        usual = gauging.result()
+        _require_outputs(self._log, usual)
+        self._warnings += doubtful(self.survey, NEEDED)
+        self._warnings += [said for doubt in doubts if (said := doubt.warning())]
+        self._warnings += [*silent_ends(self.survey, self.clock, NEEDED), *holding.said()]
+        return usual, yaw, surge
 
-        on_step("model", 0.0)
-        self.vessel, self.model_origin = stated or (
-            fit_first_model(self._yaw, self._surge, self.usual, log.name),
-            FITTED,
-        )
-        model = self.vessel.coefficients
-        if not stated and not (model.a < 0 and model.g <= 0 and model.h >= 0):
-            warnings.append(
+    def _first_model(self) -> Vessel:
+        vessel = fit_first_model(self._yaw, self._surge, self.usual, self._log.name)
+        model = vessel.coefficients
+        if not (model.a < 0 and model.g <= 0 and model.h >= 0):
+            self._warnings.append(
                 "the model fitted to this log is no ship's: too little moves in it to tell"
             )
-        settings = _averaged(self.vessel.filter, found, self.clock.dt_secs)
-        self.noise = noise_of(self.usual, model, settings)
-        self._warnings = tuple(warnings)
-        self._findings: Findings | None = None
+        return vessel
 
     def slabs(self) -> Iterator[Slab]:
         """Replay the trial, once.
@@ -184,7 +192,7 @@ class Replay:
             yaw=self._yaw.result(),
             surge=self._surge.result(),
             track_origin=tracking.origin,
-            warnings=self._warnings,
+            warnings=tuple(self._warnings),
         )
 
     @property
