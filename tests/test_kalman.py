@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.design import discretise, pseudo_input_matrices, pseudo_inputs
-from analysis.gauge import gauge, noise_level
+from analysis.gauge import gauge
 from analysis.kalman import (
     OUTPUTS,
     PAPER_RATIO,
@@ -172,30 +172,6 @@ def test_with_nothing_measured_the_filter_only_predicts(vessel: Vessel) -> None:
     truth = trial.trajectory.at(signals.time_secs)
     assert estimates.states[:, 0] == pytest.approx(truth["yaw_rate"], abs=1e-8)
     assert estimates.states[:, 3] == pytest.approx(truth["speed"], abs=1e-6)
-
-
-def test_noise_is_found_below_the_ships_motion(vessel: Vessel) -> None:
-    sensors = suite("white", {"yaw_rate.white": 3e-4, "speed.white": 0.07, "speed.rate_hz": 2.0})
-    trial = simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=sensors)
-    signals = on_one_clock(trial)
-    assert noise_level(signals["yaw_rate"]) == pytest.approx(3e-4, rel=0.05)
-    assert noise_level(signals["speed"]) == pytest.approx(0.07, rel=0.1)
-
-
-def test_a_spike_and_a_gap_do_not_pass_for_noise() -> None:
-    values = np.random.default_rng(2).standard_normal(5000)
-    values[1000] += 500
-    values[2000:2500] = np.nan
-    assert noise_level(values) == pytest.approx(1, rel=0.05)
-
-
-def test_a_signal_printed_to_few_digits_has_the_noise_of_its_rounding() -> None:
-    values = np.round(np.sin(np.arange(5000) / 500), 2)
-    assert noise_level(values) == pytest.approx(0.01 / np.sqrt(12), rel=0.5)
-
-
-def test_four_samples_are_needed_to_tell_noise() -> None:
-    assert np.isnan(noise_level(np.array([1.0, 2.0, np.nan])))
 
 
 def test_what_the_vessel_file_states_is_taken(zigzag: SimulatedTrial, vessel: Vessel) -> None:
