@@ -26,7 +26,7 @@ class Gauge:
     measured: tuple[int, int]  # how many instants have a sample of each output
     first: FloatArray  # the first values measured
     spread: FloatArray  # their standard deviation about the mean
-    interval_secs: FloatArray  # the usual one from sample to sample
+    intervals: FloatArray  # instants: the usual number from sample to sample
     noise: FloatArray  # standard deviation of white noise in them
     turning: float  # rad/s, the root of the mean square
     ahead: float  # m/s, the median speed
@@ -34,6 +34,11 @@ class Gauge:
     rpm: float  # the median
     steering: float  # the rudder's largest effect, `ship.rudder_effects`
     head: Signals  # the first of the signals, the inputs held
+
+    @property
+    def interval_secs(self) -> FloatArray:
+        """(2,) the usual time from sample to sample."""
+        return self.intervals * self.dt_secs
 
     @property
     def longest_steps(self) -> FloatArray:
@@ -80,7 +85,7 @@ class Gauging:
             measured=(outputs[0].moments.count, outputs[1].moments.count),
             first=np.array([output.first for output in outputs]),
             spread=np.array([output.moments.std for output in outputs]),
-            interval_secs=np.array([output.interval() * self._dt for output in outputs]),
+            intervals=np.array([output.interval() for output in outputs]),
             noise=np.array([output.noise.level() for output in outputs]),
             turning=float(np.sqrt(yaw_rate.mean_square)),
             ahead=self._speed.median(),

@@ -20,7 +20,7 @@ class Holding:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._last = dict.fromkeys(INPUTS, np.nan)
-        self._last_ns = dict.fromkeys(INPUTS, -1)
+        self._last_ns = dict.fromkeys(INPUTS, np.iinfo(np.int64).min)
         self.missing = dict.fromkeys(INPUTS, 0)  # instants
 
     def watch(self, slab: tuple[Channel, ...]) -> None:

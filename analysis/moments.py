@@ -5,14 +5,17 @@ import numpy as np
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray
 
-_COUNT, _MEAN, _SQUARES, _LOWEST, _HIGHEST = range(5)
+_COUNT, _FIRST, _MEAN, _SQUARES, _LOWEST, _HIGHEST = range(6)
 
 
 class Moments:
-    """Of the finite values of a stream. Source: Welford, "Note on a method ...", 1962."""
+    """Of the finite values of a stream, the mean counted from the first of them.
+
+    Source: Welford, "Note on a method for calculating corrected sums of squares", 1962.
+    """
 
     def __init__(self) -> None:
-        self._sums = np.array([0.0, 0.0, 0.0, np.inf, -np.inf])
+        self._sums = np.array([0.0, 0.0, 0.0, 0.0, np.inf, -np.inf])
 
     def add(self, values: FloatArray) -> None:
         """Take the next values, (n,)."""
@@ -26,7 +29,7 @@ class Moments:
     @property
     def mean(self) -> float:
         """The mean, NaN of none."""
-        return float(self._sums[_MEAN]) if self.count else np.nan
+        return float(self._sums[_FIRST] + self._sums[_MEAN]) if self.count else np.nan
 
     @property
     def std(self) -> float:
@@ -53,9 +56,12 @@ class Moments:
 def _accumulate(values: FloatArray, sums: FloatArray) -> None:
     for value in values:
         if np.isfinite(value):
+            if sums[_COUNT] == 0:
+                sums[_FIRST] = value
             sums[_COUNT] += 1.0
-            away = value - sums[_MEAN]
+            since = value - sums[_FIRST]
+            away = since - sums[_MEAN]
             sums[_MEAN] += away / sums[_COUNT]
-            sums[_SQUARES] += away * (value - sums[_MEAN])
+            sums[_SQUARES] += away * (since - sums[_MEAN])
             sums[_LOWEST] = min(sums[_LOWEST], value)
             sums[_HIGHEST] = max(sums[_HIGHEST], value)

@@ -19,8 +19,8 @@ from shiplog.gyro_bias import GyroWatch
 from shiplog.quality import faults
 from shiplog.rudder_sign import RudderWatch
 from shiplog.ship import Coefficients
-from shiplog.survey import Survey, longest_step_secs, survey
-from shiplog.types import Log
+from shiplog.survey import Survey, survey
+from shiplog.types import FloatArray, Log
 from shiplog.vessel import FilterSettings, parse_vessel
 
 from .disturbance import Course, Disturbance, Observing
@@ -110,6 +110,7 @@ class Replay:
         self, log: Log, vessel: Vessel | None = None, *, on_step: Tell = lambda _step, _share: None
     ) -> None:
         self._log, self._tell = log, on_step
+        self._begun = False
         self._findings: Findings | None = None
         self._warnings: list[str] = []
         self.survey, self.clock = self._surveyed()
@@ -131,21 +132,28 @@ class Replay:
         return found, set_clock(self._log, found, channels=NEEDED, optional=("heading",))
 
     def _gauged(self, alphas: Coefficients) -> tuple[Gauge, Identifying, Identifying]:
-        """The second time: what is usual, and the whole trial's yaw and surge equations."""
-        gauging, holding, weak_form = Gauging(alphas), Holding(self.clock), self._weak_form(alphas)
-        yaw, surge = Identifying(weak_form.rows, constant=True), Identifying(weak_form.rows)
-        doubts = RudderWatch(self.survey), GyroWatch(self.survey)
+        """The second time: what is usual, and the whole trial's yaw and surge equations.
+
+        For these one must know how far apart samples stand on the clock, which is only told by
+        then. It is nearly always what the survey lets expect; where not, they are made once more.
+        """
+        clock, doubts = self.clock, (RudderWatch(self.survey), GyroWatch(self.survey))
+        holding, gauging = Holding(clock), Gauging(alphas)
+        expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in OUTPUTS]
+        equations = _Equations(alphas, clock, np.maximum(np.round(expected), 1.0))
         for signals in self._on_clock("one clock", holding.watch, *(d.add for d in doubts)):
             gauging.add(holding.held(signals))
-            yaw_rows, surge_rows = weak_form.step(signals, gauging.fastest)
-            yaw.fit(yaw_rows)
-            surge.fit(surge_rows)
+            equations.add(signals, gauging.fastest)
         usual = gauging.result()
+        if not np.array_equal(usual.intervals, equations.intervals):
+            equations = _Equations(alphas, clock, usual.intervals)
+            for signals in self._on_clock("one clock"):
+                equations.add(signals, usual.fastest)
         _require_outputs(self._log, usual)
         self._warnings += doubtful(self.survey, NEEDED)
         self._warnings += [said for doubt in doubts if (said := doubt.warning())]
-        self._warnings += [*silent_ends(self.survey, self.clock, NEEDED), *holding.said()]
-        return usual, yaw, surge
+        self._warnings += [*silent_ends(self.survey, clock, NEEDED), *holding.said()]
+        return usual, equations.yaw, equations.surge
 
     def _first_model(self) -> Vessel:
         vessel = fit_first_model(self._yaw, self._surge, self.usual, self._log.name)
@@ -161,11 +169,13 @@ class Replay:
 
         Raises `LogError` where the model does not fit it at all.
         """
+        if self._begun:
+            raise ValueError("the slabs of a replay come once; make another")
+        self._begun = True
         model, holding = self.vessel.coefficients, Holding(self.clock)
-        filtering = Filter(model, self.noise, self.usual)
-        observing = self._observing()
+        filtering, observing = self._designed()
         judging = [self._judging(output) for output in range(len(OUTPUTS))]
-        weak_form = self._weak_form(model)
+        weak_form = _weak_form(model, self.clock, self.usual.intervals)
         tracking = Tracking(self.clock, self.survey.get("position"))
         on_clock = self._on_clock("replay", holding.watch, tracking.watch)
         for signals, held, following in held_throughout(on_clock, holding):
@@ -218,30 +228,46 @@ class Replay:
             yield signals
             self._tell(step, (signals.first + len(signals)) / self.clock.count)
 
-    def _weak_form(self, model: Coefficients) -> WeakForm:
-        clock = self.clock
-        longest = {
-            name: longest_step_secs(max(clock.channels[name].usual_known_secs, clock.dt_secs))
-            for name in NEEDED
-        }
-        return WeakForm(model, clock.count, clock.dt_secs, longest)
-
-    def _observing(self) -> Observing:
+    def _designed(self) -> tuple[Filter, Observing]:
+        """The filter and the observer; of a model that runs away neither may be had."""
+        model = self.vessel.coefficients
         try:
-            return Observing(self.vessel.coefficients, self.noise, self.usual)
-        except UsageError as error:  # one of the model's modes is beyond any gain
+            with np.errstate(over="ignore", invalid="ignore"):
+                filtering = Filter(model, self.noise, self.usual)
+                return filtering, Observing(model, self.noise, self.usual)
+        except (UsageError, np.linalg.LinAlgError) as error:
             raise self._runs_away() from error
 
     def _judging(self, output: int) -> Judging:
-        step = float(self.usual.interval_secs[output]) / self.clock.dt_secs
-        unit = self.survey[OUTPUTS[output]].unit
-        return Judging(OUTPUTS[output], unit, step, noise_measured=self.noise.measured[output])
+        unit, interval = self.survey[OUTPUTS[output]].unit, float(self.usual.intervals[output])
+        return Judging(OUTPUTS[output], unit, interval, noise_measured=self.noise.measured[output])
 
     def _runs_away(self) -> LogError:
         return LogError(
             f"the filter runs away: the model does not fit this log ({self.model_origin}); "
             f"give the ship's own with --vessel: {self._log.name}"
         )
+
+
+class _Equations:
+    """The whole trial's equations of yaw and surge, from signals in slabs."""
+
+    def __init__(self, alphas: Coefficients, clock: Clock, intervals: FloatArray) -> None:
+        self.intervals = intervals
+        self._weak_form = _weak_form(alphas, clock, intervals)
+        self.yaw = Identifying(self._weak_form.rows, constant=True)
+        self.surge = Identifying(self._weak_form.rows)
+
+    def add(self, signals: Signals, fastest: float) -> None:
+        """Take the next signals; `fastest` is the greatest speed so far, m/s."""
+        yaw_rows, surge_rows = self._weak_form.step(signals, fastest)
+        self.yaw.fit(yaw_rows)
+        self.surge.fit(surge_rows)
+
+
+def _weak_form(model: Coefficients, clock: Clock, intervals: FloatArray) -> WeakForm:
+    """The inputs are known at every instant, but for their gaps."""
+    return WeakForm(model, clock.count, clock.dt_secs, (*intervals.tolist(), 1.0, 1.0))
 
 
 def _stated_model(log: Log, given: Vessel | None) -> tuple[Vessel, str] | None:

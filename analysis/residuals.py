@@ -5,7 +5,7 @@ from math import isnan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray
@@ -118,7 +118,8 @@ class _Products:
     """Sums over pairs of measurements at each lag, before their mean is known.
 
     With it, the sums of (a - m) (b - m) and of its square follow from those of ab, a + b, their
-    squares and their product.
+    squares and their product. All are counted from the first innovation, lest they cancel where
+    the mean is far from zero.
     """
 
     def __init__(self, usual_step: float) -> None:
@@ -126,11 +127,14 @@ class _Products:
         self._sums = np.zeros((LAGS, 6))
         self._last, self._numbers = np.zeros(LAGS), np.zeros(LAGS, np.int64)  # ring of measurements
         self._measured = self._count = 0
+        self._origin: float | None = None
 
     def add(self, innovations: FloatArray) -> None:
         """Take the next innovations."""
+        if self._origin is None and np.isfinite(innovations).any():
+            self._origin = float(innovations[np.isfinite(innovations)][0])
         self._measured = _add_products(
-            np.ascontiguousarray(innovations), self._count, self._measured, self._usual,
+            innovations - (self._origin or 0.0), self._count, self._measured, self._usual,
             self._last, self._numbers, self._sums,
         )  # fmt: skip
         self._count += len(innovations)
@@ -139,6 +143,7 @@ class _Products:
         """The test's p-value for innovations of that mean; NaN if too few."""
         if count < FEWEST:
             return float("nan")
+        m -= self._origin or 0.0
         pairs, ab, a_plus_b, ab_squared, a_plus_b_squared, both = self._sums.T
         covariance = ab - m * a_plus_b + m**2 * pairs
         spread = (
@@ -147,7 +152,7 @@ class _Products:
         )  # fmt: skip
         used = (pairs >= FEWEST) & (spread > 0)
         statistic = float(np.sum(covariance[used] ** 2 / spread[used]))
-        return float(chi2.sf(statistic, np.count_nonzero(used))) if used.any() else float("nan")
+        return float(chdtrc(np.count_nonzero(used), statistic)) if used.any() else float("nan")
 
 
 @compiled

@@ -13,6 +13,7 @@ from shiplog.types import FloatArray, Signals
 from .stacking import stacked
 
 EARTH_RADIUS = 6_371_008.8  # m, mean
+BRIDGED = 1 << 20  # instants of a compass's silence; beyond, the gyro goes on from its last word
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,11 @@ class Tracking:
 
 
 class _Reckoning:
-    """Dead reckoning in slabs; what follows the last heading known waits for the next."""
+    """Dead reckoning in slabs; what follows the last heading known waits for the next.
+
+    It does not wait for ever: after a silence of `BRIDGED` the compass is taken for lost, and the
+    gyro goes on alone until there is a heading again.
+    """
 
     def __init__(self, clock: Clock) -> None:
         self._clock, self._compass = clock, "heading" in clock.channels
@@ -99,10 +104,10 @@ class _Reckoning:
         self._turned, turned = float(sums[-1]), sums * dt
         self._waiting = np.concatenate((self._waiting, np.column_stack((turned, speed))))
         if self._compass:
-            known = np.flatnonzero(np.isfinite(slab["heading"]))
-            off = np.column_stack((known + slab.first, slab["heading"][known] - turned[known]))
-            self._off = np.concatenate((self._off, off))
-        until = end if end == self._clock.count or not self._compass else self._known_until()
+            self._look_at_compass(slab, turned)
+        last = int(self._off[-1, 0]) if len(self._off) else -1
+        waits = self._compass and end < self._clock.count and end - 1 - last <= BRIDGED
+        until = last + 1 if waits else end
         at = np.arange(self._reckoned, until)
         turned, speed = self._waiting[: len(at)].T
         self._waiting, self._reckoned = self._waiting[len(at) :], until
@@ -118,5 +123,12 @@ class _Reckoning:
         north, east = (positions - self._start).T
         return Track(at * dt, north, east)
 
-    def _known_until(self) -> int:
-        return int(self._off[-1, 0]) + 1 if len(self._off) else 0
+    def _look_at_compass(self, slab: Signals, turned: FloatArray) -> None:
+        known = np.flatnonzero(np.isfinite(slab["heading"]))
+        off = np.column_stack((known + slab.first, slab["heading"][known] - turned[known]))
+        before = self._off if len(self._off) else np.array([[-1.0, 0.0]])
+        rows = np.concatenate((before, off))
+        lost = np.flatnonzero(np.diff(rows[:, 0]) > BRIDGED)
+        held = np.column_stack((rows[lost + 1, 0] - 1, rows[lost, 1]))
+        rows = np.insert(rows, lost + 1, held, axis=0)
+        self._off = rows[len(before) - len(self._off) :]

@@ -12,7 +12,7 @@ integrated by parts: the derivatives go over to phi,
 and only what was measured remains. One bump gives one row of a linear regression.
 """
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,25 +66,24 @@ def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
     Of `model` only the alphas are used. `signals` must have NaN in `rudder` and `rpm` too where
     they were not measured.
     """
-    dt = signals.dt_secs
-    intervals = (np.diff(np.flatnonzero(np.isfinite(signals[name]))) for name in NAMES)
-    usual = (float(np.median(steps)) * dt if len(steps) else dt for steps in intervals)
-    longest = {n: longest_step_secs(secs) for n, secs in zip(NAMES, usual, strict=True)}
+    steps = (np.diff(np.flatnonzero(np.isfinite(signals[name]))) for name in NAMES)
+    usual = [float(np.median(step)) if len(step) else 1.0 for step in steps]
     fastest = float(np.nanmax(np.abs(signals["speed"])))
-    return WeakForm(model, len(signals), dt, longest).step(signals, fastest)
+    return WeakForm(model, len(signals), signals.dt_secs, usual).step(signals, fastest)
 
 
 class WeakForm:
     """Makes rows of signals that come in slabs, `count` instants in all.
 
-    `longest_secs` is how far apart two samples of a channel may stand without a gap.
+    `intervals` (4,) are the usual numbers of instants from one sample of `NAMES` to the next.
     """
 
     def __init__(
-        self, model: Coefficients, count: int, dt: float, longest_secs: Mapping[str, float]
+        self, model: Coefficients, count: int, dt: float, intervals: Sequence[float]
     ) -> None:
         self._model, self._count, self._dt = model, count, dt
-        self._longest = {name: longest_secs[name] / dt for name in NAMES}
+        longest = [longest_step_secs(interval * dt) / dt for interval in intervals]
+        self._longest = dict(zip(NAMES, longest, strict=True))
         self._reach = int(max(self._longest.values())) + 2  # over which a sample has influence
         self._half = max(2, round(min(BUMP_SECS, count * dt / 5) / dt / 2))
         self._stride = max(1, round(STRIDE_SECS / dt))
@@ -132,8 +131,10 @@ class WeakForm:
         needed = slice(start, start + (count - 1) * self._stride + self._width)
         w, v, delta, delta_dot, n = (x[needed] for x in (w, v, delta, delta_dot, n))
         ks = rudder_effects(self._model, v, n)
+        with np.errstate(invalid="ignore", over="ignore"):  # a model that runs away
+            steering, steering_rate = ks * delta, ks * delta_dot
         return _integrated(
-            w, v, delta, n, ks * delta, ks * delta_dot, *self._bump, self._stride, count
+            w, v, delta, n, steering, steering_rate, *self._bump, self._stride, count
         )
 
 

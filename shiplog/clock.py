@@ -19,6 +19,7 @@ from .units import CATALOGUE
 
 MAX_SAMPLES = 20_000_000  # of a grid that hardly anything stands on: beyond it the times are wrong
 SPARSEST = 20  # instants of such a grid to a sample
+MOST_INSTANTS = 1 << 18  # of a slab: a silence of days comes in several
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,17 +85,22 @@ def set_clock(
 
 
 def on_clock(slabs: Iterable[tuple[Channel, ...]], clock: Clock) -> Iterator[Signals]:
-    """A log that comes in slabs on the clock, in consecutive slabs from first instant to last."""
+    """A log that comes in slabs on the clock, in consecutive slabs from first instant to last.
+
+    The slabs that come must follow one another in the order of reception.
+    """
     placing = {name: _placing(channel, clock) for name, channel in clock.channels.items()}
-    done = 0
+    done, received_ns = 0, np.iinfo(np.int64).min
     for slab in slabs:
+        received_ns = max([received_ns, *(int(c.received_ns.max()) for c in slab if len(c))])
         for place in placing.values():
             place.add(slab)
-        ready = min(clock.count, *(place.ready for place in placing.values()))
-        if ready > done:
-            values = {name: place.placed(done, ready) for name, place in placing.items()}
+        ready = min(place.ready(received_ns) for place in placing.values())
+        while done < ready:
+            end = min(done + MOST_INSTANTS, ready)
+            values = {name: place.placed(done, end) for name, place in placing.items()}
             yield Signals(clock.start_ns, clock.dt_secs, values, done)
-            done = ready
+            done = end
 
 
 def _require_samples(log: Log, name: str, channel: ChannelSurvey) -> None:
@@ -165,13 +171,22 @@ class _Placing:
             self._seen += len(times)
             self._times = np.concatenate((self._times, times))
             self._values = np.concatenate((self._values, self._prepared(values)))
+            # of what was before the clock's first instant the last is enough
+            early = int(np.searchsorted(self._times, -self._clock.dt_secs))
+            self._drop(max(early - 1, 0))
 
-    @property
-    def ready(self) -> int:
-        """Before which instant of the clock no sample can change anything any more."""
+    def ready(self, received_ns: int) -> int:
+        """Before which instant of the clock no sample can change anything any more.
+
+        All that was received before `received_ns` was added.
+        """
         if self._seen == self._channel.known:
             return self._clock.count
-        return floor(self._times[-1] / self._clock.dt_secs) if len(self._times) else 0
+        last = float(self._times[-1]) if len(self._times) else -inf
+        # of a channel that is silent: what is yet to come was measured after this
+        silent = (received_ns - self._channel.delay_ns - self._clock.start_ns) * 1e-9
+        until = silent if silent - last > self._channel.gap_threshold_secs else last
+        return min(max(floor(until / self._clock.dt_secs), 0), self._clock.count)
 
     def _prepared(self, values: FloatArray) -> FloatArray:
         return values
@@ -204,6 +219,8 @@ class _Interpolation(_Placing):
     def placed(self, first: int, end: int) -> FloatArray:
         """The values at the instants from `first` to before `end`, which must be ready."""
         dt, times = self._clock.dt_secs, self._times
+        if not len(times):
+            return np.full(end - first, np.nan)
         grid = np.arange(first, end) * dt
         placed = np.interp(grid, times, self._values)
         after = np.searchsorted(times, grid - 1e-6 * dt)

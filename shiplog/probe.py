@@ -15,15 +15,17 @@ class Probe:
         self._at, self._gap = at, gap_secs
         self._values = np.full(len(at), np.nan)
         self._done = 0
-        self._times, self._seen = np.zeros(0), np.zeros(0)  # the last sample or two
+        self._times, self._seen = np.zeros(0), np.zeros(0)  # the last samples
 
     def add(self, times: FloatArray, values: FloatArray) -> None:
         """Take the next known samples, (m,) seconds on the scale of `at` and (m,)."""
         if len(times):
             self._times = np.concatenate((self._times, times))
             self._seen = np.concatenate((self._seen, values))
-            self._place(int(np.searchsorted(self._at, self._times[-1], side="right")))
-            self._times, self._seen = self._times[-2:], self._seen[-2:]
+            self._place(int(np.searchsorted(self._at, self._times[-1])))
+            # what is at the last time may not be all that is; and the sample before it
+            kept = max(int(np.searchsorted(self._times, self._times[-1])) - 1, 0)
+            self._times, self._seen = self._times[kept:], self._seen[kept:]
 
     def values(self) -> FloatArray:
         """The values, (n,), once all samples were added."""

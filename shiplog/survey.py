@@ -47,6 +47,7 @@ class ChannelSurvey:
     repeated: int  # samples with the time of the one before
     backwards: Cases  # by how many seconds the measured times first ran back
     early: Cases  # received before measured, by seconds at the most
+    delay_ns: int  # from measurement to reception, at the most
     missing: int  # NaN
     infinite: Cases
     impossible: Cases  # and the worst value
@@ -141,6 +142,7 @@ class _Surveyor:
         self._span, self._known_span = (_NEVER, -_NEVER), (_NEVER, -_NEVER)
         self._extremes = (np.inf, -np.inf)
         self._backwards, self._early, self._infinite, self._impossible = (Cases(),) * 4
+        self._delay = 0
         self._long = [np.zeros((0, 2), np.int64)]  # rows of the start and length of a long step
         self._intervals, self._values = Thinned(), Thinned()
         self._known_intervals = self._intervals  # until a sample is not known
@@ -176,10 +178,12 @@ class _Surveyor:
         long = np.flatnonzero(steps > GAP_SECS * 1e9)
         self._long.append(np.column_stack((joined[long], steps[long])))
         early = times - channel.received_ns
+        self._delay = max(self._delay, -int(early.min()))
         ahead = float(early.max()) * 1e-9
         if ahead > 0:
             worst = max(self._early.extent, ahead)
-            met = self._met(self._early, int(np.count_nonzero(early > 0)), times[0], 0.0)
+            count, first = int(np.count_nonzero(early > 0)), int(times[np.argmax(early > 0)])
+            met = self._met(self._early, count, first, 0.0)
             self._early = replace(met, extent=worst)
         if self._known_intervals is not self._intervals:
             joined = np.concatenate(([self._last_known] * (self._known > 0), times[known]))
@@ -192,7 +196,7 @@ class _Surveyor:
             self._last_known = int(times[known][-1])
 
     def _add_values(self, channel: Channel, rows: FloatArray, known: Mask) -> None:
-        if not self._strict or not known.all():
+        if not known.all() or channel.fields or not self._strict:
             times = channel.measured_ns
             self._missing += int(np.count_nonzero(np.isnan(rows).all(axis=1)))
             infinite = np.flatnonzero(np.isinf(rows).any(axis=1))
@@ -203,7 +207,9 @@ class _Surveyor:
         self._known += len(values)
         if len(values) and not channel.fields:
             low, high = self._extremes
-            self._extremes = min(low, float(values.min())), max(high, float(values.max()))
+            # + 0.0: a negative zero is a zero
+            low, high = min(low, float(values.min())), max(high, float(values.max()))
+            self._extremes = low + 0.0, high + 0.0
             self._negative += int(np.count_nonzero(values < 0))
             self._values.add(values[:, 0])
 
@@ -248,6 +254,7 @@ class _Surveyor:
             repeated=self._repeated,
             backwards=self._backwards,
             early=self._early,
+            delay_ns=self._delay,
             missing=self._missing,
             infinite=self._infinite,
             impossible=self._impossible,
@@ -275,7 +282,9 @@ def _beyond(channel: Channel, rows: FloatArray) -> FloatArray:
     kind = CATALOGUE.get(channel.name)
     if channel.fields == GEOGRAPHIC:
         limits = np.array([_GLOBE.get(field, np.inf) for field in channel.fields])
-        return np.asarray(np.nan_to_num(np.abs(rows) - limits, nan=-np.inf).max(axis=1))
+        with np.errstate(invalid="ignore"):  # an infinite altitude
+            beyond = np.abs(rows) - limits
+        return np.asarray(np.nan_to_num(beyond, nan=-np.inf).max(axis=1))
     if channel.fields or kind is None:
         return np.full(len(rows), -np.inf)
     return np.asarray(np.maximum(kind.lowest - rows[:, 0], rows[:, 0] - kind.highest))

@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import isnan, nan, pi
 
 import numpy as np
@@ -7,7 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shiplog import Channel, LogError, TrialLog, UsageError, resample
+from shiplog.clock import on_clock, set_clock
 from shiplog.survey import survey
+from shiplog.types import joined
 
 START = 1_700_000_000_000_000_000
 SEC = 1_000_000_000
@@ -256,3 +258,47 @@ def test_times_years_apart_are_an_error_and_not_a_want_of_memory(dt_secs: float)
 def test_a_step_that_is_none_is_refused(dt_secs: float) -> None:
     with pytest.raises(UsageError, match="time step must be positive"):
         resample(log_of(channel("rudder", [0, 1], [0, 0])), dt_secs)
+
+
+@pytest.mark.parametrize("silent", ["yaw_rate", "rudder", "heading", "all"])
+def test_a_long_silence_comes_in_slabs_as_it_goes_by(
+    silent: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("shiplog.clock.MOST_INSTANTS", 50)
+    seconds = np.arange(3000.0)
+    kept = (seconds < 300) | (seconds > 2500)
+    names = ("yaw_rate", "rudder", "heading")
+    channels = [
+        channel(name, seconds[kept] if silent in (name, "all") else seconds, np.cos(seconds))
+        if silent not in (name, "all")
+        else channel(name, seconds[kept], np.cos(seconds[kept]))
+        for name in names
+    ]
+    log = log_of(*channels)
+    whole = resample(log, channels=names)
+    clock = set_clock(log, survey(log), channels=names)
+    given, most, done = 0, 0, 0
+    parts = []
+    for at in range(0, 3000, 100):
+        slab = tuple(
+            c.part(*np.searchsorted(c.received_ns, [START + at * SEC, START + (at + 100) * SEC]))
+            for c in log
+        )
+        parts.append(slab)
+
+    def watched() -> Iterator[tuple[Channel, ...]]:
+        nonlocal given
+        for slab in parts:
+            given += 100
+            yield slab
+
+    for signals in on_clock(watched(), clock):
+        most = max(most, len(signals))
+        done = signals.first + len(signals)
+        if silent != "all":
+            assert given - done <= 250
+    assert (most, done) == (50, len(whole))
+    again = joined(on_clock(parts, clock))
+    for name in names:
+        assert np.array_equal(again[name], whole[name], equal_nan=True)
+    assert np.isnan(whole["yaw_rate"]).any() == (silent in ("yaw_rate", "all"))

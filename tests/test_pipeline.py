@@ -7,14 +7,15 @@ import pytest
 from conftest import InSlabs, as_log
 from faults import bias, dropout, freeze, spike
 
-from analysis.pipeline import NEEDED, STEPS, Analysis, analyse
+from analysis.pipeline import FITTED, NEEDED, STEPS, Analysis, Replay, analyse
 from analysis.summary import markdown
 from analysis.weak_form import weak_form
 from recorders.sensors import suite
 from recorders.simulate import START_NS, SimulatedTrial, simulate
-from shiplog import LogError, TrialLog, Vessel, VesselError
+from shiplog import Channel, LogError, TrialLog, Vessel, VesselError
 from shiplog.foreign import read_table
 from shiplog.layout import load_layout
+from shiplog.schema import GEOGRAPHIC
 
 LAYOUTS = Path(__file__).parents[1] / "sample_data" / "layouts"
 
@@ -301,6 +302,71 @@ def test_the_slabs_of_a_log_change_nothing_to_the_last_bit(
             assert np.array_equal(numbers, parted[place], equal_nan=True), place
         else:
             assert numbers == parted[place], place
+
+
+def with_channel(log: TrialLog, changed: Channel) -> TrialLog:
+    return replace(
+        log, channels=tuple(changed if c.name == changed.name else c for c in log.channels)
+    )
+
+
+def test_a_sensor_that_speaks_in_bursts_is_identified_with(zigzag_log: TrialLog) -> None:
+    """Its usual interval is not that from burst to burst, which is what counts on the clock."""
+    c = zigzag_log["speed"]
+    rows = np.repeat(np.arange(0, len(c), 20), 3)
+    late = np.tile([0, 50_000_000, 100_000_000], len(rows) // 3)
+    bursts = replace(
+        c,
+        measured_ns=c.measured_ns[rows] + late,
+        received_ns=c.received_ns[rows] + late,
+        values=c.values[rows],
+    )
+    log = with_channel(zigzag_log, bursts)
+    found = analyse(log)
+    assert all(np.isfinite(c.value) for c in found.yaw.coefficients.values())
+    assert all(np.isfinite(c.value) for c in found.surge.coefficients.values())
+    assert analyse(replace(log, vessel_toml=None)).model_origin == FITTED
+
+
+def test_impossible_positions_are_counted_whatever_the_slabs(zigzag_log: TrialLog) -> None:
+    at = zigzag_log["yaw_rate"].measured_ns[:3000:10]
+    values = np.column_stack((np.full(300, 95.0), np.linspace(10, 10.1, 300), np.zeros(300)))
+    for nans in (0, 1):
+        values[200, :] = np.nan if nans else values[200]
+        fixes = Channel("position", "gps", "deg", at, at, values, GEOGRAPHIC)
+        log = with_channel(zigzag_log, fixes)
+        for cut in (log, InSlabs(log, [150.0])):
+            said = f"{300 - nans} impossible positions"
+            assert any(said in warning for warning in analyse(cut).warnings)
+
+
+def test_a_trial_before_1970_begins_with_what_its_inputs_were(zigzag_log: TrialLog) -> None:
+    late = dropout("speed", 0.0, 5.0)(dropout("rudder", 0.15, 30.0)(zigzag_log))
+    shifted = tuple(
+        replace(c, measured_ns=c.measured_ns - 3 * 10**18, received_ns=c.received_ns - 3 * 10**18)
+        for c in late
+    )
+    before = analyse(replace(late, channels=shifted))
+    assert np.array_equal(before.estimates.states, analyse(late).estimates.states)
+
+
+@pytest.mark.parametrize("wild", [{"g": 1000.0}, {"a": 1e4}])
+def test_a_model_for_which_there_is_no_observer_is_refused_as_one_that_runs_away(
+    zigzag_log: TrialLog, vessel: Vessel, wild: dict[str, float]
+) -> None:
+    away = replace(vessel, coefficients=vessel.coefficients._replace(**wild))
+    with pytest.raises(LogError, match="runs away"):
+        analyse(zigzag_log, away)
+
+
+def test_the_slabs_of_a_replay_come_once(zigzag_log: TrialLog) -> None:
+    replay = Replay(zigzag_log)
+    with pytest.raises(ValueError, match="go through the slabs first"):
+        _ = replay.findings
+    assert sum(len(slab.signals) for slab in replay.slabs()) == replay.clock.count
+    assert replay.findings.clock is replay.clock
+    with pytest.raises(ValueError, match="come once"):
+        next(replay.slabs())
 
 
 KVLCC2 = Path(__file__).parents[2] / "shared" / "data" / "kvlcc2"

@@ -30,3 +30,9 @@ def test_in_a_gap_there_is_nothing(cuts: list[int]) -> None:
 
 def test_without_samples_nothing_is_known() -> None:
     assert np.isnan(Probe(np.arange(3.0)).values()).all()
+
+
+@pytest.mark.parametrize("cuts", [[], [1], [2], [3], [1, 2, 3]])
+def test_samples_at_one_time_are_as_to_numpy_whatever_the_cuts(cuts: list[int]) -> None:
+    times, values = np.array([0.0, 1.0, 1.0, 2.0]), np.array([0.0, 10.0, 20.0, 30.0])
+    assert probed(times, values, np.arange(3.0), np.inf, cuts).tolist() == [0.0, 20.0, 30.0]

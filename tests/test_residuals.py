@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import kstest
 
 from analysis.gauge import noise_level
-from analysis.residuals import judge, whiteness
+from analysis.residuals import _Products, judge, whiteness
 
 
 def noises(count: int = 300, length: int = 2000) -> np.ndarray:
@@ -87,3 +87,23 @@ def test_a_slow_sensor_on_a_fast_clock_is_tested_over_its_own_measurements() -> 
 def test_what_was_never_tested_is_not_called_white() -> None:
     few = judge("speed", "m/s", np.ones(30), np.ones(30), noise_measured=False)
     assert few.white is None
+
+
+@pytest.mark.parametrize("mean", [0.0, 30.0, 1e4, -1e6])
+def test_a_mean_far_from_zero_does_not_change_the_verdict(mean: float) -> None:
+    noise = noises(1)[0]
+    assert whiteness(noise + mean) == pytest.approx(whiteness(noise), rel=1e-6)
+
+
+def test_the_pairs_of_a_slow_sensor_with_losses_are_all_counted() -> None:
+    """Their distance is at the very limit, where a rounding of 43 * 0.1 / 0.1 lost them."""
+    noise = np.full(43 * 2000, np.nan)
+    noise[::43] = noises(1)[0]
+    noise[:: 43 * 7] = np.nan
+    assert not np.isnan(whiteness(noise))
+    at = np.flatnonzero(np.isfinite(noise))
+    products = _Products(43.0)
+    products.add(noise)
+    for lag in range(1, 21):
+        near = at[lag:] - at[:-lag] <= 1.5 * lag * 43
+        assert products._sums[lag - 1, 0] == near.sum()

@@ -76,3 +76,31 @@ def test_positions_on_the_globe_become_metres() -> None:
     metre = np.pi / 180 * EARTH_RADIUS
     assert track.north == pytest.approx([0, 0.001 * metre, 0.001 * metre])
     assert track.east == pytest.approx([0, 0, 0.001 * metre], rel=1e-3)
+
+
+def test_after_a_long_silence_the_gyro_goes_on_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And does so as it goes, holding no more than that silence."""
+    monkeypatch.setattr("analysis.track.BRIDGED", 100)
+    count = 1000
+    heading = np.full(count, np.nan)
+    heading[[10, 60, 700]] = 0.0, 0.5, 2.0
+    signals = Signals(0, 1.0, {"yaw_rate": np.zeros(count), "heading": heading})
+    stamps = np.arange(count) * 10**9
+    compass = Channel("heading", "a", "rad", stamps, stamps, heading)
+    channels = {"heading": survey(TrialLog("x", (compass,)))["heading"]}
+    tracks = {}
+    for size in (1, 50, count):
+        tracking = Tracking(Clock(0, 1.0, count, channels), None)
+        held, parts = 0, []
+        for start in range(0, count, size):
+            part = signals.part(start, start + size)
+            track = tracking.step(part, np.zeros(len(part)), np.ones(len(part)))
+            parts.append(track)
+            held = max(held, start + len(part) - sum(len(p.north) for p in parts))
+        assert held <= 101 or size == count
+        tracks[size] = np.concatenate([np.column_stack((p.north, p.east)) for p in parts])
+    steps = np.diff(tracks[1], axis=0)
+    sailed = np.arctan2(steps[:, 1], steps[:, 0])
+    assert sailed[[5, 34, 650, 900]] == pytest.approx([0.0, 0.25, 0.5, 2.0], abs=0.01)
+    for size in (50, count):
+        assert np.array_equal(tracks[1], tracks[size])
