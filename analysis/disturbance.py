@@ -23,7 +23,7 @@ from shiplog.ship import (
 from shiplog.thinned import Thinned
 from shiplog.types import FloatArray, Signals
 
-from .design import Observer, butterworth_poles, discrete_observer
+from .design.observer import Observer, butterworth_poles, discrete_observer
 from .gauge import Gauge, gauge
 from .inputs import INPUTS, last_inputs
 from .kalman import Noise

@@ -19,7 +19,8 @@ from shiplog.ship import (
 from shiplog.types import FloatArray, Signals
 from shiplog.vessel import FilterSettings
 
-from .design import discretise, pseudo_input_matrices
+from .design.discrete import discretise
+from .design.pseudo_input import pseudo_input_matrices
 from .gauge import OUTPUTS, Gauge, gauge
 from .inputs import INPUTS, last_inputs
 

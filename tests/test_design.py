@@ -3,15 +3,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from analysis.design import (
-    butterworth_poles,
-    discrete_observer,
-    discretise,
-    observer_gain,
-    pseudo_input_matrices,
-    pseudo_inputs,
-)
-from shiplog import UsageError, Vessel
+from analysis.design.discrete import discretise
+from analysis.design.observer import butterworth_poles, discrete_observer
+from analysis.design.pseudo_input import pseudo_input_matrices, pseudo_inputs
+from shiplog import Vessel
 from shiplog.ship import Coefficients, surge_acceleration, yaw_acceleration_rate
 
 # The paper's coefficients as printed, angles in degrees
@@ -97,20 +92,6 @@ def test_discretised_noise_is_the_integral_it_stands_for(vessel: Vessel) -> None
 def test_butterworth_poles_are_the_roots_of_their_polynomial() -> None:
     assert np.poly(butterworth_poles(3, 0.05)) == pytest.approx([1, 0.1, 0.005, 0.000125])
     assert np.poly(butterworth_poles(2, 2.0)) == pytest.approx([1, 2 * np.sqrt(2), 4])
-
-
-def test_the_roll_example_of_the_disturbance_observer() -> None:
-    inertia = 1000.0
-    A = np.array([[0, 1 / inertia, 0], [0, 0, 1], [0, 0, 0]])
-    L = observer_gain(A, np.array([[1.0, 0, 0]]), butterworth_poles(3, 0.05))
-    assert L[:, 0] == pytest.approx([0.1, 5, 0.125])
-
-
-def test_an_observer_of_what_cannot_be_seen_is_refused() -> None:
-    # a constant moment and a constant bias of the gyro that measures the rate
-    A = np.array([[-0.05, 1, 0], [0, 0, 0], [0, 0, 0]])
-    with pytest.raises(UsageError, match="cannot be seen"):
-        observer_gain(A, np.array([[1.0, 0, 1]]), butterworth_poles(3, 0.1))
 
 
 def test_a_discrete_observer_has_the_poles_asked_for_and_says_its_noise() -> None:

@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.design import discretise, pseudo_input_matrices, pseudo_inputs
+from analysis.design.discrete import discretise
+from analysis.design.pseudo_input import pseudo_input_matrices, pseudo_inputs
 from analysis.gauge import gauge
 from analysis.kalman import (
     OUTPUTS,

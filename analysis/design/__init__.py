@@ -1,0 +1,1 @@
+"""Matrices and gains, for any linear system; each module is one idea."""

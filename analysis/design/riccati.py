@@ -1,0 +1,199 @@
+"""The steady-state Kalman filter: one gain for ever, of one algebraic Riccati equation."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import LinAlgError, solve_continuous_are, solve_continuous_lyapunov
+
+from shiplog.errors import UsageError
+from shiplog.types import FloatArray
+
+from .arguments import matrix, square, symmetric
+from .observability import AXIS, ComplexArray, spelled, unseen_modes
+
+PRECISE = 1e-9  # a scaled residual beyond it is no solution
+
+
+@dataclass(frozen=True, eq=False)
+class Gain:
+    """The gain of x̂' = A x̂ + B u + L (y - C x̂) and what the Riccati equation says of it."""
+
+    gain: FloatArray  # L, (n, m)
+    covariance: FloatArray  # P, (n, n): the error's, unless a quality design changed the question
+    poles: ComplexArray  # of A - L C, (n,), the slowest last
+    residual: float  # of the Riccati equation, as a part of its terms
+
+
+def kalman_gain(
+    A: ArrayLike, G: ArrayLike, C: ArrayLike, Q: ArrayLike, R: ArrayLike, N: ArrayLike | None = None
+) -> Gain:
+    """The steady-state Kalman filter of x' = A x + G w, y = C x + v.
+
+    A (n, n), G (n, q), C (m, n); w and v are white of intensities Q (q, q) and R (m, m), in the
+    square of their unit times second, and E[w v'] = N (q, m). Samples `dt` seconds apart whose
+    noise has the variance r are of the intensity R = r dt. The covariance is singular where a
+    stable state is not driven by w: an actuator's row of the gain is zero.
+
+    Raises `UsageError` for matrices that do not fit, Q or [Q N; N' R] not semidefinite, R not
+    definite, a mode that does not decay and is not seen in y, and one on the imaginary axis that
+    w does not drive. Source: Sakharov, Shergina, Chertkov, (11) and (13).
+    """
+    A = square("A", A)
+    n = len(A)
+    G = matrix("G", G, rows=n)
+    C = matrix("C", C, columns=n)
+    q, m = G.shape[1], len(C)
+    Q = symmetric("Q", Q, q)
+    R = symmetric("R", R, m, definite="positive")
+    N = np.zeros((q, m)) if N is None else matrix("N", N, q, m)
+    symmetric("[Q N; N' R]", np.block([[Q, N], [N.T, R]]), q + m)
+    return optimal_gain(A, C, G @ Q @ G.T, R, G @ N)
+
+
+class Words(NamedTuple):
+    """What the matrices of `optimal_gain` are to the one who asks, for the messages."""
+
+    A: str = "A"
+    C: str = "C"
+    noise: str = "the noise"
+    unseen: str = "cannot be seen in the measurements; measure another state"
+    undriven: str = "no noise drives it; give it some"
+
+
+FILTER = Words()
+
+
+def optimal_gain(
+    A: FloatArray,
+    C: FloatArray,
+    W: FloatArray,
+    R: FloatArray,
+    S: FloatArray,
+    words: Words = FILTER,
+) -> Gain:
+    """The Kalman filter of state noise W (n, n), measurement noise R (m, m), cross term S (n, m).
+
+    What it is given must have been checked; A is shifted where a quality design asks for it, and
+    transposed for a regulator. A P + P A' + W - (P C' + S) R⁻¹ (C P + S') = 0,
+    L = (P C' + S) R⁻¹. Raises `UsageError` where there is no stabilising solution, naming the mode.
+    """
+    weight = np.linalg.solve(R, S.T).T  # S R⁻¹
+    drift, drive, sharp = A - weight @ C, W - weight @ S.T, C.T @ np.linalg.solve(R, C)
+    _refuse_hopeless(A, C, drift, drive, words)
+    matrices = f"{words.A} {A.shape} and {words.C}"
+    try:
+        P = _solved(A, C, W, R, S)
+    except (LinAlgError, ValueError) as error:
+        raise UsageError(f"{matrices}: no stabilising gain found ({error})") from None
+    _refuse_unstable(drift - P @ sharp, matrices)
+    P = newton_step(drift, drive, sharp, P)
+    L = np.linalg.solve(R, (P @ C.T + S).T).T
+    poles = _refuse_unstable(A - L @ C, matrices)
+    residual = scaled_residual(drift, drive, sharp, P)
+    if residual > PRECISE:
+        raise UsageError(
+            f"{matrices}: the residual of the Riccati equation is {residual:.1g};"
+            " bring the units nearer to each other"
+        )
+    return Gain(L, P, poles, residual)
+
+
+def _solved(
+    A: FloatArray, C: FloatArray, W: FloatArray, R: FloatArray, S: FloatArray
+) -> FloatArray:
+    """The library's P, (n, n), asked for in units that suit it.
+
+    With a ship's, of state noise 1e-12 and measurement noise 1e-9, it finds none or a wrong one. So
+    the measurements are taken in units of their noise, and P in the p that makes the equation's
+    first and last coefficients alike.
+    """
+    if not W.any() and poles_of(A)[-1].real < 0:
+        return np.zeros_like(A)  # nothing drives what decays; the library's rounding is no answer
+    F = np.linalg.cholesky(R)
+    C, S = np.linalg.solve(F, C), np.linalg.solve(F, S.T).T
+    p = np.sqrt(np.linalg.norm(W)) / np.linalg.norm(C) if W.any() and C.any() else 1.0
+    C, S = np.sqrt(p) * C, S / np.sqrt(p)
+    return p * solve_continuous_are(A.T, C.T, W / p, np.eye(len(R)), s=S)
+
+
+def _refuse_hopeless(
+    A: FloatArray, C: FloatArray, drift: FloatArray, drive: FloatArray, words: Words
+) -> None:
+    """Raise `UsageError` for a mode that no gain makes decay, or that the best one would not."""
+    for mode in unseen_modes(A, C):
+        if mode.real >= -AXIS * np.linalg.norm(A):
+            raise UsageError(
+                f"{words.A} {A.shape} and {words.C}: the mode at {spelled(mode)} does not decay and"
+                f" {words.unseen}"
+            )
+    for mode in unseen_modes(drift.T, drive):
+        if abs(mode.real) <= AXIS * np.linalg.norm(drift):
+            raise UsageError(
+                f"{words.A} {A.shape} and {words.noise}: the mode at {spelled(mode)} neither grows"
+                f" nor decays and {words.undriven}"
+            )
+
+
+def _refuse_unstable(closed: FloatArray, matrices: str) -> ComplexArray:
+    """The poles of a closed loop (n, n), the slowest last."""
+    poles = poles_of(closed)
+    if poles[-1].real >= 0:
+        raise UsageError(
+            f"{matrices}: the gain found leaves a pole at {spelled(poles[-1])}: too weak a hold on"
+            " a mode for the arithmetic, or units too far apart"
+        )
+    return poles
+
+
+def newton_step(
+    drift: FloatArray, drive: FloatArray, sharp: FloatArray, P: FloatArray
+) -> FloatArray:
+    """P nearer to the root of drift P + P drift' + drive - P sharp P, all (n, n).
+
+    The library's P is good to the units of its matrices, which a ship's are far apart in; from
+    there one step squares what is missing (Kleinman, 1968).
+    """
+    left = drift @ P + P @ drift.T + drive - P @ sharp @ P
+    better = P + solve_continuous_lyapunov(drift - P @ sharp, -left)
+    return (better + better.T) / 2
+
+
+def scaled_residual(
+    drift: FloatArray, drive: FloatArray, sharp: FloatArray, P: FloatArray
+) -> float:
+    """What is left of drift P + P drift' + drive - P sharp P, all (n, n), against its terms."""
+    left = drift @ P + P @ drift.T + drive - P @ sharp @ P
+    drifts, drives, sharps, size = (float(np.linalg.norm(M)) for M in (drift, drive, sharp, P))
+    terms = drives + 2 * drifts * size + sharps * size**2
+    return float(np.linalg.norm(left)) / terms if terms else 0.0
+
+
+def poles_of(closed: FloatArray) -> ComplexArray:
+    """The eigenvalues of a closed loop (n, n), (n,), the slowest last."""
+    poles = np.linalg.eigvals(closed).astype(complex)
+    return poles[np.lexsort((poles.imag, poles.real))]
+
+
+def error_covariance(
+    A: ArrayLike, L: ArrayLike, C: ArrayLike, W: ArrayLike, R: ArrayLike
+) -> FloatArray:
+    """The covariance (n, n) of the error of any gain L (n, m), optimal or not.
+
+    A (n, n), C (m, n); W (n, n) is the state's noise intensity, R (m, m) the measurement's:
+    (A - L C) P + P (A - L C)' + W + L R L' = 0. Raises `UsageError` for matrices that do not fit
+    and where A - L C is not stable.
+    """
+    A = square("A", A)
+    n = len(A)
+    C = matrix("C", C, columns=n)
+    L = matrix("L", L, n, len(C))
+    W, R = symmetric("W", W, n), symmetric("R", R, len(C))
+    F = A - L @ C
+    worst = poles_of(F)[-1]
+    if worst.real >= 0:
+        raise UsageError(
+            f"L {L.shape}: A - L C has a pole at {spelled(worst)}; expected a stable L"
+        )
+    return solve_continuous_lyapunov(F, -(W + L @ R @ L.T))

@@ -1,0 +1,312 @@
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from numpy.typing import ArrayLike
+
+from analysis.design.cascade import cascade
+from analysis.design.quality import (
+    cycle_regulator,
+    fast_and_slow,
+    quality_filter,
+    quality_regulator,
+)
+from analysis.design.riccati import error_covariance, kalman_gain
+from shiplog import UsageError
+from shiplog.types import FloatArray
+
+FEW = settings(derandomize=True, max_examples=30, deadline=None)
+SEEDS = st.integers(0, 2**32 - 1)
+
+# Second-order Nomoto, the rate ω measured; states ω and ω'
+T1, T2 = 150.0, 50.0
+SHIP = np.array([[0, 1], [-1 / (T1 * T2), -(T1 + T2) / (T1 * T2)]])
+RATE, R1, R2 = np.array([[1.0, 0]]), np.diag([0, 1e-12]), np.array([[2.5e-9]])
+DOUBLE, PUSH = np.array([[0.0, 1], [0, 0]]), np.array([[0.0], [1]])  # the double integrator
+TWO_DECAYS, BOTH = np.diag([-2, -0.2]), np.array([[1.0], [1]])
+
+
+@pytest.mark.parametrize(
+    ("shift", "G", "gain"),
+    [
+        (0.0, (0, 0), [0.174443585, 0.0152152822]),
+        (0.2, (0, 0), [0.4137657921, 0.0442244862]),
+        (0.0, (0, 1e-9), [0.6369938891, 0.0028806074]),
+        (0.0, (1e-8, 0), [0.109519673, 0.0058906127]),
+        (0.2, (1e-8, 0), [0.3695245931, 0.0312150865]),
+    ],
+)
+def test_the_ships_filters(shift: float, G: tuple[float, float], gain: list[float]) -> None:
+    found = quality_filter(SHIP, RATE, R1, R2, G=np.diag(G), shift=shift)
+    assert found.gain[:, 0] == pytest.approx(gain, abs=1e-8)
+    assert found.residual < 1e-12
+
+
+def test_three_cycles_of_the_double_integrator() -> None:
+    last = cycle_regulator(DOUBLE, PUSH, np.eye(2), 1, 3)[-1]
+    expected = [-np.sqrt(3), -np.sqrt(3 + 2 * np.sqrt(3))]
+    assert last.gain[0] == pytest.approx(expected, abs=1e-8)
+
+
+def test_the_double_integrator_with_shift_and_weight_on_the_rates() -> None:
+    found = quality_regulator(DOUBLE, PUSH, np.eye(2), 1, G=np.diag([0.5, 2]), shift=1)
+    assert found.gain[0] == pytest.approx([-1.7532528806, -2.5631300883], abs=1e-8)
+    expected = [-1.2815650442 - 0.3329323028j, -1.2815650442 + 0.3329323028j]
+    assert found.poles == pytest.approx(np.array(expected), abs=1e-8)
+
+
+def test_the_scalars_cycles_go_towards_minus_two() -> None:
+    done = cycle_regulator([[0.5]], [[1]], 1, 1, 60, G=0.25)
+    poles = [step.poles[0].real for step in done]
+    assert poles[:3] == pytest.approx([-1, -1.2649110641, -1.4422205102], abs=1e-8)
+    assert poles[-1] == pytest.approx(-2, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("shift", "settling", "noise"),
+    [(0, 30.5, 1), (0.1, 22.7, 1.07), (0.2, 17.0, 1.23), (0.4, 10.1, 1.64), (0.8, 5.1, 2.34)],
+)
+def test_the_knob_of_speed(shift: float, settling: float, noise: float) -> None:
+    optimal = kalman_gain(SHIP, np.eye(2), RATE, R1, R2).covariance[0, 0]
+    K = quality_filter(SHIP, RATE, R1, R2, shift=shift).gain
+    of_it = error_covariance(SHIP, K, RATE, R1, R2)[0, 0]
+    assert np.sqrt(of_it / optimal) == pytest.approx(noise, abs=5e-3)
+    poles, modes = np.linalg.eig(SHIP - K @ RATE)
+    times = np.arange(0, 60, 0.01)
+    parts = modes[0] * np.linalg.solve(modes, [1, 0])
+    error = np.real(np.exp(np.outer(times, poles)) @ parts)  # of ω, from one in ω
+    settled = times[np.abs(error) > 0.05][-1]
+    assert settled + 0.01 == pytest.approx(settling + 0.05, abs=0.05)  # the page cuts digits off
+
+
+@pytest.mark.parametrize(
+    ("G", "noise", "slowest"), [(1e-10, 1.034, -0.1313), (1e-9, 1.387, -0.0316)]
+)
+def test_the_knob_of_damping(G: float, noise: float, slowest: float) -> None:
+    optimal = kalman_gain(SHIP, np.eye(2), RATE, R1, R2).covariance[0, 0]
+    found = quality_filter(SHIP, RATE, R1, R2, G=np.diag([0, G]))
+    of_it = error_covariance(SHIP, found.gain, RATE, R1, R2)[0, 0]
+    assert np.abs(found.poles.imag).max() == 0  # a damping of one
+    assert np.sqrt(of_it / optimal) == pytest.approx(noise, abs=5e-4)
+    assert found.poles[-1].real == pytest.approx(slowest, abs=5e-5)
+
+
+def test_different_shifts_that_destabilise_are_refused_by_the_poles_name() -> None:
+    projectors = fast_and_slow(TWO_DECAYS, 1.0)
+    assert_allclose(projectors, [np.diag([1, 0]), np.diag([0, 1])])
+    with pytest.raises(UsageError, match=r"poles left of -0\.5, and one is at 0\.2164316;"):
+        quality_regulator(
+            TWO_DECAYS, BOTH, np.zeros((2, 2)), 1, shift=(6, 1), projectors=projectors
+        )
+    with pytest.raises(UsageError, match=r"poles left of -0\.5, and one is at 0\.2164316;"):
+        quality_filter(TWO_DECAYS, BOTH.T, np.zeros((2, 2)), 1, shift=(6, 1), projectors=projectors)
+
+
+def test_the_gain_that_is_refused_is_the_pages() -> None:
+    shifted = TWO_DECAYS + np.diag([6, 1]) / 2
+    L = quality_regulator(shifted, BOTH, np.zeros((2, 2)), 1).gain
+    assert L[0] == pytest.approx([-3.7142857, 1.1142857], abs=5e-8)
+    poles = np.linalg.eigvals(TWO_DECAYS + BOTH @ L)
+    assert poles.max() == pytest.approx(0.2164316, abs=5e-8)
+
+
+@pytest.mark.parametrize(
+    ("factor", "errors", "best"),
+    [
+        (1.0, [1, 1.43, 2.08, 2.76, 3.44], 1),
+        (1e-4, [2.91, 1.27, 2.09, 2.97, 3.84], 2),  # taken for ten thousand times less noisy
+    ],
+)
+def test_the_cascade_repairs_a_first_stage_that_is_too_fast_and_nothing_else(
+    factor: float, errors: list[float], best: int
+) -> None:
+    first = quality_filter(SHIP, RATE, R1, factor * R2).gain
+    found = cascade(SHIP, RATE, R1, R2, first, stages=5, correlation_secs=10)
+    assert found.relative[:, 0] == pytest.approx(errors, abs=5e-3)
+    assert found.best == best
+    assert "more stages hurt" in found.verdict
+    assert f"stage {best} of 5 is the best" in found.verdict
+
+
+def test_a_cascade_says_where_it_helped() -> None:
+    first = quality_filter(SHIP, RATE, R1, 1e-4 * R2).gain
+    found = cascade(SHIP, RATE, R1, R2, first, stages=2, correlation_secs=10)
+    assert found.verdict == (
+        "stage 2 of 2 is the best, 1.27 times the optimal error; the first alone has 2.91"
+    )
+
+
+def random_regulator(
+    seed: int,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """A, B, P, R and G of one to six states."""
+    rng = np.random.default_rng(seed)
+    n, m = rng.integers(1, [7, 4])
+    half, rotated, rates = (rng.standard_normal((k, k)) for k in (n, m, n))
+    return (
+        rng.standard_normal((n, n)),
+        rng.standard_normal((n, m)),
+        half @ half.T,
+        rotated @ rotated.T + 0.1 * np.eye(m),
+        0.3 * rates @ rates.T,
+    )
+
+
+@FEW
+@given(SEEDS, st.floats(0, 3))
+def test_every_pole_is_left_of_the_bound_and_the_equation_holds(seed: int, c: float) -> None:
+    A, B, P, R, G = random_regulator(seed)
+    found = quality_regulator(A, B, P, R, G=G, shift=c)
+    Q, heavier = found.cost, R + B.T @ G @ B
+    part = np.linalg.solve(heavier, B.T @ G @ A)
+    J21 = P + A.T @ G @ A - A.T @ G @ B @ part
+    J11 = c / 2 * np.eye(len(A)) + A - B @ part
+    J12 = B @ np.linalg.solve(heavier, B.T)
+    left = J21 + Q @ J11 + J11.T @ Q - Q @ J12 @ Q
+    sizes = [np.linalg.norm(M) for M in (J21, A, Q, J12)]
+    scale = sizes[0] + 2 * sizes[1] * sizes[2] + sizes[3] * sizes[2] ** 2
+    assert np.linalg.norm(left) < 1e-12 * scale
+    assert found.residual < 1e-12
+    assert found.gain == pytest.approx(
+        -np.linalg.solve(heavier, B.T @ G @ A + B.T @ Q), rel=1e-8, abs=1e-8
+    )
+    assert np.linalg.eigvals(A + B @ found.gain).real.max() < -c / 2
+
+
+@FEW
+@given(SEEDS, st.floats(0, 3))
+def test_the_filter_is_the_regulators_dual(seed: int, c: float) -> None:
+    A, B, P, R, G = random_regulator(seed)
+    L = quality_regulator(A.T, B, P, R, G=G, shift=c).gain
+    assert_allclose(quality_filter(A, B.T, P, R, G=G, shift=c).gain, -L.T, rtol=1e-8, atol=1e-10)
+
+
+@FEW
+@given(SEEDS)
+def test_without_shift_and_weight_they_are_controls(seed: int) -> None:
+    A, B, P, R, _ = random_regulator(seed)
+    P, R = (P + P.T) / 2, (R + R.T) / 2
+    K, _, _ = control.lqr(A, B, P, R)
+    assume(np.linalg.norm(K) < 1e3)  # an input that hardly moves a mode leaves fewer digits
+    assert_allclose(quality_regulator(A, B, P, R).gain, -K, rtol=1e-7, atol=1e-8)
+    L, _, _ = control.lqe(A, np.eye(len(A)), B.T, P, R)
+    assert_allclose(quality_filter(A, B.T, P, R).gain, L, rtol=1e-7, atol=1e-8)
+
+
+@FEW
+@given(SEEDS, st.floats(0.01, 3))
+def test_one_shift_is_the_ordinary_design_of_a_shifted_system(seed: int, c: float) -> None:
+    A, B, P, R, _ = random_regulator(seed)
+    shifted = A + c / 2 * np.eye(len(A))
+    L = quality_regulator(A, B, P, R, shift=c).gain
+    assert_allclose(L, quality_regulator(shifted, B, P, R).gain, rtol=1e-8, atol=1e-10)
+
+
+@FEW
+@given(SEEDS, st.floats(0, 2))
+def test_without_weights_a_slow_eigenvalue_is_mirrored_and_a_fast_one_stays(
+    seed: int, c: float
+) -> None:
+    A, B, P, R, _ = random_regulator(seed)
+    before = np.linalg.eigvals(A)
+    assume(np.abs(before.real + c / 2).min() > 0.02)
+    after = np.where(before.real < -c / 2, before, -c - before.conj())
+    found = quality_regulator(A, B, np.zeros_like(P), R, shift=c)
+    assert np.poly(found.poles) == pytest.approx(np.poly(after), rel=1e-6, abs=1e-6)
+
+
+@FEW
+@given(SEEDS, st.integers(1, 6))
+def test_cycles_without_weight_on_the_rates_are_one_design_with_j_times_p(
+    seed: int, cycles: int
+) -> None:
+    A, B, P, R, _ = random_regulator(seed)
+    done = cycle_regulator(A, B, P, R, cycles)
+    assert len(done) == cycles
+    assert_allclose(
+        done[-1].gain, quality_regulator(A, B, cycles * P, R).gain, rtol=1e-6, atol=1e-8
+    )
+
+
+@FEW
+@given(SEEDS, st.integers(1, 6))
+def test_cycles_of_one_input_with_weight_are_one_design_with_a_smaller_r(
+    seed: int, cycles: int
+) -> None:
+    A, B, P, R, G = random_regulator(seed)
+    B, R = B[:, :1], R[:1, :1]
+    weight = (B.T @ G @ B).item()
+    assume(weight > 0.01)
+    ratio = R.item() / (R.item() + weight)
+    effective = ratio**cycles * weight / (1 - ratio**cycles)
+    once = quality_regulator(A, B, P, effective, G=G)
+    assert_allclose(
+        cycle_regulator(A, B, P, R, cycles, G=G)[-1].gain, once.gain, rtol=1e-6, atol=1e-7
+    )
+
+
+@FEW
+@given(SEEDS, st.floats(-1, 2))
+def test_the_projectors_split_the_motions(seed: int, border: float) -> None:
+    A = random_regulator(seed)[0]
+    values = np.linalg.eigvals(A)
+    assume(np.abs(values.real + border).min() > 0.02)
+    E1, E2 = fast_and_slow(A, border)
+    for E in (E1, E2):
+        assert_allclose(E @ E, E, atol=1e-7 * (1 + np.linalg.norm(E)) ** 2)
+        assert_allclose(E @ A, A @ E, atol=1e-7 * (1 + np.linalg.norm(E)) * np.linalg.norm(A))
+    assert np.trace(E1) == pytest.approx(np.sum(values.real < -border), abs=1e-7)
+
+
+UNFIT: list[tuple[dict[str, Any], str]] = [
+    ({"A": [[1, 2]]}, r"A is of shape \(1, 2\); expected a square matrix"),
+    ({"B": [[1]]}, r"B is of shape \(1, 1\); expected \(2, any\)"),
+    ({"P": np.eye(3)}, r"P is of shape \(3, 3\); expected \(2, 2\)"),
+    ({"P": [[0, 1], [0, 0]]}, r"P, \(2, 2\), differs from its transpose by 1"),
+    ({"P": -np.eye(2)}, r"P, \(2, 2\), has the eigenvalue -1; expected a positive semidefinite"),
+    ({"R": -1}, r"R, \(1, 1\), has the eigenvalue -1; expected a positive definite"),
+    ({"G": np.diag([1, -1])}, r"G, \(2, 2\), has the eigenvalue -1"),
+    ({"A": [[np.nan, 0], [0, 0]]}, r"A, \(2, 2\), has NaN or infinities"),
+    ({"shift": -1}, "shift is -1; expected one number, or two, not below 0"),
+    ({"shift": (1, 2, 3)}, "shift is .* expected one number, or two"),
+    ({"shift": (6, 1)}, r"shift is \(6, 1\); expected projectors"),
+    ({"projectors": (np.eye(2), np.eye(2))}, r"projectors, \(2, 2\): expected E1 \+ E2 = I"),
+    ({"projectors": (np.eye(3), np.eye(2))}, r"projectors\[0\] is of shape \(3, 3\)"),
+    ({"B": [[1], [0]]}, r"A \(2, 2\) and B: the mode at 0 does not decay and cannot be moved by B"),
+    ({"P": np.zeros((2, 2))}, "A .* and P: the mode at 0 neither grows nor decays and P does not"),
+]
+
+
+@pytest.mark.parametrize(("changed", "said"), UNFIT)
+def test_a_regulator_of_what_does_not_fit_is_refused_in_one_line(
+    changed: dict[str, ArrayLike], said: str
+) -> None:
+    arguments: dict[str, Any] = {"A": DOUBLE, "B": PUSH, "P": np.eye(2), "R": 1}
+    with pytest.raises(UsageError, match=said) as caught:
+        quality_regulator(**(arguments | changed))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_filter_of_what_does_not_fit_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"S is of shape \(1, 3\); expected \(any, 2\)"):
+        quality_filter(SHIP, [[1, 0, 0]], R1, R2)
+    with pytest.raises(UsageError, match=r"R2, .* expected a positive definite"):
+        quality_filter(SHIP, RATE, R1, 0)
+    with pytest.raises(UsageError, match=r"A \+ Ec/2 \(2, 2\) and S: the mode at 0\.5 .* seen"):
+        quality_filter(np.diag([-1, -1.0]), RATE, np.eye(2), 1, shift=3)
+
+
+def test_cycles_and_stages_are_counted() -> None:
+    for cycles, said in ((0, "not below 1"), (1.5, "expected a whole number")):
+        with pytest.raises(UsageError, match=f"cycles is {cycles}; expected .*{said[-6:]}"):
+            cycle_regulator(DOUBLE, PUSH, np.eye(2), 1, cycles)
+    with pytest.raises(UsageError, match="stages is 0; expected"):
+        cascade(SHIP, RATE, R1, R2, [[0.2], [0.01]], stages=0, correlation_secs=10)
+    with pytest.raises(UsageError, match="correlation_secs is 0; expected a positive number"):
+        cascade(SHIP, RATE, R1, R2, [[0.2], [0.01]], stages=2, correlation_secs=0)
+    with pytest.raises(UsageError, match=r"a pole at .* expected a stable L"):
+        cascade(SHIP, RATE, R1, R2, [[-1], [0]], stages=2, correlation_secs=10)
