@@ -14,6 +14,7 @@ import numpy as np
 
 from shiplog.compiled import compiled
 from shiplog.ship import (
+    INPUTS,
     Coefficients,
     rudder_effects,
     surge_acceleration,
@@ -25,7 +26,7 @@ from shiplog.types import FloatArray, Signals
 
 from .design.observer import Observer, butterworth_poles, discrete_observer
 from .gauge import Gauge, gauge
-from .inputs import INPUTS, last_inputs
+from .inputs import last_inputs
 from .kalman import Noise
 from .moments import Moments
 
@@ -62,7 +63,7 @@ class Course:
     settling_secs: float  # before it what is seen is the observer's own transient
 
 
-class Observing:
+class ForceObserver:
     """Observes a yaw moment and a surge force in slabs; where nothing is measured they are held.
 
     The inputs must be known throughout.
@@ -104,7 +105,7 @@ class Observing:
             watch.add(getattr(found, name))
         return found
 
-    def courses(self) -> dict[str, Course]:
+    def result(self) -> dict[str, Course]:
         """What was observed, once all was: of `yaw`, `rudder` and `surge`."""
         usual = self._steering.median()
         stds = {
@@ -113,7 +114,7 @@ class Observing:
             "surge": self._surge_std,
         }
         return {
-            name: self._courses[name].course(std, DISTURBANCE_UNITS[name])
+            name: self._courses[name].result(std, DISTURBANCE_UNITS[name])
             for name, std in stds.items()
         }
 
@@ -121,10 +122,10 @@ class Observing:
 def observe_disturbance(
     signals: Signals, model: Coefficients, noise: Noise
 ) -> tuple[Disturbance, dict[str, Course]]:
-    """The disturbance in signals that are all there, and what comes of it; as `Observing`."""
-    observing = Observing(model, noise, gauge(signals, model))
+    """The disturbance in signals that are all there, and what comes of it; as `ForceObserver`."""
+    observing = ForceObserver(model, noise, gauge(signals, model))
     found = observing.step(signals, last_inputs(signals))
-    return found, observing.courses()
+    return found, observing.result()
 
 
 class _CourseWatch:
@@ -145,7 +146,7 @@ class _CourseWatch:
         self._skipped = max(self._skipped - len(values), 0)
         self._last = np.concatenate((self._last, values))[-self._tail :]
 
-    def course(self, std: float, unit: str) -> Course:
+    def result(self, std: float, unit: str) -> Course:
         """What all of them come to."""
         settled, last = self._settled, self._last[np.isfinite(self._last)]
         return Course(

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from shiplog.clock import Clock
 from shiplog.compiled import compiled
+from shiplog.ship import INPUTS, OUTPUTS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, factor
 
-from .gauge import OUTPUTS, Gauge
-from .inputs import INPUTS
+from .gauge import Gauge
 from .kalman import OUTPUT_STATES
 from .pipeline import Slab
 
@@ -67,7 +67,7 @@ class Sketch:
         }
 
     def add(self, slab: Slab) -> dict[str, Series]:
-        """Draw the next slab: the series that have a point at every instant, by entity, whole."""
+        """Draw the next slab; its series over time, by entity, whole."""
         dense = {
             entity: series
             for part in (self._outputs(slab), self._inputs(slab), self._disturbances(slab))
@@ -80,9 +80,9 @@ class Sketch:
             self._thinned[entity].add(series)
         return dense
 
-    def drawn(self) -> dict[str, Series]:
+    def result(self) -> dict[str, Series]:
         """All series, by entity, each thinned to about `POINTS`, once all slabs were added."""
-        return {entity: thinned.kept() for entity, thinned in self._thinned.items()}
+        return {entity: thinned.result() for entity, thinned in self._thinned.items()}
 
     def _outputs(self, slab: Slab) -> dict[str, Series]:
         drawn = {}
@@ -190,7 +190,8 @@ class Thinning:
     def __init__(self, stretch_secs: float) -> None:
         self._stretch = stretch_secs
         self._parts: list[FloatArray] = []  # rows of time and lines
-        self._open = np.zeros((0, 0))  # the rows of the stretch that goes on, after one before it
+        self._open = np.zeros((0, 0))  # the rows of the stretch that goes on
+        self._before: FloatArray = np.zeros(0)  # the row before them
         self._like: Series | None = None
 
     def add(self, series: Series) -> None:
@@ -211,7 +212,7 @@ class Thinning:
         self._keep(rows[:done])
         self._open = rows[done:]
 
-    def kept(self) -> Series:
+    def result(self) -> Series:
         """What was kept of all points."""
         if self._like is None:
             raise ValueError("nothing was added")

@@ -5,7 +5,7 @@ from shiplog.ship import SURGE_COEFFICIENTS, Coefficients
 from shiplog.vessel import Vessel
 
 from .gauge import Gauge
-from .identification import Identifying
+from .identification import Identifier
 
 # The rudder works in proportion to the speed: without a model nothing is known of the
 # slipstream, and d and e take the factor up.
@@ -18,7 +18,7 @@ YAW_FORMS = (("a", "b1", "b2", "d", "e"), ("a", "b1", "d", "e"), ("a", "d", "e")
 SURGE_FORMS = (SURGE_COEFFICIENTS, ("f", "h"))
 
 
-def fit_first_model(yaw: Identifying, surge: Identifying, usual: Gauge, name: str) -> Vessel:
+def fit_first_model(yaw: Identifier, surge: Identifier, usual: Gauge, name: str) -> Vessel:
     """A vessel whose coefficients are those of the whole log, by least squares in weak form.
 
     b3 is left out, for on a real ship it cannot be told from b2; and b2 and b1 where the log
@@ -36,7 +36,7 @@ def fit_first_model(yaw: Identifying, surge: Identifying, usual: Gauge, name: st
     return Vessel(f"fitted to {name}", BARE._replace(**found), approach_rpm=usual.rpm)
 
 
-def _richest(rows: Identifying, forms: tuple[tuple[str, ...], ...]) -> dict[str, float]:
+def _richest(rows: Identifier, forms: tuple[tuple[str, ...], ...]) -> dict[str, float]:
     """The coefficients of the first of the forms that the rows can tell; none if they cannot."""
     for names in forms:
         solution = rows.solution(names)

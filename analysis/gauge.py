@@ -5,15 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog import Signals
-from shiplog.ship import Coefficients, rudder_effects
+from shiplog.ship import OUTPUTS, Coefficients, rudder_effects
 from shiplog.survey import longest_step_secs
 from shiplog.thinned import Thinned
 from shiplog.types import FloatArray, joined
 
 from .moments import Moments
 
-OUTPUTS = ("yaw_rate", "speed")
-FEWEST = 4  # samples of an output: their third difference shows its noise
 HEAD = 50_000  # samples of a long log are enough to tell how well a model fits
 
 
@@ -46,7 +44,7 @@ class Gauge:
         return np.array([longest_step_secs(s) / self.dt_secs for s in self.interval_secs])
 
 
-class Gauging:
+class Gauger:
     """Looks at signals, their inputs held, as they come in slabs.
 
     Of `model` only the alphas are used. Source of the noise: `noise_level`.
@@ -54,7 +52,7 @@ class Gauging:
 
     def __init__(self, model: Coefficients) -> None:
         self._model = model
-        self._outputs = {name: _OutputGauging() for name in OUTPUTS}
+        self._outputs = {name: _OutputGauger() for name in OUTPUTS}
         self._speed, self._rpm = Thinned(), Thinned()
         self.fastest = self._steering = 0.0  # m/s so far, and of the rudder's effect
         self._heads: list[Signals] = []
@@ -86,7 +84,7 @@ class Gauging:
             first=np.array([output.first for output in outputs]),
             spread=np.array([output.moments.std for output in outputs]),
             intervals=np.array([output.interval() for output in outputs]),
-            noise=np.array([output.noise.level() for output in outputs]),
+            noise=np.array([output.noise.result() for output in outputs]),
             turning=float(np.sqrt(yaw_rate.mean_square)),
             ahead=self._speed.median(),
             fastest=self.fastest,
@@ -98,12 +96,12 @@ class Gauging:
 
 def gauge(signals: Signals, model: Coefficients) -> Gauge:
     """What signals usually do, their inputs held; of `model` only the alphas are used."""
-    gauging = Gauging(model)
+    gauging = Gauger(model)
     gauging.add(signals)
     return gauging.result()
 
 
-class _OutputGauging:
+class _OutputGauger:
     """Looks at one output."""
 
     def __init__(self) -> None:
@@ -139,7 +137,7 @@ def noise_level(values: FloatArray) -> float:
     """
     level = NoiseLevel()
     level.add(values[np.isfinite(values)])
-    return level.level()
+    return level.result()
 
 
 class NoiseLevel:
@@ -161,7 +159,7 @@ class NoiseLevel:
         self._thirds.add(np.diff(seen, 3) / np.sqrt(20.0))
         self._last = seen[-3:]
 
-    def level(self) -> float:
+    def result(self) -> float:
         """The standard deviation of all that was added."""
         thirds = self._thirds.values
         if not len(thirds):

@@ -39,8 +39,8 @@ class Identification:
     blank_windows: int  # that tell no coefficient
 
 
-class Identifying:
-    """Identifies one equation from rows in slabs, which come twice: to `fit`, then to `step`.
+class Identifier:
+    """Identifies one equation from rows in slabs, which come twice: to `add`, then to `step`.
 
     With `constant`, a constant is estimated beside the coefficients of the whole trial: a steady
     moment, or the rudder's zero. A gyro's bias it takes up in part only, for that stands in w|w|
@@ -59,7 +59,7 @@ class Identifying:
         self._conditions: list[FloatArray] = []
         self._blank = 0
 
-    def fit(self, rows: Rows) -> None:
+    def add(self, rows: Rows) -> None:
         """The next rows, the first time."""
         rows = with_constant(rows) if self._constant else rows
         self._regression = self._regression or Regression(rows)
@@ -89,7 +89,7 @@ class Identifying:
         """What all rows come to, when they have come twice."""
         if self._errors is None:
             raise ValueError("no rows were given to step")
-        whole = self._errors.fit()
+        whole = self._errors.result()
         coefficients = {  # a constant after them is left out
             name: Coefficient(float(value), float(std), COEFFICIENT_UNITS[name])
             for name, value, std in zip(self._names, whole.values, whole.stds, strict=False)
@@ -108,11 +108,11 @@ def identify(
 ) -> tuple[Identification, History]:
     """The coefficients over the whole trial and over each window, of rows that are all there.
 
-    As `Identifying`. A trial shorter than the window is one window.
+    As `Identifier`. A trial shorter than the window is one window.
     """
     count = len(rows.target)
-    identifying = Identifying(count, constant=constant, window_secs=window_secs)
-    identifying.fit(rows)
+    identifying = Identifier(count, constant=constant, window_secs=window_secs)
+    identifying.add(rows)
     slabs = [rows.part(start, start + ROWS) for start in range(0, max(count, 1), ROWS)]
     history = stacked([identifying.step(slab) for slab in slabs])
     return identifying.result(), history

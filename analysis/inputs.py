@@ -7,11 +7,10 @@ import numpy as np
 
 from shiplog import Channel, Signals
 from shiplog.clock import Clock
+from shiplog.ship import INPUTS
 
-INPUTS = ("rudder", "rpm")
 
-
-class Holding:
+class InputHold:
     """Keeps rudder and revolutions at their last known value wherever they were not measured.
 
     A filter cannot predict without them; what it predicts then is a guess, to be said so.
@@ -23,7 +22,7 @@ class Holding:
         self._last_ns = dict.fromkeys(INPUTS, np.iinfo(np.int64).min)
         self.missing = dict.fromkeys(INPUTS, 0)  # instants
 
-    def watch(self, slab: tuple[Channel, ...]) -> None:
+    def add_raw(self, slab: tuple[Channel, ...]) -> None:
         """Look at the samples themselves for what was known before the clock begins."""
         for name in INPUTS:
             channel = self._clock.channels[name].of(slab)
@@ -35,7 +34,7 @@ class Holding:
                 self._last[name] = float(channel.values[earlier][latest])
                 self._last_ns[name] = int(channel.measured_ns[earlier][latest])
 
-    def held(self, signals: Signals) -> Signals:
+    def step(self, signals: Signals) -> Signals:
         """The next signals, their inputs known throughout."""
         values = dict(signals.values)
         for name in INPUTS:
@@ -59,7 +58,7 @@ class Holding:
 
 
 def held_throughout(
-    slabs: Iterable[Signals], holding: Holding
+    slabs: Iterable[Signals], holding: InputHold
 ) -> Iterator[tuple[Signals, Signals, Mapping[str, float]]]:
     """Each slab as measured, with its inputs held, and the inputs of the instant after it.
 
@@ -67,7 +66,7 @@ def held_throughout(
     """
     previous: tuple[Signals, Signals] | None = None
     for signals in slabs:
-        held = holding.held(signals)
+        held = holding.step(signals)
         if previous is not None:
             yield *previous, {name: float(held[name][0]) for name in INPUTS}
         previous = signals, held

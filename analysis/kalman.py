@@ -9,6 +9,8 @@ from scipy.optimize import minimize_scalar
 
 from shiplog.compiled import compiled
 from shiplog.ship import (
+    INPUTS,
+    OUTPUTS,
     Coefficients,
     rudder_effect,
     rudder_effect_rate,
@@ -21,8 +23,8 @@ from shiplog.vessel import FilterSettings
 
 from .design.discrete import discretise
 from .design.pseudo_input import pseudo_input_matrices
-from .gauge import OUTPUTS, Gauge, gauge
-from .inputs import INPUTS, last_inputs
+from .gauge import Gauge, gauge
+from .inputs import last_inputs
 
 STATES = ("yaw_rate", "yaw_acceleration", "yaw_jerk", "speed", "surge_acceleration")
 OUTPUT_STATES = (0, 3)  # where the outputs stand among the states: C of y = C x

@@ -6,6 +6,7 @@ from math import floor, log10
 
 import numpy as np
 
+from shiplog.ship import INPUTS, OUTPUTS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
 
@@ -20,9 +21,7 @@ from .drawing import (
     Series,
     banded,
 )
-from .gauge import OUTPUTS
 from .identification import Coefficient
-from .inputs import INPUTS
 from .pipeline import Findings
 
 Drawn = Mapping[str, Series]  # by entity, as `drawing.Sketch` has them

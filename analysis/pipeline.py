@@ -2,8 +2,8 @@
 
 A log may be longer than memory: it is gone through three times in slabs. First it is surveyed,
 then put on one clock to see what its signals usually do and to fit what is fitted to the whole of
-it, and at last replayed. Every stage takes slabs, gives slabs and carries its state; where the
-slabs are cut changes nothing.
+it (a second time where that shows that the fit was begun on a wrong guess), and at last replayed.
+Every stage takes slabs, gives slabs and carries its state; where the slabs are cut changes nothing.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,22 +18,22 @@ from shiplog.errors import UsageError
 from shiplog.gyro_bias import GyroWatch
 from shiplog.quality import faults
 from shiplog.rudder_sign import RudderWatch
-from shiplog.ship import Coefficients
-from shiplog.survey import Survey, survey
+from shiplog.ship import INPUTS, OUTPUTS, Coefficients
+from shiplog.survey import Survey, survey_log
 from shiplog.types import FloatArray, Log
 from shiplog.vessel import FilterSettings, parse_vessel
 
-from .disturbance import Course, Disturbance, Observing
+from .disturbance import Course, Disturbance, ForceObserver
 from .doubts import doubtful, silent_ends
 from .first_model import BARE, fit_first_model
-from .gauge import OUTPUTS, Gauge, Gauging
-from .identification import Identification, Identifying
-from .inputs import INPUTS, Holding, held_throughout
+from .gauge import Gauge, Gauger
+from .identification import Identification, Identifier
+from .inputs import InputHold, held_throughout
 from .kalman import OUTPUT_STATES, Estimates, Filter, Noise, noise_of
-from .residuals import Judging, OutputResiduals
+from .residuals import OutputResiduals, ResidualTest
 from .sliding import History
 from .stacking import stacked
-from .track import Track, Tracking
+from .track import Track, Tracker
 from .weak_form import WeakForm
 
 FITTED = "a first model, fitted to this log"
@@ -57,27 +57,33 @@ class Slab:
 
 
 @dataclass(frozen=True, eq=False)
-class Findings:
-    """What a replay comes to."""
+class Plan:
+    """What is known of a trial before it is replayed, from two passes over its log."""
 
     survey: Survey
-    metadata: dict[str, str]  # of the log
     clock: Clock
     vessel: Vessel
     model_origin: str  # where the model came from, in words
     usual: Gauge
     noise: Noise
-    residuals: tuple[OutputResiduals, ...]  # of yaw rate and speed
-    courses: dict[str, Course]  # of the disturbances
-    yaw: Identification
-    surge: Identification
-    track_origin: str  # how the track is known, in words
     warnings: tuple[str, ...]
 
     @property
     def name(self) -> str:
         """The log's."""
         return self.survey.name
+
+
+@dataclass(frozen=True, eq=False)
+class Findings(Plan):
+    """What a replay comes to."""
+
+    metadata: dict[str, str]  # of the log
+    residuals: tuple[OutputResiduals, ...]  # of yaw rate and speed
+    courses: dict[str, Course]  # of the disturbances
+    yaw: Identification
+    surge: Identification
+    track_origin: str  # how the track is known, in words
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,66 +109,25 @@ def analyse(
 class Replay:
     """A replay in slabs: go through `slabs`, then ask for the `findings`.
 
-    As `analyse`, except that no more than a slab is held.
+    As `analyse`, except that no more than a slab is held. Its `plan` is made at once, from two
+    passes over the log; the slabs are the third.
     """
 
     def __init__(
         self, log: Log, vessel: Vessel | None = None, *, on_step: Tell = lambda _step, _share: None
     ) -> None:
         self._log, self._tell = log, on_step
+        self._warnings: list[str] = []
+        survey, clock = self._surveyed()
+        stated = _stated_model(log, vessel)
+        usual, self._yaw, self._surge = self._gauged(survey, clock, stated[0] if stated else None)
+        on_step("model", 0.0)
+        vessel, origin = stated or (self._first_model(usual), FITTED)
+        settings = _averaged(vessel.filter, survey, clock.dt_secs)
+        noise = noise_of(usual, vessel.coefficients, settings)
+        self.plan = Plan(survey, clock, vessel, origin, usual, noise, tuple(self._warnings))
         self._begun = False
         self._findings: Findings | None = None
-        self._warnings: list[str] = []
-        self.survey, self.clock = self._surveyed()
-        stated = _stated_model(log, vessel)
-        self.usual, self._yaw, self._surge = self._gauged(
-            stated[0].coefficients if stated else BARE
-        )
-        on_step("model", 0.0)
-        self.vessel, self.model_origin = stated or (self._first_model(), FITTED)
-        settings = _averaged(self.vessel.filter, self.survey, self.clock.dt_secs)
-        self.noise = noise_of(self.usual, self.vessel.coefficients, settings)
-
-    def _surveyed(self) -> tuple[Survey, Clock]:
-        """The first time through the log."""
-        self._tell("check", 0.0)
-        found = survey(self._log, strict=True)
-        also = tuple(name for name in ("heading", "position") if name in found)
-        self._warnings += [*self._log.warnings, *faults(found, (*NEEDED, *also))]
-        return found, set_clock(self._log, found, channels=NEEDED, optional=("heading",))
-
-    def _gauged(self, alphas: Coefficients) -> tuple[Gauge, Identifying, Identifying]:
-        """The second time: what is usual, and the whole trial's yaw and surge equations.
-
-        For these one must know how far apart samples stand on the clock, which is only told by
-        then. It is nearly always what the survey lets expect; where not, they are made once more.
-        """
-        clock, doubts = self.clock, (RudderWatch(self.survey), GyroWatch(self.survey))
-        holding, gauging = Holding(clock), Gauging(alphas)
-        expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in OUTPUTS]
-        equations = _Equations(alphas, clock, np.maximum(np.round(expected), 1.0))
-        for signals in self._on_clock("one clock", holding.watch, *(d.add for d in doubts)):
-            gauging.add(holding.held(signals))
-            equations.add(signals, gauging.fastest)
-        usual = gauging.result()
-        if not np.array_equal(usual.intervals, equations.intervals):
-            equations = _Equations(alphas, clock, usual.intervals)
-            for signals in self._on_clock("one clock"):
-                equations.add(signals, usual.fastest)
-        _require_outputs(self._log, usual)
-        self._warnings += doubtful(self.survey, NEEDED)
-        self._warnings += [said for doubt in doubts if (said := doubt.warning())]
-        self._warnings += [*silent_ends(self.survey, clock, NEEDED), *holding.said()]
-        return usual, equations.yaw, equations.surge
-
-    def _first_model(self) -> Vessel:
-        vessel = fit_first_model(self._yaw, self._surge, self.usual, self._log.name)
-        model = vessel.coefficients
-        if not (model.a < 0 and model.g <= 0 and model.h >= 0):
-            self._warnings.append(
-                "the model fitted to this log is no ship's: too little moves in it to tell"
-            )
-        return vessel
 
     def slabs(self) -> Iterator[Slab]:
         """Replay the trial, once.
@@ -172,37 +137,31 @@ class Replay:
         if self._begun:
             raise ValueError("the slabs of a replay come once; make another")
         self._begun = True
-        model, holding = self.vessel.coefficients, Holding(self.clock)
-        filtering, observing = self._designed()
-        judging = [self._judging(output) for output in range(len(OUTPUTS))]
-        weak_form = _weak_form(model, self.clock, self.usual.intervals)
-        tracking = Tracking(self.clock, self.survey.get("position"))
-        on_clock = self._on_clock("replay", holding.watch, tracking.watch)
+        plan, clock, fastest = self.plan, self.plan.clock, self.plan.usual.fastest
+        holding, (filtering, observing) = InputHold(clock), self._designed()
+        tests = [self._residual_test(output) for output in range(len(OUTPUTS))]
+        weak_form = _weak_form(plan.vessel.coefficients, clock, plan.usual.intervals)
+        tracking = Tracker(clock, plan.survey.get("position"))
+        on_clock = self._on_clock("replay", clock, holding.add_raw, tracking.add_raw)
         for signals, held, following in held_throughout(on_clock, holding):
             estimates = filtering.step(held, following)
             if not np.all(np.isfinite(estimates.states)):
                 raise self._runs_away()
-            for i, of_output in enumerate(judging):
-                of_output.add(estimates.innovations[:, i], estimates.innovation_stds[:, i])
+            for i, test in enumerate(tests):
+                test.add(estimates.innovations[:, i], estimates.innovation_stds[:, i])
             disturbance = observing.step(held, following)
-            yaw_rows, surge_rows = weak_form.step(signals, self.usual.fastest)
+            yaw_rows, surge_rows = weak_form.step(signals, fastest)
             yaw, surge = self._yaw.step(yaw_rows), self._surge.step(surge_rows)
             track = tracking.step(signals, *(estimates.states[:, i] for i in OUTPUT_STATES))
             yield Slab(signals, estimates, disturbance, yaw, surge, track)
         self._findings = Findings(
-            survey=self.survey,
+            **vars(plan),
             metadata=dict(self._log.metadata),
-            clock=self.clock,
-            vessel=self.vessel,
-            model_origin=self.model_origin,
-            usual=self.usual,
-            noise=self.noise,
-            residuals=tuple(of_output.result() for of_output in judging),
-            courses=observing.courses(),
+            residuals=tuple(test.result() for test in tests),
+            courses=observing.result(),
             yaw=self._yaw.result(),
             surge=self._surge.result(),
             track_origin=tracking.origin,
-            warnings=tuple(self._warnings),
         )
 
     @property
@@ -212,8 +171,53 @@ class Replay:
             raise ValueError("go through the slabs first")
         return self._findings
 
+    def _surveyed(self) -> tuple[Survey, Clock]:
+        """The first time through the log."""
+        self._tell("check", 0.0)
+        found = survey_log(self._log, strict=True)
+        also = tuple(name for name in ("heading", "position") if name in found)
+        self._warnings += [*self._log.warnings, *faults(found, (*NEEDED, *also))]
+        return found, set_clock(self._log, found, channels=NEEDED, optional=("heading",))
+
+    def _gauged(
+        self, found: Survey, clock: Clock, vessel: Vessel | None
+    ) -> tuple[Gauge, Identifier, Identifier]:
+        """The second time: what is usual, and the whole trial's yaw and surge equations.
+
+        For these one must know how far apart samples stand on the clock, which is only told by
+        then. It is nearly always what the survey lets expect; where not, they are made once more.
+        """
+        alphas = vessel.coefficients if vessel else BARE
+        doubts = RudderWatch(found), GyroWatch(found)
+        holding, gauger = InputHold(clock), Gauger(alphas)
+        expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in OUTPUTS]
+        equations = _Equations(alphas, clock, np.maximum(np.round(expected), 1.0))
+        watches = holding.add_raw, *(doubt.add for doubt in doubts)
+        for signals in self._on_clock("one clock", clock, *watches):
+            gauger.add(holding.step(signals))
+            equations.add(signals, gauger.fastest)
+        usual = gauger.result()
+        if not np.array_equal(usual.intervals, equations.intervals):
+            equations = _Equations(alphas, clock, usual.intervals)
+            for signals in self._on_clock("one clock", clock):
+                equations.add(signals, usual.fastest)
+        _require_outputs(self._log, usual)
+        self._warnings += doubtful(found, NEEDED)
+        self._warnings += [said for doubt in doubts if (said := doubt.result())]
+        self._warnings += [*silent_ends(found, clock, NEEDED), *holding.said()]
+        return usual, equations.yaw, equations.surge
+
+    def _first_model(self, usual: Gauge) -> Vessel:
+        vessel = fit_first_model(self._yaw, self._surge, usual, self._log.name)
+        model = vessel.coefficients
+        if not (model.a < 0 and model.g <= 0 and model.h >= 0):
+            self._warnings.append(
+                "the model fitted to this log is no ship's: too little moves in it to tell"
+            )
+        return vessel
+
     def _on_clock(
-        self, step: str, *watches: Callable[[tuple[Channel, ...]], None]
+        self, step: str, clock: Clock, *watches: Callable[[tuple[Channel, ...]], None]
     ) -> Iterator[Signals]:
         """The signals; each slab of the log is shown to the watches before it is placed."""
 
@@ -224,27 +228,28 @@ class Replay:
                 yield slab
 
         self._tell(step, 0.0)
-        for signals in on_clock(watched(), self.clock):
+        for signals in on_clock(watched(), clock):
             yield signals
-            self._tell(step, (signals.first + len(signals)) / self.clock.count)
+            self._tell(step, (signals.first + len(signals)) / clock.count)
 
-    def _designed(self) -> tuple[Filter, Observing]:
+    def _designed(self) -> tuple[Filter, ForceObserver]:
         """The filter and the observer; of a model that runs away neither may be had."""
-        model = self.vessel.coefficients
+        model, noise, usual = self.plan.vessel.coefficients, self.plan.noise, self.plan.usual
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                filtering = Filter(model, self.noise, self.usual)
-                return filtering, Observing(model, self.noise, self.usual)
+                return Filter(model, noise, usual), ForceObserver(model, noise, usual)
         except (UsageError, np.linalg.LinAlgError) as error:
             raise self._runs_away() from error
 
-    def _judging(self, output: int) -> Judging:
-        unit, interval = self.survey[OUTPUTS[output]].unit, float(self.usual.intervals[output])
-        return Judging(OUTPUTS[output], unit, interval, noise_measured=self.noise.measured[output])
+    def _residual_test(self, output: int) -> ResidualTest:
+        name, plan = OUTPUTS[output], self.plan
+        interval = float(plan.usual.intervals[output])
+        unit, noise_measured = plan.survey[name].unit, plan.noise.measured[output]
+        return ResidualTest(name, unit, interval, noise_measured=noise_measured)
 
     def _runs_away(self) -> LogError:
         return LogError(
-            f"the filter runs away: the model does not fit this log ({self.model_origin}); "
+            f"the filter runs away: the model does not fit this log ({self.plan.model_origin}); "
             f"give the ship's own with --vessel: {self._log.name}"
         )
 
@@ -255,14 +260,14 @@ class _Equations:
     def __init__(self, alphas: Coefficients, clock: Clock, intervals: FloatArray) -> None:
         self.intervals = intervals
         self._weak_form = _weak_form(alphas, clock, intervals)
-        self.yaw = Identifying(self._weak_form.rows, constant=True)
-        self.surge = Identifying(self._weak_form.rows)
+        self.yaw = Identifier(self._weak_form.row_count, constant=True)
+        self.surge = Identifier(self._weak_form.row_count)
 
     def add(self, signals: Signals, fastest: float) -> None:
         """Take the next signals; `fastest` is the greatest speed so far, m/s."""
         yaw_rows, surge_rows = self._weak_form.step(signals, fastest)
-        self.yaw.fit(yaw_rows)
-        self.surge.fit(surge_rows)
+        self.yaw.add(yaw_rows)
+        self.surge.add(surge_rows)
 
 
 def _weak_form(model: Coefficients, clock: Clock, intervals: FloatArray) -> WeakForm:

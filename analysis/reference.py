@@ -8,10 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from shiplog import Channel, TrialLog
-from shiplog.ship import COEFFICIENT_UNITS
+from shiplog.ship import COEFFICIENT_UNITS, OUTPUTS
 from shiplog.types import FloatArray, TimeArray
 
-from .gauge import OUTPUTS
 from .identification import Identification
 from .kalman import STATES
 from .pipeline import Analysis

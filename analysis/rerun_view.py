@@ -2,16 +2,9 @@
 
 import os
 import re
-import signal
-import socket
-import subprocess
-import sys
-import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import sha256
-from typing import IO
 
 import numpy as np
 import rerun as rr
@@ -24,10 +17,9 @@ from shiplog.types import FloatArray
 from .chart import Chart, draw_track
 from .drawing import CYAN, GREEN, GREY, ORANGE, RED, Series, Sketch
 from .panels import Panel, coefficient_panels, equation_panels
-from .pipeline import Analysis, Findings, Replay, Slab
+from .pipeline import Analysis, Findings, Plan, Slab
 
 ROWS_SENT = 1 << 16  # at once
-VIEWER_SECS = 20.0  # within which a viewer listens, or never will
 WHOLE_RUN = rrb.TimeAxis(
     view_range=rr.TimeRange(
         start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
@@ -46,12 +38,10 @@ A gap: not measured, or a window that cannot tell.*
 class Review:
     """A review that is drawn as the slabs of a replay come; made by `reviewing`."""
 
-    def __init__(
-        self, replay: Replay | Analysis, recording: rr.RecordingStream, *, full: bool
-    ) -> None:
+    def __init__(self, plan: Plan, recording: rr.RecordingStream, *, full: bool) -> None:
         self._recording, self._full = recording, full
-        self._start_ns = replay.clock.start_ns
-        self._sketch = Sketch(replay.clock, replay.usual)
+        self._start_ns = plan.clock.start_ns
+        self._sketch = Sketch(plan.clock, plan.usual)
 
     def add(self, slab: Slab) -> None:
         """Draw the next slab."""
@@ -63,7 +53,7 @@ class Review:
     def finish(self, findings: Findings, text: str) -> None:
         """Draw what is known at the end; `text` is the page of words, in Markdown."""
         recording, start_ns = self._recording, self._start_ns
-        drawn = self._sketch.drawn()
+        drawn = self._sketch.result()
         yaw, surge = equation_panels(findings, drawn)
         coefficients, chart = coefficient_panels(findings, drawn), draw_track(findings, drawn)
         rr.send_blueprint(_blueprint(yaw, surge, coefficients, chart), recording=recording)
@@ -81,9 +71,7 @@ class Review:
 
 
 @contextmanager
-def reviewing(
-    replay: Replay | Analysis, path: str | os.PathLike[str], *, full: bool = False
-) -> Iterator[Review]:
+def reviewing(plan: Plan, path: str | os.PathLike[str], *, full: bool = False) -> Iterator[Review]:
     """A review that becomes the .rrd file `path` when it was finished.
 
     Of a long trial the series are thinned to what a screen can show, with every extreme kept;
@@ -91,10 +79,10 @@ def reviewing(
     the end.
     """
     with replacing(path) as part:
-        recording = _recording(replay)
+        recording = _recording(plan)
         try:
             recording.save(part)
-            yield Review(replay, recording, full=full)
+            yield Review(plan, recording, full=full)
         except RuntimeError as error:  # what Rerun makes of a full disk
             raise ShiplogError(f"cannot finish the review; is the disk full? {path}") from error
         finally:
@@ -110,59 +98,14 @@ def write_review(
         review.finish(analysis, text)
 
 
-def view_review(path: str | os.PathLike[str]) -> None:
-    """Open a review in a viewer of its own, which listens to this computer only.
-
-    The viewer stays open when the caller ends. Raises `ShiplogError` where none can start, for
-    want of a screen as a rule.
-    """
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    listening = ["--bind", "127.0.0.1", "--port", str(port)]
-    command = [sys.executable, "-m", "rerun_cli", *listening, os.fspath(path)]
-    with tempfile.TemporaryFile() as said:
-        viewer = subprocess.Popen(  # noqa: S603 - our own interpreter
-            command, stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
-        )
-        _await(viewer, port, said)
-
-
-def _await(viewer: subprocess.Popen[bytes], port: int, said: IO[bytes]) -> None:
-    """Wait until the viewer listens; it does so a moment before it looks for a screen."""
-    deadline, listening = time.monotonic() + VIEWER_SECS, False
-    while viewer.poll() is None and time.monotonic() < deadline:
-        if listening:
-            return
-        with socket.socket() as probe:
-            listening = probe.connect_ex(("127.0.0.1", port)) == 0
-        time.sleep(1.0 if listening else 0.1)
-    _end(viewer)
-    said.seek(0)
-    lines = said.read().decode(errors="replace").strip().splitlines()
-    reason = lines[-1].rpartition(": ")[2].rstrip(".") if lines else "it does not answer"
-    raise ShiplogError(
-        f"the Rerun viewer cannot start here ({reason}); "
-        "write the review to a file and open it on a computer with a screen"
-    )
-
-
-def _end(viewer: subprocess.Popen[bytes]) -> None:
-    """End the command and, where there are process groups, the viewer it started."""
-    if viewer.poll() is None and hasattr(os, "killpg"):
-        os.killpg(viewer.pid, signal.SIGTERM)
-    viewer.terminate()
-    viewer.wait()
-
-
-def _recording(replay: Replay | Analysis) -> rr.RecordingStream:
+def _recording(plan: Plan) -> rr.RecordingStream:
     """A stream whose names depend on the log, the model and the noise alone.
 
     Each log is an application of its own to Rerun, which shares one layout among the recordings
     of an application; the axes of another ship would be wrong for this one.
     """
-    name, usual, noise = replay.survey.name, replay.usual, replay.noise
-    known = (name, replay.clock.start_ns, replay.clock.count, replay.vessel, usual.measured)
+    name, usual, noise = plan.name, plan.usual, plan.noise
+    known = (name, plan.clock.start_ns, plan.clock.count, plan.vessel, usual.measured)
     digest = sha256(repr(known).encode())
     for array in (usual.spread, noise.measurement_std, noise.process_ratio):
         digest.update(np.ascontiguousarray(array).tobytes())

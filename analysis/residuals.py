@@ -47,7 +47,7 @@ class OutputResiduals:
         return low <= self.normalised_squared <= high
 
 
-class Judging:
+class ResidualTest:
     """Judges one output's innovations as they come.
 
     `usual_step` is the median number of instants from one measurement to the next.
@@ -89,10 +89,10 @@ def judge(
     *,
     noise_measured: bool,
 ) -> OutputResiduals:
-    """Judge one output's innovations that are all there, (n,); as `Judging`."""
+    """Judge one output's innovations that are all there, (n,); as `ResidualTest`."""
     steps = np.diff(np.flatnonzero(np.isfinite(innovations)))
     usual_step = float(np.median(steps)) if len(steps) else 1.0
-    judging = Judging(name, unit, usual_step, noise_measured=noise_measured)
+    judging = ResidualTest(name, unit, usual_step, noise_measured=noise_measured)
     judging.add(innovations, innovation_stds)
     return judging.result()
 

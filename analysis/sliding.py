@@ -61,7 +61,7 @@ def fit(rows: Rows) -> Fit:
     regression.add(rows)
     errors = Errors(regression.solve())
     errors.add(rows)
-    return errors.fit()
+    return errors.result()
 
 
 class Windows:
@@ -165,7 +165,7 @@ class Errors:
         add_runs(self._runs, new, self._count, self._solution.values, self._solution.inverse)
         self._count += len(new)
 
-    def fit(self) -> Fit:
+    def result(self) -> Fit:
         """The values and their errors, when all rows have come twice."""
         of = self._solution
         stds = of.enlarged * np.sqrt(variances(self._runs, self._count))

@@ -28,7 +28,7 @@ class Track:
 NOWHERE = Track(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
-class Tracking:
+class Tracker:
     """Follows the ship in slabs: the positions recorded, or else dead reckoning.
 
     The latter is from heading and speed ahead; where there is no heading the yaw rate is
@@ -37,7 +37,7 @@ class Tracking:
 
     def __init__(self, clock: Clock, position: ChannelSurvey | None) -> None:
         self._recorded = position if position is not None and position.known > 1 else None
-        self._start_ns, self._reckoning = clock.start_ns, _Reckoning(clock)
+        self._start_ns, self._reckoning = clock.start_ns, _DeadReckoner(clock)
         self._fixes: list[Track] = []  # since the last step
         self._datum: FloatArray | None = None  # the first position
 
@@ -49,7 +49,7 @@ class Tracking:
         heading = "heading" if self._reckoning.by_compass else "yaw rate"
         return f"dead reckoning from {heading} and speed ahead"
 
-    def watch(self, slab: tuple[Channel, ...]) -> None:
+    def add_raw(self, slab: tuple[Channel, ...]) -> None:
         """Look at the samples themselves for the positions recorded."""
         channel = self._recorded.of(slab) if self._recorded else None
         if channel is None:
@@ -77,7 +77,7 @@ class Tracking:
         return np.asarray(np.radians(positions) * per_radian - np.radians(self._datum) * per_radian)
 
 
-class _Reckoning:
+class _DeadReckoner:
     """Dead reckoning in slabs; what follows the last heading known waits for the next.
 
     It does not wait for ever: after a silence of `BRIDGED` the compass is taken for lost, and the
@@ -124,6 +124,11 @@ class _Reckoning:
         return Track(at * dt, north, east)
 
     def _look_at_compass(self, slab: Signals, turned: FloatArray) -> None:
+        """Add how far off each heading is from what was turned.
+
+        Where two are further apart than is bridged, the first is said again just before the
+        second, so that what lies between them is not led from one to the other.
+        """
         known = np.flatnonzero(np.isfinite(slab["heading"]))
         off = np.column_stack((known + slab.first, slab["heading"][known] - turned[known]))
         before = self._off if len(self._off) else np.array([[-1.0, 0.0]])

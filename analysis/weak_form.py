@@ -18,11 +18,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shiplog.compiled import compiled
-from shiplog.ship import SURGE_COEFFICIENTS, YAW_COEFFICIENTS, Coefficients, rudder_effects
+from shiplog.ship import (
+    INPUTS,
+    OUTPUTS,
+    SURGE_COEFFICIENTS,
+    YAW_COEFFICIENTS,
+    Coefficients,
+    rudder_effects,
+)
 from shiplog.survey import longest_step_secs
 from shiplog.types import FloatArray, Signals
 
-NAMES = ("yaw_rate", "speed", "rudder", "rpm")
+CHANNELS = (*OUTPUTS, *INPUTS)
 BUMP_SECS = 60.0  # long against the noise, short against the ship's turning
 STRIDE_SECS = 1.0
 LEAST_RUDDER = np.radians(2.0)  # a rudder that moves less tells nothing of yaw,
@@ -66,7 +73,7 @@ def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
     Of `model` only the alphas are used. `signals` must have NaN in `rudder` and `rpm` too where
     they were not measured.
     """
-    steps = (np.diff(np.flatnonzero(np.isfinite(signals[name]))) for name in NAMES)
+    steps = (np.diff(np.flatnonzero(np.isfinite(signals[name]))) for name in CHANNELS)
     usual = [float(np.median(step)) if len(step) else 1.0 for step in steps]
     fastest = float(np.nanmax(np.abs(signals["speed"])))
     return WeakForm(model, len(signals), signals.dt_secs, usual).step(signals, fastest)
@@ -75,7 +82,7 @@ def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
 class WeakForm:
     """Makes rows of signals that come in slabs, `count` instants in all.
 
-    `intervals` (4,) are the usual numbers of instants from one sample of `NAMES` to the next.
+    `intervals` (4,) are the usual numbers of instants from one sample of `CHANNELS` to the next.
     """
 
     def __init__(
@@ -83,23 +90,24 @@ class WeakForm:
     ) -> None:
         self._model, self._count, self._dt = model, count, dt
         longest = [longest_step_secs(interval * dt) / dt for interval in intervals]
-        self._longest = dict(zip(NAMES, longest, strict=True))
+        self._longest = dict(zip(CHANNELS, longest, strict=True))
         self._reach = int(max(self._longest.values())) + 2  # over which a sample has influence
         self._half = max(2, round(min(BUMP_SECS, count * dt / 5) / dt / 2))
         self._stride = max(1, round(STRIDE_SECS / dt))
         self._bump = _bump(self._half, dt)
         self._row, self._first = 0, 0  # the next row, and the first sample that is kept for it
-        self._kept = {name: np.zeros(0) for name in NAMES}
+        self._kept = {name: np.zeros(0) for name in CHANNELS}
 
     @property
-    def rows(self) -> int:
+    def row_count(self) -> int:
         """How many rows there will be in all."""
         return max(0, (self._count - self._width) // self._stride + 1)
 
     def step(self, slab: Signals, fastest: float) -> tuple[Rows, Rows]:
         """The rows of yaw and of surge that the next slab makes possible.
 
-        `fastest` is the greatest speed of the trial, m/s.
+        `fastest` is the greatest speed of the trial, m/s, as far as it is known: what is judged by
+        it is judged by that of the last rows.
         """
         self._kept = {n: np.concatenate((kept, slab[n])) for n, kept in self._kept.items()}
         end = self._first + len(self._kept["speed"])
@@ -126,7 +134,7 @@ class WeakForm:
         """The integrals of `_integrated` over `count` bumps, the first from sample `start` on."""
         if not count:
             return np.zeros((0, 13))
-        w, v, delta, n = (_bridged(self._kept[name], self._longest[name]) for name in NAMES)
+        w, v, delta, n = (_bridged(self._kept[name], self._longest[name]) for name in CHANNELS)
         delta_dot = np.gradient(delta, self._dt)
         needed = slice(start, start + (count - 1) * self._stride + self._width)
         w, v, delta, delta_dot, n = (x[needed] for x in (w, v, delta, delta_dot, n))

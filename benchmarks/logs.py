@@ -4,15 +4,14 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from recorders.sensors import suite
 from recorders.simulate import simulate
 from shiplog import Channel, LogWriter, TrialLog, load_vessel
+from shiplog.ship import INPUTS, OUTPUTS
 
 from .measure import SkippedError
 
-NAMES = ("yaw_rate", "speed", "rudder", "rpm")
+NAMES = (*OUTPUTS, *INPUTS)
 RATE_HZ = 10.0
 _BYTES_PER_HOUR = 4.4e6  # of such a log; a little more than it takes
 _SLAB_SECS = 3600.0  # of a log that is written piece by piece
@@ -48,12 +47,9 @@ def write_repeated(day: TrialLog, hours: float, path: Path) -> Path:
 
 
 def _part(channel: Channel, first: int, count: int, later_ns: int) -> Channel:
-    part = slice(first, first + count)
+    part = channel.part(first, first + count)
     return replace(
-        channel,
-        measured_ns=channel.measured_ns[part] + np.int64(later_ns),
-        received_ns=channel.received_ns[part] + np.int64(later_ns),
-        values=channel.values[part],
+        part, measured_ns=part.measured_ns + later_ns, received_ns=part.received_ns + later_ns
     )
 
 

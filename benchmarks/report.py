@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from .measure import Result
-from .replays import Growth, Length
+from .replays import MOST_MEMORY, STEEPEST, Growth, Length
 
 
 @dataclass
@@ -118,9 +118,12 @@ def _growth(growth: Growth) -> _Grid:
         fitted = ", ".join(f"{hours:g}" for hours in growth.fitted_hours)
         remarks.append(
             f"Time grows with length to the power {growth.exponent:.3f} (of {fitted} h); "
-            f"held to at most 1.05 from a day on: {_met(growth.exponent_met) or 'not measured'}."
+            f"held to at most {STEEPEST:g} from a day on: "
+            f"{_met(growth.exponent_met) or 'not measured'}."
         )
-    remarks.append(f"Memory under 1.5 GiB: {_met(growth.memory_met) or 'not measured'}.")
+    remarks.append(
+        f"Memory under {MOST_MEMORY / 2**30:g} GiB: {_met(growth.memory_met) or 'not measured'}."
+    )
     return _Grid("How a replay grows", columns, list(map(_grown, growth.lengths)), tuple(remarks))
 
 

@@ -132,9 +132,9 @@ def _run_replay(arguments: argparse.Namespace) -> int:
         except ShiplogError:
             _warn(log.warnings)  # they may explain it
             raise
-        from analysis.rerun_view import reviewing, view_review
+        from analysis.rerun_view import reviewing
 
-        with reviewing(replay, output, full=arguments.full) as review:
+        with reviewing(replay.plan, output, full=arguments.full) as review:
             for slab in replay.slabs():
                 review.add(slab)
             findings = replay.findings
@@ -146,6 +146,8 @@ def _run_replay(arguments: argparse.Namespace) -> int:
     _warn(findings.warnings)
     print(f"review: {output} (open it with: rerun {output})", file=sys.stderr)
     if arguments.view:
+        from analysis.viewer import view_review
+
         view_review(output)
     return DATA_LOST if log.data_lost else FINE
 

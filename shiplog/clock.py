@@ -13,7 +13,7 @@ import numpy as np
 
 from .errors import LogError, UsageError
 from .probe import known_samples
-from .survey import ChannelSurvey, Survey, survey
+from .survey import ChannelSurvey, Survey, survey_log
 from .types import Channel, FloatArray, Log, Signals, joined
 from .units import CATALOGUE
 
@@ -52,7 +52,9 @@ def resample(
     Raises `LogError` where a channel is missing or has fewer than two samples, or where the
     channels have no time in common.
     """
-    return joined(on_clock(log.slabs(), set_clock(log, survey(log), dt_secs, channels, optional)))
+    return joined(
+        on_clock(log.slabs(), set_clock(log, survey_log(log), dt_secs, channels, optional))
+    )
 
 
 def set_clock(
@@ -214,7 +216,9 @@ class _Binning(_Placing):
 class _Interpolation(_Placing):
     """Linear between samples, NaN inside a gap and beyond the ends."""
 
-    _last, _turns = 0.0, 0.0
+    def __init__(self, channel: ChannelSurvey, clock: Clock) -> None:
+        super().__init__(channel, clock)
+        self._last, self._turns = 0.0, 0.0  # of angles: the last, and the full turns so far
 
     def placed(self, first: int, end: int) -> FloatArray:
         """The values at the instants from `first` to before `end`, which must be ready."""

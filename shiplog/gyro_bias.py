@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .probe import Probe, known_samples
-from .survey import ChannelSurvey, Survey, survey
+from .survey import ChannelSurvey, Survey, survey_log
 from .types import Channel, FloatArray, Log
 from .units import factor
 
@@ -21,10 +21,10 @@ def gyro_bias_warning(log: Log) -> str | None:
     their scatter; blocks with a gap in either channel are left out. None where a channel is
     missing, or too little of it is whole.
     """
-    watch = GyroWatch(survey(log))
+    watch = GyroWatch(survey_log(log))
     for slab in log.slabs():
         watch.add(slab)
-    return watch.warning()
+    return watch.result()
 
 
 class GyroWatch:
@@ -51,12 +51,12 @@ class GyroWatch:
             self._turned.add(slab)
             self._headed.add(slab)
 
-    def warning(self) -> str | None:
+    def result(self) -> str | None:
         """What there is to say, once all samples were added."""
         if not self._turned:
             return None
         whole = self._turned.whole & self._headed.whole
-        turned, headed = self._turned.values(), self._headed.values()
+        turned, headed = self._turned.result(), self._headed.result()
         biases, contrary = (
             (np.diff(turned + sign * headed) / np.diff(self._edges))[whole] for sign in (-1, 1)
         )
@@ -109,9 +109,9 @@ class _Turning:
             first, last = np.searchsorted(self._edges, times[i : i + 2]) - 1
             self.whole[max(first, 0) : last + 1] = False
 
-    def values(self) -> FloatArray:
+    def result(self) -> FloatArray:
         """Radians at the edges, (n,), from some direction on."""
-        return self._probe.values()
+        return self._probe.result()
 
 
 def _integrated(times: FloatArray, rates: FloatArray) -> FloatArray:

@@ -27,7 +27,7 @@ class Probe:
             kept = max(int(np.searchsorted(self._times, self._times[-1])) - 1, 0)
             self._times, self._seen = self._times[kept:], self._seen[kept:]
 
-    def values(self) -> FloatArray:
+    def result(self) -> FloatArray:
         """The values, (n,), once all samples were added."""
         if len(self._times):
             self._place(len(self._at))

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from .errors import LogError
 from .schema import GEOGRAPHIC
-from .survey import ChannelSurvey, Survey, survey
+from .survey import ChannelSurvey, Survey, survey_log
 from .types import TrialLog
 from .units import CATALOGUE, factor
 
@@ -19,7 +19,7 @@ def examine(log: TrialLog, names: tuple[str, ...]) -> list[str]:
     Raises `LogError` where a channel is missing, holds an infinite value, or has measured times
     that run backwards: with these nothing can be computed.
     """
-    return faults(survey(log), names)
+    return faults(survey_log(log), names)
 
 
 def faults(found: Survey, names: tuple[str, ...]) -> list[str]:

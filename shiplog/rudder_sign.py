@@ -3,7 +3,7 @@
 import numpy as np
 
 from .probe import Probe, known_samples
-from .survey import ChannelSurvey, Survey, survey
+from .survey import ChannelSurvey, Survey, survey_log
 from .types import Channel, FloatArray, Log
 
 WINDOW_SECS = 10.0  # over which the rudder's effect on the yaw rate is looked at
@@ -23,10 +23,10 @@ def rudder_sign_warning(log: Log) -> str | None:
     into account (Newey and West, 1987). None where a channel is missing, or the rudder moved too
     little to tell.
     """
-    watch = RudderWatch(survey(log))
+    watch = RudderWatch(survey_log(log))
     for slab in log.slabs():
         watch.add(slab)
-    return watch.warning()
+    return watch.result()
 
 
 class RudderWatch:
@@ -37,6 +37,7 @@ class RudderWatch:
 
     def __init__(self, found: Survey) -> None:
         self._rudder, yaw_rate = found.get("rudder"), found.get("yaw_rate")
+        self._dt, self._start = 0.0, 0
         self._probes: dict[ChannelSurvey, Probe] = {}
         if self._rudder is None or yaw_rate is None:
             return
@@ -62,11 +63,11 @@ class RudderWatch:
             if channel is not None:
                 probe.add(*known_samples(channel, self._start))
 
-    def warning(self) -> str | None:
+    def result(self) -> str | None:
         """What there is to say, once all samples were added."""
         if not self._probes or self._rudder is None:
             return None
-        r, delta, *speed = (probe.values() for probe in self._probes.values())
+        r, delta, *speed = (probe.result() for probe in self._probes.values())
         relative = _relative(speed[0]) if speed else np.ones_like(r)
         window = min(WINDOW_SECS, len(r) * self._dt / WINDOWS)
         length = max(round(window / self._dt), 1)
@@ -111,7 +112,10 @@ def _rudder_effect(
 
 
 def _standard_errors(X: FloatArray, residual: FloatArray, lags: int) -> FloatArray:
-    """Of least squares whose residuals stay alike over so many rows (Newey and West, 1987)."""
+    """Of least squares whose residuals stay alike over so many rows (Newey and West, 1987).
+
+    The core does not know `analysis.newey_west`, and needs no compiled loop here.
+    """
     moments = X * residual[:, None]
     middle = moments.T @ moments
     for lag in range(1, min(lags, len(X) - 1)):

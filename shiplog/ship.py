@@ -53,6 +53,8 @@ COEFFICIENT_UNITS = {
     "alpha2": "1/rpm",
     "alpha3": "s/m",
 }
+OUTPUTS = ("yaw_rate", "speed")  # what is measured of the ship,
+INPUTS = ("rudder", "rpm")  # and what she is given
 YAW_COEFFICIENTS = ("a", "b1", "b2", "b3", "d", "e")
 SURGE_COEFFICIENTS = ("f", "g", "h")
 

@@ -58,8 +58,8 @@ class StuckWatch:
         self._start, self._count = times[following], len(rows) - following
         self._jump = after[-1]
 
-    def found(self, usual_secs: float) -> Stuck | None:
-        """What was stuck of all that was added, once it is all; `usual_secs` between samples."""
+    def result(self, usual_secs: float) -> Stuck | None:
+        """What was stuck of all that was added, told once; `usual_secs` between samples."""
         if self._last is None:
             return None
         end, value = self._last

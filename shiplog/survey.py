@@ -100,7 +100,7 @@ class Survey(ByName[ChannelSurvey]):
         return (end - start) * 1e-9
 
 
-def survey(log: Log, *, strict: bool = False) -> Survey:
+def survey_log(log: Log, *, strict: bool = False) -> Survey:
     """Go through a log once and say what each of its channels holds.
 
     `strict` takes what no ship does as not measured.
@@ -143,6 +143,7 @@ class _Surveyor:
         self._extremes = (np.inf, -np.inf)
         self._backwards, self._early, self._infinite, self._impossible = (Cases(),) * 4
         self._delay = 0
+        self._worst_beyond = 0.0  # by which a value is impossible
         self._long = [np.zeros((0, 2), np.int64)]  # rows of the start and length of a long step
         self._intervals, self._values = Thinned(), Thinned()
         self._known_intervals = self._intervals  # until a sample is not known
@@ -224,8 +225,6 @@ class _Surveyor:
             met = self._met(self._impossible, len(bad), channel.measured_ns[bad[0]], 0.0)
             self._impossible = replace(met, extent=extent)
 
-    _worst_beyond = 0.0
-
     def _met(self, cases: Cases, count: int, at_ns: int, extent: float) -> Cases:
         """Some more cases; the first of all is told."""
         if cases.count:
@@ -258,7 +257,7 @@ class _Surveyor:
             missing=self._missing,
             infinite=self._infinite,
             impossible=self._impossible,
-            stuck=self._stuck.found(usual) if self._stuck else None,
+            stuck=self._stuck.result(usual) if self._stuck else None,
             known=self._known,
             known_span_ns=self._known_span if self._known else (0, 0),
             usual_known_secs=usual if known is self._intervals else _median_secs(known),

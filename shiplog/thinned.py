@@ -13,7 +13,7 @@ class Thinned:
     """The values of a stream, all of them, or of a longer one a part from all over it.
 
     Which values are kept depends on their numbers in the stream alone, by a hash, never on the
-    slabs in which they came or on what they are: between half of `HELD` and all of it.
+    slabs in which they came or on what they are: between about half of `HELD` and all of it.
     """
 
     def __init__(self) -> None:

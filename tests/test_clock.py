@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from shiplog import Channel, LogError, TrialLog, UsageError, resample
 from shiplog.clock import on_clock, set_clock
-from shiplog.survey import survey
+from shiplog.survey import survey_log
 from shiplog.types import joined
 
 START = 1_700_000_000_000_000_000
@@ -89,7 +89,7 @@ def test_what_is_measured_is_the_mean_of_the_nearest_samples(seed: int, dt_ns: i
 def test_what_is_commanded_is_interpolated_but_not_across_a_gap(seed: int, dt_ns: int) -> None:
     commanded = scattered("rudder", np.random.default_rng(seed), 40, 60.0)
     signals = resample(log_of(commanded), dt_ns * 1e-9)
-    gap_ns = survey(log_of(commanded))[commanded.name].gap_threshold_secs * 1e9
+    gap_ns = survey_log(log_of(commanded))[commanded.name].gap_threshold_secs * 1e9
     expected = interpolated_by_force(commanded, signals.start_ns, dt_ns, len(signals), gap_ns)
     np.testing.assert_allclose(signals["rudder"], expected, rtol=1e-9, atol=1e-12)
 
@@ -163,7 +163,7 @@ def test_jittered_times_keep_the_usual_period_and_lose_no_sample() -> None:
     rng = np.random.default_rng(3)
     seconds = np.arange(500) * 0.1 + rng.uniform(-0.02, 0.02, 500)
     jittered = channel("yaw_rate", seconds, np.arange(500.0))
-    assert survey(log_of(jittered))[jittered.name].usual_secs == pytest.approx(0.1, abs=0.005)
+    assert survey_log(log_of(jittered))[jittered.name].usual_secs == pytest.approx(0.1, abs=0.005)
     signals = resample(log_of(jittered), 0.1)
     assert np.nanmax(np.abs(np.diff(signals["yaw_rate"]))) <= 2
     assert np.isfinite(signals["yaw_rate"]).mean() > 0.9
@@ -276,7 +276,7 @@ def test_a_long_silence_comes_in_slabs_as_it_goes_by(
     ]
     log = log_of(*channels)
     whole = resample(log, channels=names)
-    clock = set_clock(log, survey(log), channels=names)
+    clock = set_clock(log, survey_log(log), channels=names)
     given, most, done = 0, 0, 0
     parts = []
     for at in range(0, 3000, 100):

@@ -3,7 +3,7 @@ import pytest
 
 from analysis.first_model import BARE, fit_first_model
 from analysis.gauge import gauge
-from analysis.identification import Identifying
+from analysis.identification import Identifier
 from analysis.weak_form import weak_form
 from recorders.sensors import suite
 from recorders.simulate import simulate
@@ -21,11 +21,11 @@ def sailed(vessel: Vessel, manoeuvre: str, duration: float, **settings: float) -
 def fitted(signals: Signals, name: str) -> Vessel:
     yaw_rows, surge_rows = weak_form(signals, BARE)
     yaw, surge = (
-        Identifying(len(yaw_rows.target), constant=True),
-        Identifying(len(surge_rows.target)),
+        Identifier(len(yaw_rows.target), constant=True),
+        Identifier(len(surge_rows.target)),
     )
-    yaw.fit(yaw_rows)
-    surge.fit(surge_rows)
+    yaw.add(yaw_rows)
+    surge.add(surge_rows)
     return fit_first_model(yaw, surge, gauge(signals, BARE), name)
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.gauge import Gauging, gauge, noise_level
+from analysis.gauge import Gauger, gauge, noise_level
 from recorders.sensors import suite
 from recorders.simulate import simulate
 from shiplog import TrialLog, Vessel, resample
@@ -22,7 +22,7 @@ def test_what_is_usual_is_what_numpy_makes_of_the_whole(vessel: Vessel) -> None:
     assert usual.turning == pytest.approx(np.sqrt(np.nanmean(w**2)), rel=1e-12)
     assert (usual.ahead, usual.fastest) == (np.nanmedian(v), np.nanmax(v))
     assert usual.rpm == np.median(signals["rpm"])
-    parted = Gauging(vessel.coefficients)
+    parted = Gauger(vessel.coefficients)
     for cuts in zip([0, 1, 999], [1, 999, len(w)], strict=True):
         parted.add(signals.part(*cuts))
     again = parted.result()

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from analysis.inputs import Holding, held_throughout
+from analysis.inputs import InputHold, held_throughout
 from shiplog import Channel, Signals, TrialLog
 from shiplog.clock import Clock
-from shiplog.survey import survey
+from shiplog.survey import survey_log
 
 START = 1_700_000_000 * 10**9
 
@@ -24,12 +24,12 @@ def log_of(rudder: list[float], rpm: list[float]) -> TrialLog:
 def test_what_is_missing_is_the_last_known_even_from_before_the_clock() -> None:
     nan = float("nan")
     log = log_of([0.1, 0.2, nan, nan, 0.3, nan], [80, nan, 81, nan, nan, 82])
-    found = survey(log)
+    found = survey_log(log)
     clock = Clock(START, 1.0, 4, {name: found[name] for name in ("rudder", "rpm")})
     signals = Signals(START, 1.0, {c.name: c.values[2:] for c in log})
     for cuts in ([], [1], [1, 2, 3]):
-        holding = Holding(clock)
-        holding.watch(log.channels)
+        holding = InputHold(clock)
+        holding.add_raw(log.channels)
         slabs = [signals.part(a, b) for a, b in zip([0, *cuts], [*cuts, 4], strict=True)]
         rows = list(held_throughout(slabs, holding))
         rudder = np.concatenate([held["rudder"] for _, held, _ in rows])
@@ -46,8 +46,8 @@ def test_what_is_missing_is_the_last_known_even_from_before_the_clock() -> None:
 
 def test_nothing_is_said_where_nothing_is_missing() -> None:
     log = log_of([0.1, 0.2, 0.3], [80, 80, 80])
-    found = survey(log)
-    holding = Holding(Clock(START, 1.0, 1, {n: found[n] for n in ("rudder", "rpm")}))
+    found = survey_log(log)
+    holding = InputHold(Clock(START, 1.0, 1, {n: found[n] for n in ("rudder", "rpm")}))
     signals = Signals(START, 1.0, {"rudder": np.array([0.3]), "rpm": np.array([80.0])})
-    assert holding.held(signals)["rudder"] == pytest.approx([0.3])
+    assert holding.step(signals)["rudder"] == pytest.approx([0.3])
     assert holding.said() == []

@@ -363,8 +363,8 @@ def test_the_slabs_of_a_replay_come_once(zigzag_log: TrialLog) -> None:
     replay = Replay(zigzag_log)
     with pytest.raises(ValueError, match="go through the slabs first"):
         _ = replay.findings
-    assert sum(len(slab.signals) for slab in replay.slabs()) == replay.clock.count
-    assert replay.findings.clock is replay.clock
+    assert sum(len(slab.signals) for slab in replay.slabs()) == replay.plan.clock.count
+    assert replay.findings.clock is replay.plan.clock
     with pytest.raises(ValueError, match="come once"):
         next(replay.slabs())
 

@@ -8,7 +8,7 @@ def probed(times: np.ndarray, values: np.ndarray, at: np.ndarray, gap: float, cu
     probe = Probe(at, gap)
     for t, v in zip(np.split(times, cuts), np.split(values, cuts), strict=True):
         probe.add(t, v)
-    return probe.values()
+    return probe.result()
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -29,7 +29,7 @@ def test_in_a_gap_there_is_nothing(cuts: list[int]) -> None:
 
 
 def test_without_samples_nothing_is_known() -> None:
-    assert np.isnan(Probe(np.arange(3.0)).values()).all()
+    assert np.isnan(Probe(np.arange(3.0)).result()).all()
 
 
 @pytest.mark.parametrize("cuts", [[], [1], [2], [3], [1, 2, 3]])

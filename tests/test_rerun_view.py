@@ -18,9 +18,10 @@ from analysis.drawing import Line, Series, Sketch, Thinning, _Samples
 from analysis.kalman import Estimates
 from analysis.panels import Drawn, coefficient_panels, equation_panels, limits
 from analysis.pipeline import Analysis, Slab, analyse
-from analysis.rerun_view import view_review, write_review
+from analysis.rerun_view import write_review
 from analysis.sliding import History
 from analysis.track import NOWHERE
+from analysis.viewer import view_review
 from recorders.sensors import suite
 from recorders.simulate import simulate
 from shiplog.errors import ShiplogError
@@ -61,7 +62,7 @@ def part_of(analysis: Analysis, start: int, stop: int) -> Slab:
 def drawn_of(analysis: Analysis) -> Drawn:
     sketch = Sketch(analysis.clock, analysis.usual)
     sketch.add(analysis)
-    return sketch.drawn()
+    return sketch.result()
 
 
 @pytest.fixture(scope="module")
@@ -284,7 +285,7 @@ def test_decimation_keeps_extremes_gaps_and_ends() -> None:
         for part in np.split(np.column_stack((at, first, second)), cuts):
             lines = Line("first", part[:, 1], GREY), Line("second", part[:, 2], BLUE)
             thinning.add(Series("s", part[:, 0], lines))
-        thin = thinning.kept()
+        thin = thinning.result()
         assert len(thin.time_secs) <= points + 6
         for line, whole in zip(thin.lines, (first, second), strict=True):
             rows = np.round(thin.time_secs / 0.1).astype(int)
@@ -321,7 +322,7 @@ def test_a_review_drawn_in_slabs_is_the_same(analysis: Analysis) -> None:
     count = len(analysis.signals)
     for start in range(0, count, 777):
         sketch.add(part_of(analysis, start, min(start + 777, count)))
-    for entity, series in sketch.drawn().items():
+    for entity, series in sketch.result().items():
         if entity.startswith(("coefficient", "track")):
             continue  # given whole
         np.testing.assert_array_equal(series.time_secs, whole[entity].time_secs)

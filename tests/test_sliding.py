@@ -161,7 +161,7 @@ def test_a_fit_of_rows_in_slabs_is_that_of_the_whole_to_the_last_bit(
         errors = Errors(regression.solve())
         for slab in parted(holed, seed + 10):
             errors.add(slab)
-        found, expected = errors.fit(), fit(holed)
+        found, expected = errors.result(), fit(holed)
         assert (found.values == expected.values).all()
         assert (found.stds == expected.stds).all()
         assert found.condition == expected.condition

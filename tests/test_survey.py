@@ -8,7 +8,7 @@ from conftest import InSlabs
 from faults import dropout, freeze, spike
 
 from shiplog import Channel, TrialLog
-from shiplog.survey import ChannelSurvey, possible, survey
+from shiplog.survey import ChannelSurvey, possible, survey_log
 
 START = 1_700_000_000 * 10**9
 
@@ -19,7 +19,7 @@ def channel(name: str, seconds: list[float], values: list[float] | np.ndarray) -
 
 
 def of(its: Channel, *, strict: bool = False) -> ChannelSurvey:
-    return survey(TrialLog("x", (its,)), strict=strict)[its.name]
+    return survey_log(TrialLog("x", (its,)), strict=strict)[its.name]
 
 
 def told(found: ChannelSurvey) -> dict[str, str]:
@@ -66,7 +66,7 @@ def test_the_slabs_do_not_matter(zigzag_log: TrialLog, seed: int) -> None:
         )
     )
     cuts = np.sort(rng.uniform(0, 500, 40)).tolist()
-    whole, parted = survey(log), survey(InSlabs(log, cuts))
+    whole, parted = survey_log(log), survey_log(InSlabs(log, cuts))
     for one, other in zip(whole, parted, strict=True):
         assert told(one) == told(other)
     assert whole["speed"].stuck is not None

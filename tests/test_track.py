@@ -3,21 +3,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.track import EARTH_RADIUS, Track, Tracking
+from analysis.track import EARTH_RADIUS, Track, Tracker
 from recorders.simulate import SimulatedTrial
 from shiplog import Channel, Signals, TrialLog, resample
 from shiplog.clock import Clock
-from shiplog.survey import survey
+from shiplog.survey import survey_log
 
 
 def tracked(
     log: TrialLog, signals: Signals, yaw_rate: np.ndarray, speed: np.ndarray
 ) -> tuple[Track, str]:
-    found = survey(log)
+    found = survey_log(log)
     channels = {name: found[name] for name in signals.values if name in found}
     clock = Clock(signals.start_ns, signals.dt_secs, len(signals), channels)
-    tracking = Tracking(clock, found.get("position"))
-    tracking.watch(log.channels)
+    tracking = Tracker(clock, found.get("position"))
+    tracking.add_raw(log.channels)
     return tracking.step(signals, yaw_rate, speed), tracking.origin
 
 
@@ -87,10 +87,10 @@ def test_after_a_long_silence_the_gyro_goes_on_alone(monkeypatch: pytest.MonkeyP
     signals = Signals(0, 1.0, {"yaw_rate": np.zeros(count), "heading": heading})
     stamps = np.arange(count) * 10**9
     compass = Channel("heading", "a", "rad", stamps, stamps, heading)
-    channels = {"heading": survey(TrialLog("x", (compass,)))["heading"]}
+    channels = {"heading": survey_log(TrialLog("x", (compass,)))["heading"]}
     tracks = {}
     for size in (1, 50, count):
-        tracking = Tracking(Clock(0, 1.0, count, channels), None)
+        tracking = Tracker(Clock(0, 1.0, count, channels), None)
         held, parts = 0, []
         for start in range(0, count, size):
             part = signals.part(start, start + size)
