@@ -40,9 +40,9 @@ class Difference:
         return not self.fault and self.first_secs is None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """A replay laid beside its reference."""
+    """A replay laid beside its reference; its repr, which pytest shows, is what it says."""
 
     name: str
     differences: tuple[Difference, ...]
@@ -60,7 +60,7 @@ class Comparison:
         """The channels that differ, the first to be computed first."""
         return tuple(difference for difference in self.differences if not difference.ok)
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         """One line if all is well, else a line for each channel that differs."""
         if self.ok:
             return f"{self.name}: as it was ({len(self.differences)} channels)"

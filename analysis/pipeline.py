@@ -175,6 +175,13 @@ class Replay:
         """The first time through the log."""
         self._tell("check", 0.0)
         found = survey_log(self._log, strict=True)
+        lacking = [name for name in NEEDED if name not in found]
+        if lacking:
+            has = ", ".join(sorted({channel.name for channel in found}))
+            raise LogError(
+                f"no channel {lacking[0]!r} in {found.name}; it has {has or 'none'}; "
+                f"a replay needs {', '.join(NEEDED)}"
+            )
         also = tuple(name for name in ("heading", "position") if name in found)
         self._warnings += [*self._log.warnings, *faults(found, (*NEEDED, *also))]
         return found, set_clock(self._log, found, channels=NEEDED, optional=("heading",))

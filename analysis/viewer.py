@@ -47,7 +47,7 @@ def _await(viewer: subprocess.Popen[bytes], port: int, said: IO[bytes]) -> None:
     reason = lines[-1].rpartition(": ")[2].rstrip(".") if lines else "it does not answer"
     raise ShiplogError(
         f"the Rerun viewer cannot start here ({reason}); "
-        "write the review to a file and open it on a computer with a screen"
+        "the review is in its file; open that on a computer with a screen"
     )
 
 

@@ -121,6 +121,8 @@ def _run_replay(arguments: argparse.Namespace) -> int:
     from .vessel import load_vessel
 
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
+    if Path(arguments.log).suffix == ".rrd":
+        raise UsageError(f"a review, not a log; open it with: rerun {arguments.log}")
     output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
     _require_distinct([output, arguments.json], [arguments.log, arguments.vessel])
     chosen = sources(arguments.source)

@@ -62,6 +62,8 @@ def _read_any(source: Path, layout: Path | None) -> TrialLog:
         return read_csv(source)
     if not source.exists():
         raise LogError(f"no such file: {source}")
+    if source.is_dir():
+        raise LogError(f"a folder, not a log; name one file in it: {source}")
     raise UsageError(
         f"a foreign table: say with --layout LAYOUT.toml what its columns are "
         f"(without one, {', '.join(SUFFIXES)} of shiplog are read): {source}"

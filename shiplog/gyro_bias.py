@@ -64,7 +64,7 @@ class GyroWatch:
             return None
         if np.std(contrary) < 0.1 * np.std(biases):
             topic = self._headed.channel.topic
-            return f"{topic}: counts to port; set the heading's sign = -1 in the layout"
+            return f"{topic}: counts to port; turn the heading's sign in the layout"
         bias = float(np.mean(biases))
         error = float(np.std(biases, ddof=1)) / np.sqrt(len(biases))
         if abs(bias) < SIGNIFICANT * error or abs(bias) * self._duration_secs < LEAST_DRIFT:

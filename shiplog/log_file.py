@@ -18,7 +18,7 @@ HELD_SAMPLES = 16_000_000  # a log of more is not held: they would take 400 MB, 
 SLAB_SAMPLES = 1 << 20
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class LogFile:
     """A log in its file. Each call of `slabs` is one pass over it, in bounded memory.
 
@@ -29,6 +29,10 @@ class LogFile:
     known: TrialLog  # its channels in their order, without samples, and what is known of the file
     schemas: Mapping[int, records.Schema]
     channel_records: Mapping[int, records.Channel]
+
+    def __repr__(self) -> str:
+        """What it is, not all that it holds."""
+        return f"LogFile({self.path}), to be gone through by its slabs"
 
     @property
     def name(self) -> str:

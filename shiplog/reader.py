@@ -64,7 +64,11 @@ def read(
     """
     path = Path(path)
     contents, skip = Contents(), frozenset[int]()
+    if isinstance(channels, str):
+        channels = (channels,)
     keys = None if channels is None else tuple(channels)
+    if start_ns is not None and end_ns is not None and end_ns < start_ns:
+        raise UsageError(f"the span ends before it starts, at {end_ns} ns; exchange them: {path}")
     span = Span(start_ns, end_ns)
     part = keys is not None or span != Span()
     with open_mcap(path) as stream:

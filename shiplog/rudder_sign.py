@@ -77,7 +77,8 @@ class RudderWatch:
         return (
             f"{self._rudder.topic}: its sign is contrary, positive turns the bow to port, "
             f"by {-effect[0] / effect[1]:.0f} standard errors; "
-            "set the rudder's sign = -1 in the layout, or turn it in the recorder"
+            "turn the rudder's sign in the layout (sign = -1, or 1 where it is -1), "
+            "or in the recorder"
         )
 
 

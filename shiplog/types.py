@@ -104,6 +104,12 @@ class ByName(Generic[C_co]):
         """The channel of that name, or of that name and source; `LogError` where there is none."""
         found = self.get(key)
         if found is None:
+            name, _, source = key.strip("/").partition("/")
+            sources = [channel.source for channel in self.channels if channel.name == name]
+            if sources:
+                raise LogError(
+                    f"no source {source!r} of {name!r} in {self.name}; it has {', '.join(sources)}"
+                )
             has = sorted({channel.name for channel in self.channels})
             raise LogError(
                 f"no channel {key!r} in {self.name}; it has {', '.join(has) or 'none'}"

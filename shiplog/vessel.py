@@ -129,7 +129,10 @@ def load_vessel(preset_or_path: str | os.PathLike[str]) -> tuple[Vessel, str]:
             f"presets are {', '.join(PRESETS)}: {path}"
         ) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise VesselError(f"cannot read the vessel file ({error}): {path}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise VesselError(
+            f"cannot read the vessel file ({reason}); name another: {path}"
+        ) from error
     return parse_vessel(text, name), text
 
 

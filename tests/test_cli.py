@@ -358,7 +358,7 @@ def test_another_source_can_be_chosen(recorded: Path, capsys: pytest.CaptureFixt
     said = capsys.readouterr().err
     assert "never changes" not in said
     assert "2 sources" not in said
-    assert "no channel 'speed/doppler'" in refusal(
+    assert "no source 'doppler' of 'speed' in x.mcap; it has dead, simulated" in refusal(
         capsys, FAILURE, "replay", "x.mcap", "--source", "speed=doppler"
     )
 
@@ -440,3 +440,8 @@ def test_a_folder_that_hides_our_package_is_named(recorded: Path) -> None:
     assert done.returncode == FAILURE
     assert "another package called 'analysis' hides shiplog's own" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_review_is_no_log(capsys: pytest.CaptureFixture[str]) -> None:
+    said = refusal(capsys, USAGE, "replay", "trial.rrd")
+    assert "a review, not a log; open it with: rerun trial.rrd" in said

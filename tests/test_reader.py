@@ -1,6 +1,7 @@
 import json
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from mcap_files import (
 
 import shiplog.messages
 import shiplog.scan
-from shiplog import Channel, LogError, LogWriter, TrialLog, read, write
+from shiplog import Channel, LogError, LogWriter, TrialLog, UsageError, read, write
 from shiplog.schema import GEOGRAPHIC, schema_for
 
 CONFORMANCE = Path(__file__).parents[2] / "shared" / "data" / "mcap_conformance"
@@ -636,3 +637,12 @@ def test_a_topic_described_twice_is_one_channel(tmp_path: Path) -> None:
     log = read(path)
     assert len(log.channels) == 1
     assert log["yaw_rate"].values.tolist() == list(range(200))
+
+
+def test_one_channel_may_be_named_without_a_tuple(path: Path) -> None:
+    stamps = np.arange(5) * 10**9
+    both = [Channel(n, "a", "1", stamps, stamps, np.arange(5.0)) for n in ("speed", "rpm")]
+    write(TrialLog("x", (replace(both[0], unit="m/s"), replace(both[1], unit="rpm"))), path)
+    assert [c.name for c in read(path, channels="rpm")] == ["rpm"]
+    with pytest.raises(UsageError, match="the span ends before it starts"):
+        read(path, start_ns=2, end_ns=1)
