@@ -1,6 +1,7 @@
 """One equation's coefficients: over the whole trial, and window by window as they settled."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from shiplog.types import FloatArray
 
 from .sliding import WINDOW_SECS, Errors, History, Regression, Solution, Windows
 from .stacking import stacked
-from .weak_form import Rows, with_constant
+from .weak_form import Equation, Rows, with_constant
 
 ROWS = 1 << 13  # a slab
 
@@ -48,37 +49,38 @@ class Identifier:
     """
 
     def __init__(
-        self, count: int, *, constant: bool = False, window_secs: float = WINDOW_SECS
+        self,
+        equation: Equation,
+        count: int,
+        *,
+        constant: bool = False,
+        window_secs: float = WINDOW_SECS,
     ) -> None:
-        self._count, self._constant = count, constant  # the former of rows in all
-        self._window_secs = window_secs
-        self._regression: Regression | None = None
-        self._errors: Errors | None = None
-        self._windows: Windows | None = None
+        """Of `count` rows in all."""
+        self._names, self._constant = equation.names, constant
+        self._regression = Regression(equation.with_constant() if constant else equation)
+        self._windows = Windows(equation, count, window_secs)
         self._ends: list[FloatArray] = []
         self._conditions: list[FloatArray] = []
         self._blank = 0
 
     def add(self, rows: Rows) -> None:
         """The next rows, the first time."""
-        rows = with_constant(rows) if self._constant else rows
-        self._regression = self._regression or Regression(rows)
-        self._regression.add(rows)
+        self._regression.add(with_constant(rows) if self._constant else rows)
 
     def solution(self, names: tuple[str, ...] | None = None) -> Solution:
         """The values over the whole trial, of these names alone if some are given."""
-        if self._regression is None:
-            raise ValueError("no rows were given to fit")
         if names is None:
             return self._regression.solve()
         return self._regression.solve((*names, "constant") if self._constant else names)
 
+    @cached_property
+    def _errors(self) -> Errors:
+        return Errors(self.solution())
+
     def step(self, rows: Rows) -> History:
         """The next rows, the second time; the windows that end in them."""
-        self._errors = self._errors or Errors(self.solution())
         self._errors.add(with_constant(rows) if self._constant else rows)
-        self._windows = self._windows or Windows(rows, self._count, self._window_secs)
-        self._names = rows.names
         history = self._windows.step(rows)
         self._ends.append(history.time_secs)
         self._conditions.append(history.conditions)
@@ -87,8 +89,6 @@ class Identifier:
 
     def result(self) -> Identification:
         """What all rows come to, when they have come twice."""
-        if self._errors is None:
-            raise ValueError("no rows were given to step")
         whole = self._errors.result()
         coefficients = {  # a constant after them is left out
             name: Coefficient(float(value), float(std), COEFFICIENT_UNITS[name])
@@ -111,8 +111,8 @@ def identify(
     As `Identifier`. A trial shorter than the window is one window.
     """
     count = len(rows.target)
-    identifying = Identifier(count, constant=constant, window_secs=window_secs)
-    identifying.add(rows)
+    identifier = Identifier(rows.equation, count, constant=constant, window_secs=window_secs)
+    identifier.add(rows)
     slabs = [rows.part(start, start + ROWS) for start in range(0, max(count, 1), ROWS)]
-    history = stacked([identifying.step(slab) for slab in slabs])
-    return identifying.result(), history
+    history = stacked([identifier.step(slab) for slab in slabs])
+    return identifier.result(), history

@@ -267,8 +267,9 @@ class _Equations:
     def __init__(self, alphas: Coefficients, clock: Clock, intervals: FloatArray) -> None:
         self.intervals = intervals
         self._weak_form = _weak_form(alphas, clock, intervals)
-        self.yaw = Identifier(self._weak_form.row_count, constant=True)
-        self.surge = Identifier(self._weak_form.row_count)
+        count = self._weak_form.row_count
+        self.yaw = Identifier(self._weak_form.yaw, count, constant=True)
+        self.surge = Identifier(self._weak_form.surge, count)
 
     def add(self, signals: Signals, fastest: float) -> None:
         """Take the next signals; `fastest` is the greatest speed so far, m/s."""

@@ -18,7 +18,7 @@ from shiplog.types import FloatArray
 from .newey_west import add_runs, no_runs, variances, window_variances
 from .triangles import Solutions, solve_one
 from .two_stack import no_rows, push, rotate_all
-from .weak_form import Rows
+from .weak_form import Equation, Rows
 
 WINDOW_SECS = 200.0
 RICHEST = 400.0  # condition of a window beyond which it is blank: in a steady turn it is so
@@ -57,7 +57,7 @@ def fit(rows: Rows) -> Fit:
     rows cannot tell is NaN: where nothing moved, or where other coefficients can do what
     one does.
     """
-    regression = Regression(rows)
+    regression = Regression(rows.equation)
     regression.add(rows)
     errors = Errors(regression.solve())
     errors.add(rows)
@@ -67,17 +67,19 @@ def fit(rows: Rows) -> Fit:
 class Windows:
     """The history of a trial whose rows come in slabs."""
 
-    def __init__(self, rows: Rows, count: int, window_secs: float = WINDOW_SECS) -> None:
-        """Of `count` rows in all, which are like `rows`, any of them."""
-        reach = round((window_secs - rows.bump_secs) / rows.stride_secs) + 1
+    def __init__(self, equation: Equation, count: int, window_secs: float = WINDOW_SECS) -> None:
+        """Of `count` rows in all."""
+        reach = round((window_secs - equation.bump_secs) / equation.stride_secs) + 1
         self._length = max(1, min(count, reach))
-        self._stacks = no_rows(self._length, len(rows.names))
-        self._known: FloatArray = np.empty((0, len(rows.names) + 1))  # rows of the next windows
+        self._stacks = no_rows(self._length, len(equation.names))
+        self._known: FloatArray = np.empty((0, len(equation.names) + 1))  # rows of the next windows
 
     def step(self, rows: Rows) -> History:
         """The windows that end in the next rows: none, before there are enough."""
         found, tallies = push(self._stacks, rows.regressors, rows.target, rows.excitation)
-        conditions, told, enlarged = _judge(found, tallies, rows, RICHEST)
+        conditions, told, enlarged = _judge(
+            found, tallies, rows.equation, rows.least_excitation, RICHEST
+        )
         new, known = _known(rows)
         ends = len(self._known) + np.cumsum(known)[len(known) - len(tallies) :]
         held = np.concatenate((self._known, new))
@@ -86,12 +88,12 @@ class Windows:
         wanted = np.asarray(told.any(axis=0))
         stds = enlarged * np.sqrt(
             window_variances(
-                held.T.copy(), spans, wanted, found.values, found.inverses, rows.overlap
+                held.T.copy(), spans, wanted, found.values, found.inverses, rows.equation.overlap
             )
         )
         return History(
-            rows.names,
-            rows.centres_secs[len(known) - len(tallies) :] + rows.bump_secs / 2,
+            rows.equation.names,
+            rows.centres_secs[len(known) - len(tallies) :] + rows.equation.bump_secs / 2,
             np.where(told, found.values, np.nan).T.copy(),
             np.where(told, stds, np.nan).T.copy(),
             conditions,
@@ -113,17 +115,16 @@ class Solution:
 class Regression:
     """The first pass over a whole trial whose rows come in slabs: the values."""
 
-    def __init__(self, rows: Rows) -> None:
-        """Of rows that are like `rows`, any of them."""
-        p = len(rows.names)
-        self._like = rows
+    def __init__(self, equation: Equation) -> None:
+        p = len(equation.names)
+        self._equation, self._least_excitation = equation, 0.0
         self._factor = np.zeros((p, p + 1))
         self._tally = np.array([0.0, np.inf, -np.inf])  # rows, least and greatest excitation
 
     def add(self, rows: Rows) -> None:
         """The next rows."""
         new, known = _known(rows)
-        self._like, moved = rows, rows.excitation[known]
+        moved, self._least_excitation = rows.excitation[known], rows.least_excitation
         rotate_all(self._factor, new)
         count, least, greatest = self._tally
         self._tally = np.array(
@@ -134,12 +135,12 @@ class Regression:
         """The values over the rows so far, as if there were no regressors but those of `names`."""
         factor = self._factor
         if names is not None:
-            columns = [self._like.names.index(name) for name in names]
+            columns = [self._equation.names.index(name) for name in names]
             factor = np.zeros((len(names), len(names) + 1))
             rotate_all(factor, self._factor[:, [*columns, -1]].copy())
         found = solve_one(factor)
         conditions, told, enlarged = _judge(
-            found, self._tally[None, :], self._like, WORST_CONDITION
+            found, self._tally[None, :], self._equation, self._least_excitation, WORST_CONDITION
         )
         return Solution(
             found.values[:, 0].copy(),
@@ -147,7 +148,7 @@ class Regression:
             told[:, 0],
             found.inverses[:, :, 0].copy(),
             float(enlarged[0]),
-            self._like.overlap,
+            self._equation.overlap,
         )
 
 
@@ -175,19 +176,23 @@ class Errors:
 
 
 def _judge(
-    found: Solutions, tallies: FloatArray, rows: Rows, worst_condition: float
+    found: Solutions,
+    tallies: FloatArray,
+    equation: Equation,
+    least_excitation: float,
+    worst_condition: float,
 ) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
     """Conditions (k,), inf where none counts; what is told (p, k); what enlarges errors (k,)."""
     known, moved = tallies[:, 0], tallies[:, 2] - tallies[:, 1]
     kept = np.count_nonzero(found.inflations > 0, axis=0)
     # rows overlap: what counts is how many of them could differ
-    independent = known / (rows.overlap * CORRELATED)
+    independent = known / (equation.overlap * CORRELATED)
     freedom = independent - kept
-    tells = (kept > 0) & (freedom > 0) & (known >= kept) & (moved >= rows.least_excitation)
+    tells = (kept > 0) & (freedom > 0) & (known >= kept) & (moved >= least_excitation)
     conditions = np.where(tells, found.conditions, np.inf)
     sure = (found.inflations > 0) & (found.inflations <= WORST_INFLATION)
     enlarged = np.full(len(known), np.nan)
-    few = _few_rows(rows.overlap / known[tells])
+    few = _few_rows(equation.overlap / known[tells])
     enlarged[tells] = few * np.sqrt(independent[tells] / freedom[tells])
     return conditions, sure & (conditions <= worst_condition), enlarged
 

@@ -37,23 +37,34 @@ LEAST_SPEED = 0.02  # nor does a speed that changes by a smaller share of itself
 BUMP_POWER = 4  # (1 - s^2)^4: three derivatives vanish at the ends
 
 
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """One equation's regression, a row a bump; rows that touch a gap are NaN."""
+@dataclass(frozen=True)
+class Equation:
+    """What a regression's rows have in common, a row a bump."""
 
-    names: tuple[str, ...]
-    centres_secs: FloatArray  # (m,) since the signals' start
-    target: FloatArray  # (m,)
-    regressors: FloatArray  # (m, p)
+    names: tuple[str, ...]  # of the p regressors
     stride_secs: float  # from one bump to the next
     bump_secs: float  # the length of one
-    excitation: FloatArray  # (m,) what must move for the rows to tell anything
-    least_excitation: float  # by how much, at the least
 
     @property
     def overlap(self) -> int:
         """How many rows on either side share a bump's data."""
         return max(1, int(self.bump_secs / self.stride_secs))
+
+    def with_constant(self) -> "Equation":
+        """The same with one more regressor: a disturbance that never changes."""
+        return replace(self, names=(*self.names, "constant"))
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows of one equation's regression; those that touch a gap are NaN."""
+
+    equation: Equation
+    centres_secs: FloatArray  # (m,) since the signals' start
+    target: FloatArray  # (m,)
+    regressors: FloatArray  # (m, p)
+    excitation: FloatArray  # (m,) what must move for the rows to tell anything
+    least_excitation: float  # by how much, at the least
 
     def part(self, start: int, stop: int) -> "Rows":
         """The rows from `start` to before `stop`."""
@@ -95,6 +106,9 @@ class WeakForm:
         self._half = max(2, round(min(BUMP_SECS, count * dt / 5) / dt / 2))
         self._stride = max(1, round(STRIDE_SECS / dt))
         self._bump = _bump(self._half, dt)
+        stride_secs, bump_secs = self._stride * dt, 2 * self._half * dt
+        self.yaw = Equation(YAW_COEFFICIENTS, stride_secs, bump_secs)
+        self.surge = Equation(SURGE_COEFFICIENTS, stride_secs, bump_secs)
         self._row, self._first = 0, 0  # the next row, and the first sample that is kept for it
         self._kept = {name: np.zeros(0) for name in CHANNELS}
 
@@ -120,10 +134,12 @@ class WeakForm:
         self._kept = {name: kept[drop:] for name, kept in self._kept.items()}
         self._first += drop
         centres = (self._half + self._stride * np.arange(first, until)) * self._dt
-        common = (centres, self._stride * self._dt, 2 * self._half * self._dt)
+        yaw, surge = sums[:, :8], sums[:, 8:]  # each: target, excitation, regressors
         return (
-            _as_rows(YAW_COEFFICIENTS, sums[:, :8], LEAST_RUDDER, *common),
-            _as_rows(SURGE_COEFFICIENTS, sums[:, 8:], LEAST_SPEED * fastest, *common),
+            Rows(self.yaw, centres, yaw[:, 0], yaw[:, 2:], yaw[:, 1], LEAST_RUDDER),
+            Rows(
+                self.surge, centres, surge[:, 0], surge[:, 2:], surge[:, 1], LEAST_SPEED * fastest
+            ),
         )
 
     @property
@@ -191,30 +207,8 @@ def _integrated(
 def with_constant(rows: Rows) -> Rows:
     """The same with one more regressor: a disturbance that never changes."""
     ones = np.ones((len(rows.target), 1))
-    return replace(
-        rows, names=(*rows.names, "constant"), regressors=np.hstack((rows.regressors, ones))
-    )
-
-
-def _as_rows(
-    names: tuple[str, ...],
-    integrals: FloatArray,
-    least: float,
-    centres_secs: FloatArray,
-    stride_secs: float,
-    bump_secs: float,
-) -> Rows:
-    """Rows of one equation's integrals: target, excitation, regressors."""
-    return Rows(
-        names=names,
-        centres_secs=centres_secs,
-        target=integrals[:, 0],
-        regressors=integrals[:, 2:],
-        stride_secs=stride_secs,
-        bump_secs=bump_secs,
-        excitation=integrals[:, 1],
-        least_excitation=least,
-    )
+    regressors = np.hstack((rows.regressors, ones))
+    return replace(rows, equation=rows.equation.with_constant(), regressors=regressors)
 
 
 def _bump(half: int, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:

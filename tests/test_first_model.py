@@ -21,8 +21,8 @@ def sailed(vessel: Vessel, manoeuvre: str, duration: float, **settings: float) -
 def fitted(signals: Signals, name: str) -> Vessel:
     yaw_rows, surge_rows = weak_form(signals, BARE)
     yaw, surge = (
-        Identifier(len(yaw_rows.target), constant=True),
-        Identifier(len(surge_rows.target)),
+        Identifier(yaw_rows.equation, len(yaw_rows.target), constant=True),
+        Identifier(surge_rows.equation, len(surge_rows.target)),
     )
     yaw.add(yaw_rows)
     surge.add(surge_rows)

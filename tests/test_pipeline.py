@@ -383,7 +383,7 @@ def test_every_real_run_of_the_kvlcc2_replays(run: Path) -> None:
     rows_of_both = weak_form(found.signals, found.vessel.coefficients)
     for rows, share in zip(rows_of_both, (0.25, 0.5), strict=True):
         left_side = rows.target - np.nanmean(rows.target)
-        model = [getattr(found.vessel.coefficients, name) for name in rows.names]
+        model = [getattr(found.vessel.coefficients, name) for name in rows.equation.names]
         left_over = rows.target - rows.regressors @ model
         assert np.nanvar(left_over) < share * np.nanvar(left_side)
     assert found.yaw.coefficients["a"].value < 0

@@ -13,7 +13,7 @@ from analysis.sliding import (
     fit,
 )
 from analysis.stacking import stacked
-from analysis.weak_form import Rows, weak_form
+from analysis.weak_form import Equation, Rows, weak_form
 from recorders.sensors import suite
 from recorders.simulate import simulate
 from shiplog import TrialLog, Vessel, resample
@@ -141,7 +141,7 @@ def test_windows_of_rows_in_slabs_are_those_of_the_whole_to_the_last_bit(
 ) -> None:
     for rows in rows_of(vessel, "pseudo-random", "paper"):
         holed = with_gaps(rows)
-        windows = Windows(holed, len(holed.target))
+        windows = Windows(holed.equation, len(holed.target))
         found = stacked([windows.step(slab) for slab in parted(holed, seed)])
         expected = identify(holed)[1]
         assert np.isfinite(expected.stds).any()
@@ -155,7 +155,7 @@ def test_a_fit_of_rows_in_slabs_is_that_of_the_whole_to_the_last_bit(
 ) -> None:
     for rows in rows_of(vessel, "pseudo-random", "paper"):
         holed = with_gaps(rows)
-        regression = Regression(holed)
+        regression = Regression(holed.equation)
         for slab in parted(holed, seed):
             regression.add(slab)
         errors = Errors(regression.solve())
@@ -169,10 +169,10 @@ def test_a_fit_of_rows_in_slabs_is_that_of_the_whole_to_the_last_bit(
 
 def test_one_pass_gives_the_values_of_fewer_regressors_too(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, noise="paper")
-    regression = Regression(yaw)
+    regression = Regression(yaw.equation)
     regression.add(yaw)
     kept = [0, 1, 4]
-    found = regression.solve(tuple(yaw.names[i] for i in kept))
+    found = regression.solve(tuple(yaw.equation.names[i] for i in kept))
     expected = np.linalg.lstsq(yaw.regressors[:, kept], yaw.target, rcond=1e-16)[0]
     assert found.values == pytest.approx(expected, rel=1e-9)
     assert found.told.all()
@@ -180,7 +180,7 @@ def test_one_pass_gives_the_values_of_fewer_regressors_too(vessel: Vessel) -> No
 
 def test_windows_without_rows_are_none(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
-    history: History = Windows(yaw, len(yaw.target)).step(yaw.part(0, 10))
+    history: History = Windows(yaw.equation, len(yaw.target)).step(yaw.part(0, 10))
     assert history.values.shape == history.stds.shape == (0, 6)
     assert history.time_secs.shape == history.conditions.shape == (0,)
 
@@ -193,7 +193,9 @@ def test_errors_allow_for_overlapping_rows() -> None:
     for _ in range(300):
         noise = np.convolve(rng.standard_normal(n + overlap - 1), np.ones(overlap), "valid")
         y = x @ [2.0, -1.0] + noise
-        rows = Rows(("a", "d"), np.arange(float(n)), y, x, 1.0, float(overlap), x[:, 0], 0.1)
+        rows = Rows(
+            Equation(("a", "d"), 1.0, float(overlap)), np.arange(float(n)), y, x, x[:, 0], 0.1
+        )
         found = fit(rows)
         slopes.append(found.values[0])
         claimed.append(found.stds[0])

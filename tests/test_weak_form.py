@@ -23,7 +23,7 @@ def signals(clean: SimulatedTrial) -> Signals:
 
 def test_the_true_coefficients_satisfy_every_row(signals: Signals, vessel: Vessel) -> None:
     for rows in weak_form(signals, vessel.coefficients):
-        true = np.array([getattr(vessel.coefficients, name) for name in rows.names])
+        true = np.array([getattr(vessel.coefficients, name) for name in rows.equation.names])
         left_over = rows.target - rows.regressors @ true
         # a step of the revolutions between two samples is known no better than to a sample
         assert np.max(np.abs(left_over)) < 1e-3 * np.max(np.abs(rows.target))
@@ -33,14 +33,14 @@ def test_a_row_is_the_integral_it_stands_for(signals: Signals, vessel: Vessel) -
     yaw, _ = weak_form(signals, vessel.coefficients)
     k = 77
     t = signals.time_secs - yaw.centres_secs[k]
-    s = np.clip(2 * t / yaw.bump_secs, -1, 1)
+    s = np.clip(2 * t / yaw.equation.bump_secs, -1, 1)
     phi = (1 - s**2) ** 4
     phi /= np.trapezoid(phi, t)
     w = signals["yaw_rate"]
     assert yaw.regressors[k, 1] == pytest.approx(np.trapezoid(phi * w, t), rel=1e-9)
     assert yaw.regressors[k, 2] == pytest.approx(np.trapezoid(phi * w * np.abs(w), t), rel=1e-9)
     # int phi w' is what stands beside a: the truth's own derivative, never measured
-    assert yaw.names[0] == "a"
+    assert yaw.equation.names[0] == "a"
     slope = np.gradient(w, signals.dt_secs)
     assert yaw.regressors[k, 0] == pytest.approx(np.trapezoid(phi * slope, t), rel=1e-3)
 
@@ -48,9 +48,9 @@ def test_a_row_is_the_integral_it_stands_for(signals: Signals, vessel: Vessel) -
 def test_rows_stand_a_second_apart_and_inside_the_record(signals: Signals, vessel: Vessel) -> None:
     yaw, surge = weak_form(signals, vessel.coefficients)
     assert np.diff(yaw.centres_secs) == pytest.approx(1.0)
-    assert yaw.centres_secs[0] == pytest.approx(yaw.bump_secs / 2)
-    assert yaw.centres_secs[-1] + yaw.bump_secs / 2 <= signals.time_secs[-1] + 1e-9
-    assert yaw.bump_secs == 60.0
+    assert yaw.centres_secs[0] == pytest.approx(yaw.equation.bump_secs / 2)
+    assert yaw.centres_secs[-1] + yaw.equation.bump_secs / 2 <= signals.time_secs[-1] + 1e-9
+    assert yaw.equation.bump_secs == 60.0
     assert np.array_equal(yaw.centres_secs, surge.centres_secs)
 
 
@@ -72,7 +72,7 @@ def test_a_slow_sensor_has_no_gaps(vessel: Vessel) -> None:
     assert np.isnan(signals["speed"]).sum() > 2000
     yaw, surge = weak_form(signals, vessel.coefficients)
     assert np.isfinite(yaw.regressors[3:-3]).all()
-    true = np.array([getattr(vessel.coefficients, name) for name in surge.names])
+    true = np.array([getattr(vessel.coefficients, name) for name in surge.equation.names])
     left_over = (surge.target - surge.regressors @ true)[3:-3]
     assert np.max(np.abs(left_over)) < 0.02 * np.max(np.abs(surge.target[3:-3]))
 
@@ -81,12 +81,12 @@ def test_a_coarse_clock_gives_rows_as_far_apart_as_its_steps(vessel: Vessel) -> 
     trial = simulate(vessel, "zigzag-20-20", duration_secs=600.0, sensors=suite("none"))
     signals = resample(TrialLog("coarse", trial.channels), 2.0, NAMES)
     yaw, _ = weak_form(signals, vessel.coefficients)
-    assert yaw.stride_secs == 2.0
+    assert yaw.equation.stride_secs == 2.0
     assert np.diff(yaw.centres_secs) == pytest.approx(2.0)
 
 
 def test_a_constant_is_one_more_regressor(signals: Signals, vessel: Vessel) -> None:
     yaw, _ = weak_form(signals, vessel.coefficients)
     more = with_constant(yaw)
-    assert more.names == (*yaw.names, "constant")
+    assert more.equation.names == (*yaw.equation.names, "constant")
     assert np.all(more.regressors[:, -1] == 1)
