@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .mcap_layout import INDEX_ENTRY, MESSAGE_HEAD, RECORD_HEAD
 from .schema import encode, fill_rows, schema_for
-from .types import Channel, TimeArray
+from .types import Channel, TimeArray, ascending
 
 Bytes = NDArray[np.uint8]
 
@@ -57,7 +57,7 @@ def _portions(parts: Sequence[Part]) -> Iterator[list[Part]]:
     leader = max(parts, key=lambda part: len(part.slab)).slab.received_ns
     step = max(1, LAID_OUT_AT_ONCE * len(leader) // max(total, 1))
     times = leader[step::step]
-    if any(np.any(p.slab.received_ns[1:] < p.slab.received_ns[:-1]) for p in parts):
+    if not all(ascending(part.slab.received_ns) for part in parts):
         times = times[:0]
     cuts = [[0, *np.searchsorted(p.slab.received_ns, times).tolist(), len(p.slab)] for p in parts]
     for number in range(len(times) + 1):

@@ -14,7 +14,7 @@ import numpy as np
 from .errors import LogError, UsageError
 from .probe import known_samples
 from .survey import ChannelSurvey, Survey, survey_log
-from .types import Channel, FloatArray, Log, Signals, joined
+from .types import Channel, FloatArray, Log, Signals, ascending, joined
 from .units import CATALOGUE
 
 MAX_SAMPLES = 20_000_000  # of a grid that hardly anything stands on: beyond it the times are wrong
@@ -167,7 +167,7 @@ class _Placing:
         channel = self._channel.of(slab)
         if channel is not None:
             times, values = known_samples(channel, self._clock.start_ns)
-            if np.any(times[1:] < times[:-1]):
+            if not ascending(times):
                 order = np.argsort(times, kind="stable")
                 times, values = times[order], values[order]
             self._seen += len(times)

@@ -91,12 +91,9 @@ def sorted_by_time(log: TrialLog) -> tuple[TrialLog, list[str]]:
         late = int(np.count_nonzero(np.diff(channel.measured_ns) < 0))
         if late:
             order = np.argsort(channel.measured_ns, kind="stable")
-            channel = replace(  # noqa: PLW2901 - the same channel, in order
-                channel,
-                measured_ns=channel.measured_ns[order],
-                received_ns=np.maximum.accumulate(channel.received_ns[order]),
-                values=channel.values[order],
-            )
+            channel = channel.take(order)  # noqa: PLW2901 - the same channel, in order
+            received_ns = np.maximum.accumulate(channel.received_ns)
+            channel = replace(channel, received_ns=received_ns)  # noqa: PLW2901
             notes.append(
                 f"{channel.topic}: the measured times ran backwards {times_in_words(late)}; "
                 "now sorted"

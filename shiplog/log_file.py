@@ -85,8 +85,8 @@ class LogFile:
 
     def _chosen(self, slab: TrialLog) -> tuple[Channel, ...]:
         """A slab's channels, in the order of those asked for."""
-        found = {(c.topic, c.fields): c for c in slab}
-        return tuple(found.get((c.topic, c.fields), c) for c in self.known)
+        found = {channel.key: channel for channel in slab}
+        return tuple(found.get(channel.key, channel) for channel in self.known)
 
 
 def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:

@@ -17,7 +17,7 @@ from .mcap_summary import Summary, read_summary
 from .messages import Contents, Piece, schema_of
 from .scan import scan
 from .schema import FORMAT_VERSION, Schema, decode
-from .types import Channel, TimeArray, TrialLog
+from .types import Channel, TimeArray, TrialLog, ascending, one_channel
 from .units import CATALOGUE, factor
 
 
@@ -152,21 +152,14 @@ def trial_log(path: Path, contents: Contents) -> TrialLog:
 
 def merged(channels: Iterable[Channel]) -> tuple[Channel, ...]:
     """One channel a topic: a recorder that was started again describes its topics once more."""
-    by_topic: dict[tuple[str, tuple[str, ...]], Channel] = {}
+    parts: dict[tuple[str, tuple[str, ...]], list[Channel]] = {}
     for channel in channels:
-        key = (channel.topic, channel.fields)
-        if key in by_topic:
-            first = by_topic[key]
-            received = np.concatenate((first.received_ns, channel.received_ns))
-            order = np.argsort(received, kind="stable")
-            channel = replace(  # noqa: PLW2901 - the same channel, whole
-                first,
-                received_ns=received[order],
-                measured_ns=np.concatenate((first.measured_ns, channel.measured_ns))[order],
-                values=np.concatenate((first.values, channel.values))[order],
-            )
-        by_topic[key] = channel
-    return tuple(by_topic.values())
+        parts.setdefault(channel.key, []).append(channel)
+    whole = map(one_channel, parts.values())
+    return tuple(
+        c if ascending(c.received_ns) else c.take(np.argsort(c.received_ns, kind="stable"))
+        for c in whole
+    )
 
 
 def _channels(path: Path, contents: Contents) -> dict[int, Channel]:
@@ -189,7 +182,7 @@ def _channel(path: Path, record: records.Channel, schema: Schema, pieces: list[P
         raise LogError(
             f"channel {name!r} holds messages that are no {schema.name}: {path}"
         ) from error
-    if np.any(received[1:] < received[:-1]):
+    if not ascending(received):
         order = np.argsort(received, kind="stable")
         received, measured, values = received[order], measured[order], values[order]
     unit = record.metadata.get("unit", "1")
@@ -241,8 +234,8 @@ def _ids(path: Path, contents: Contents, keys: Collection[str] | None) -> frozen
     if keys is None:
         return frozenset(by_id)
     log = TrialLog(path.name, merged(by_id.values()))
-    asked = {(log[key].topic, log[key].fields) for key in keys}
-    return frozenset(id_ for id_, c in by_id.items() if (c.topic, c.fields) in asked)
+    asked = {log[key].key for key in keys}
+    return frozenset(id_ for id_, c in by_id.items() if c.key in asked)
 
 
 def _not_wanted(summary: Summary, ids: frozenset[int], span: Span) -> frozenset[int]:

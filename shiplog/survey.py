@@ -108,8 +108,7 @@ def survey_log(log: Log, *, strict: bool = False) -> Survey:
     surveyors: dict[tuple[str, tuple[str, ...]], _Surveyor] = {}
     for slab in log.slabs():
         for channel in slab:
-            key = (channel.topic, channel.fields)
-            surveyors.setdefault(key, _Surveyor(channel, strict=strict)).add(channel)
+            surveyors.setdefault(channel.key, _Surveyor(channel, strict=strict)).add(channel)
     return Survey(log.name, tuple(surveyor.result() for surveyor in surveyors.values()))
 
 

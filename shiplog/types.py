@@ -1,6 +1,6 @@
 """What a trial is: channels of samples, and the same on one clock."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Generic, Protocol, Self, TypeVar
@@ -62,15 +62,23 @@ class Channel:
         """The number of samples."""
         return len(self.measured_ns)
 
-    def part(self, start: int, stop: int) -> "Channel":
-        """Its samples from `start` to before `stop`."""
-        cut = slice(start, stop)
+    @property
+    def key(self) -> tuple[str, tuple[str, ...]]:
+        """What no two channels of a log share: the topic, and what it holds."""
+        return self.topic, self.fields
+
+    def take(self, rows: slice | NDArray[np.intp]) -> "Channel":
+        """The same channel with some of its samples."""
         return replace(
             self,
-            measured_ns=self.measured_ns[cut],
-            received_ns=self.received_ns[cut],
-            values=self.values[cut],
+            measured_ns=self.measured_ns[rows],
+            received_ns=self.received_ns[rows],
+            values=self.values[rows],
         )
+
+    def part(self, start: int, stop: int) -> "Channel":
+        """Its samples from `start` to before `stop`."""
+        return self.take(slice(start, stop))
 
     def __repr__(self) -> str:
         """What it is, not all that it holds."""
@@ -175,7 +183,7 @@ class TrialLog(ByName[Channel]):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
-        topics = [(channel.topic, channel.fields) for channel in self.channels]
+        topics = [channel.key for channel in self.channels]
         if len(set(topics)) < len(topics):
             raise ValueError(f"{self.name}: two channels of one topic; merge them: {topics}")
 
@@ -192,7 +200,7 @@ class TrialLog(ByName[Channel]):
         """The samples in slabs of some hours, each channel cut at the same times of reception."""
         leader = max(self.channels, key=len, default=None)
         times = [] if leader is None else leader.received_ns[SLAB_SAMPLES::SLAB_SAMPLES].tolist()
-        if not all(_ascending(c.received_ns) and _ascending(c.measured_ns) for c in self.channels):
+        if not all(ascending(c.received_ns) and ascending(c.measured_ns) for c in self.channels):
             times = []  # in no order: one slab
         cuts = [[0, *np.searchsorted(c.received_ns, times), len(c)] for c in self.channels]
         for number in range(len(times) + 1):
@@ -216,8 +224,21 @@ class TrialLog(ByName[Channel]):
         return (end - start) * 1e-9
 
 
-def _ascending(times: TimeArray) -> bool:
+def ascending(times: TimeArray | FloatArray) -> bool:
+    """Whether none is less than the one before it."""
     return bool(np.all(times[1:] >= times[:-1]))
+
+
+def one_channel(parts: Sequence[Channel]) -> Channel:
+    """Parts of a channel, one at least, one after the other."""
+    if len(parts) == 1:
+        return parts[0]
+    return replace(
+        parts[0],
+        measured_ns=np.concatenate([part.measured_ns for part in parts]),
+        received_ns=np.concatenate([part.received_ns for part in parts]),
+        values=np.concatenate([part.values for part in parts]),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ from types import TracebackType
 from typing import Self
 
 import mcap
-import numpy as np
 import zstandard
 from mcap import records
 from mcap.data_stream import RecordBuilder
@@ -28,7 +27,7 @@ from .schema import (
     VESSEL_ATTACHMENT,
     schema_for,
 )
-from .types import Channel, TrialLog
+from .types import Channel, TrialLog, one_channel
 from .units import CATALOGUE, factor
 
 CHUNK_BYTES = 1 << 20  # what a crash between two flushes can lose
@@ -261,14 +260,7 @@ def _one_a_channel(parts: Sequence[Part]) -> list[Part]:
 
 
 def _joined(parts: Sequence[Part]) -> Part:
-    slabs = [part.slab for part in parts]
-    whole = replace(
-        slabs[0],
-        measured_ns=np.concatenate([slab.measured_ns for slab in slabs]),
-        received_ns=np.concatenate([slab.received_ns for slab in slabs]),
-        values=np.concatenate([slab.values for slab in slabs]),
-    )
-    return replace(parts[0], slab=whole)
+    return replace(parts[0], slab=one_channel([part.slab for part in parts]))
 
 
 def _bytes(record: records.McapRecord) -> bytes:

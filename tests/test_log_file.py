@@ -3,7 +3,6 @@
 import tracemalloc
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ import shiplog.log_file
 from shiplog import Channel, LogError, LogWriter, TrialLog, read, write
 from shiplog.log_file import LogFile, open_log
 from shiplog.schema import GEOGRAPHIC, schema_for
+from shiplog.types import one_channel
 
 ANYWHERE = st.floats(0, 1, exclude_max=True)
 SLAB = 300
@@ -63,16 +63,8 @@ def whole(slabs: Iterator[tuple[Channel, ...]]) -> dict[Any, Channel]:
     parts: dict[Any, list[Channel]] = defaultdict(list)
     for slab in slabs:
         for part in slab:
-            parts[part.topic, part.fields].append(part)
-    return {
-        key: replace(
-            few[0],
-            measured_ns=np.concatenate([part.measured_ns for part in few]),
-            received_ns=np.concatenate([part.received_ns for part in few]),
-            values=np.concatenate([part.values for part in few]),
-        )
-        for key, few in parts.items()
-    }
+            parts[part.key].append(part)
+    return {key: one_channel(few) for key, few in parts.items()}
 
 
 def described(c: Channel) -> tuple[object, ...]:
@@ -81,7 +73,7 @@ def described(c: Channel) -> tuple[object, ...]:
 
 def assert_as_read(log: LogFile, read_whole: TrialLog) -> None:
     found = {key: c for key, c in whole(log.slabs()).items() if len(c)}
-    expected = {(c.topic, c.fields): c for c in read_whole if len(c)}
+    expected = {c.key: c for c in read_whole if len(c)}
     assert found.keys() == expected.keys()
     for key, c in expected.items():
         assert described(found[key]) == described(c)
