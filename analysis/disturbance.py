@@ -8,6 +8,7 @@ disturbances and noise measurements", eqs (3), (4).
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import degrees
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +34,11 @@ from .moments import Moments
 YAW_FREQUENCY = 0.05  # rad/s, the paper's
 SURGE_FREQUENCY = 0.02  # rad/s: surge is slower and its sensor noisier
 SETTLING = 5.0  # over the frequency: the paper's transient time
-DISTURBANCE_UNITS = {"yaw": "rad/s³", "rudder": "rad", "surge": "m/s²"}
+DISTURBANCE_UNITS = {  # in SI, as people read it, and the factor from the one to the other
+    "yaw": ("rad/s³", "0.001 deg/s³", degrees(1) * 1e3),
+    "rudder": ("rad", "deg", degrees(1)),
+    "surge": ("m/s²", "mm/s²", 1e3),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +119,7 @@ class ForceObserver:
             "surge": self._surge_std,
         }
         return {
-            name: self._courses[name].result(std, DISTURBANCE_UNITS[name])
+            name: self._courses[name].result(std, DISTURBANCE_UNITS[name][0])
             for name, std in stds.items()
         }
 

@@ -14,6 +14,7 @@ from shiplog.ship import INPUTS, OUTPUTS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, factor
 
+from .disturbance import DISTURBANCE_UNITS
 from .gauge import Gauge
 from .kalman import OUTPUT_STATES
 from .pipeline import Slab
@@ -28,11 +29,6 @@ GREEN: Colour = (76, 175, 80, 255)
 BLUE: Colour = (66, 150, 245, 255)  # what is said of yaw
 ORANGE: Colour = (245, 140, 40, 255)  # what is said of surge
 RED: Colour = (225, 70, 80, 255)
-
-DISTURBANCES = {  # unit, and how many of it are one SI unit
-    "yaw": ("0.001 deg/s³", 1e3 * factor("rad", "deg")),
-    "surge": ("mm/s²", 1e3),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +113,7 @@ class Sketch:
     def _disturbances(self, slab: Slab) -> dict[str, Series]:
         drawn, found = {}, slab.disturbance
         for name, values in (("yaw", found.yaw), ("surge", found.surge)):
-            line = Line("disturbance", values * DISTURBANCES[name][1], RED, 1.5)
+            line = Line("disturbance", values * DISTURBANCE_UNITS[name][2], RED, 1.5)
             series = Series("observed", slab.signals.time_secs, (line,))
             drawn[f"disturbance_{name}/observed"] = series
         return drawn

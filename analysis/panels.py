@@ -10,9 +10,9 @@ from shiplog.ship import INPUTS, OUTPUTS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
 
+from .disturbance import DISTURBANCE_UNITS
 from .drawing import (
     BLUE,
-    DISTURBANCES,
     GREY,
     GUIDE,
     ORANGE,
@@ -46,7 +46,7 @@ def equation_panels(findings: Findings, drawn: Drawn) -> tuple[list[Panel], list
             _disturbance(findings, drawn, disturbed),
             _residual(findings, drawn, output),
         ]
-        for output, given, disturbed in zip(OUTPUTS, INPUTS, DISTURBANCES, strict=True)
+        for output, given, disturbed in zip(OUTPUTS, INPUTS, ("yaw", "surge"), strict=True)
     )
     return yaw, surge
 
@@ -77,7 +77,7 @@ def _input(drawn: Drawn, name: str) -> Panel:
 
 def _disturbance(findings: Findings, drawn: Drawn, name: str) -> Panel:
     observed, course = drawn[f"disturbance_{name}/observed"], findings.courses[name]
-    unit, scale = DISTURBANCES[name]
+    _, unit, scale = DISTURBANCE_UNITS[name]
     values = observed.lines[0].values
     settled = observed.time_secs >= course.settling_secs
     kept = values[settled] if settled.mean() > 0.5 else values

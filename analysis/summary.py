@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from math import degrees, isfinite
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from shiplog.ship import COEFFICIENT_UNITS
 from shiplog.survey import ChannelSurvey
 from shiplog.units import CATALOGUE, factor
 
-from .disturbance import Course
+from .disturbance import DISTURBANCE_UNITS, Course
 from .identification import Identification
 from .pipeline import FITTED, Findings
 from .residuals import OutputResiduals
@@ -226,11 +226,8 @@ def _verdict(residuals: OutputResiduals) -> str:
 
 def _disturbance_section(findings: Findings) -> Section:
     rows = []
-    for label, name, scale, unit in (
-        ("yaw, as rudder", "rudder", degrees(1), "deg"),
-        ("yaw", "yaw", degrees(1) * 1e3, "0.001 deg/s³"),
-        ("surge", "surge", 1e3, "mm/s²"),
-    ):
+    for name, label in (("rudder", "yaw, as rudder"), ("yaw", "yaw"), ("surge", "surge")):
+        _, unit, scale = DISTURBANCE_UNITS[name]
         course = findings.courses[name]
         values = (course.mean, course.rms, course.last, course.std)
         rows.append(
