@@ -1,5 +1,6 @@
 """What was measured, as tables on a terminal, as JSON, and as Markdown."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -38,7 +39,8 @@ class _Grid:
 
 def show(report: Report) -> None:
     """On the terminal."""
-    console = Console(highlight=False, markup=False)
+    wide = None if sys.stdout.isatty() else 140  # a file has no width of its own
+    console = Console(highlight=False, markup=False, width=wide)
     for grid in _grids(report):
         table = Table(title=grid.title, title_justify="left")
         for i, column in enumerate(grid.columns):
