@@ -64,6 +64,7 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
     from .writer import write
 
     _require_distinct([arguments.output, arguments.truth], [arguments.vessel])
+    _require_suffix(".mcap", arguments.output, arguments.truth)
     vessel, text = load_vessel(arguments.vessel)
     with _progress("recorders") as tell:
         tell("sail and measure")
@@ -125,6 +126,7 @@ def _run_replay(arguments: argparse.Namespace) -> int:
         raise UsageError(f"a review, not a log; open it with: rerun {arguments.log}")
     output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
     _require_distinct([output, arguments.json], [arguments.log, arguments.vessel])
+    _require_suffix(".rrd", output)
     chosen = sources(arguments.source)
     with _progress("analysis") as tell:
         tell("read")
@@ -211,6 +213,13 @@ def _require_distinct(
     for path in written:
         if written.count(path) > 1 or path in [Path(p).resolve() for p in inputs if p]:
             raise UsageError(f"the same file is named twice; name another for the output: {path}")
+
+
+def _require_suffix(suffix: str, *outputs: str | Path | None) -> None:
+    """Refuse a name by which nobody would know what is in the file."""
+    for path in (Path(output) for output in outputs if output):
+        if path.suffix.lower() != suffix and not (is_device(path) or path.is_dir()):
+            raise UsageError(f"what is written is a {suffix} file; call it so: {path}")
 
 
 def _require_ours(package: str) -> None:

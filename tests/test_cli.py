@@ -445,3 +445,17 @@ def test_a_folder_that_hides_our_package_is_named(recorded: Path) -> None:
 def test_a_review_is_no_log(capsys: pytest.CaptureFixture[str]) -> None:
     said = refusal(capsys, USAGE, "replay", "trial.rrd")
     assert "a review, not a log; open it with: rerun trial.rrd" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "suffix"),
+    [
+        ("record simulate zigzag-20-20 --duration 10 -o trial.csv", ".mcap"),
+        ("replay trial.mcap -o review.txt", ".rrd"),
+    ],
+)
+def test_an_output_is_called_what_it_is(
+    capsys: pytest.CaptureFixture[str], arguments: str, suffix: str
+) -> None:
+    said = refusal(capsys, USAGE, *arguments.split())
+    assert f"what is written is a {suffix} file; call it so" in said
