@@ -261,5 +261,11 @@ def _coefficient_section(findings: Findings) -> Section:
         "Two standard deviations are about a 95 % interval, less where a few seconds tell all. "
         "A gyro's bias goes into b1, b2, b3 and e."
     )
+    remarks = [remark]
+    if findings.model_origin == FITTED:
+        remarks.append(
+            "With no model the rudder is taken to work in proportion to the speed (α = 1, 0, 0): "
+            "d and e are not to be laid beside those of a vessel whose slipstream is known."
+        )
     columns = ("coefficient", "from this log", "std", "unit", "in the model")
-    return Section("Coefficients", columns, tuple(rows), (remark,))
+    return Section("Coefficients", columns, tuple(rows), tuple(remarks))

@@ -62,6 +62,7 @@ def test_a_fitted_model_is_said_to_be_one(zigzag_log: TrialLog) -> None:
     found = analyse(replace(zigzag_log, vessel_toml=None))
     assert "a first model, fitted to this log" in markdown(found)
     assert summarise(found)["model"]["origin"] == "a first model, fitted to this log"
+    assert "in proportion to the speed" in markdown(found)
 
 
 def test_warnings_are_on_the_page(zigzag_analysis: Analysis) -> None:
