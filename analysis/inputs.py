@@ -29,10 +29,10 @@ class InputHold:
             if channel is None:
                 continue
             earlier = np.isfinite(channel.values) & (channel.measured_ns <= self._clock.start_ns)
-            if earlier.any() and channel.measured_ns[earlier].max() > self._last_ns[name]:
-                latest = np.argmax(channel.measured_ns[earlier])
-                self._last[name] = float(channel.values[earlier][latest])
-                self._last_ns[name] = int(channel.measured_ns[earlier][latest])
+            times, values = channel.measured_ns[earlier], channel.values[earlier]
+            if len(times) and times.max() > self._last_ns[name]:
+                latest = np.argmax(times)
+                self._last[name], self._last_ns[name] = float(values[latest]), int(times[latest])
 
     def step(self, signals: Signals) -> Signals:
         """The next signals, their inputs known throughout."""

@@ -108,7 +108,9 @@ def survey_log(log: Log, *, strict: bool = False) -> Survey:
     surveyors: dict[tuple[str, tuple[str, ...]], _Surveyor] = {}
     for slab in log.slabs():
         for channel in slab:
-            surveyors.setdefault(channel.key, _Surveyor(channel, strict=strict)).add(channel)
+            if channel.key not in surveyors:
+                surveyors[channel.key] = _Surveyor(channel, strict=strict)
+            surveyors[channel.key].add(channel)
     return Survey(log.name, tuple(surveyor.result() for surveyor in surveyors.values()))
 
 
