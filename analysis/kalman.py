@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from shiplog.compiled import compiled
+from shiplog.settings import FilterSettings
 from shiplog.ship import (
     INPUTS,
     OUTPUTS,
@@ -19,7 +20,6 @@ from shiplog.ship import (
     yaw_stiffness,
 )
 from shiplog.types import FloatArray, Signals
-from shiplog.vessel import FilterSettings
 
 from .design.discrete import discretise
 from .design.pseudo_input import pseudo_input_matrices

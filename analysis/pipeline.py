@@ -18,10 +18,11 @@ from shiplog.errors import UsageError
 from shiplog.gyro_bias import GyroWatch
 from shiplog.quality import faults
 from shiplog.rudder_sign import RudderWatch
+from shiplog.settings import FilterSettings
 from shiplog.ship import INPUTS, OUTPUTS, Coefficients
 from shiplog.survey import Survey, survey_log
 from shiplog.types import FloatArray, Log
-from shiplog.vessel import FilterSettings, parse_vessel
+from shiplog.vessel import parse_vessel
 
 from .disturbance import Course, Disturbance, ForceObserver
 from .doubts import doubtful, silent_ends

@@ -3,12 +3,20 @@
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
-from math import inf, isfinite, pi
+from dataclasses import dataclass, field, replace
+from math import inf, pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import VesselError
+from .errors import UsageError, VesselError
+from .settings import (
+    DisturbanceSettings,
+    FilterSettings,
+    as_table,
+    disturbance_settings,
+    filter_settings,
+    number_fault,
+)
 from .units import did_you_mean
 
 if TYPE_CHECKING:  # ship.py brings numba; only verbs that compute need it
@@ -16,17 +24,8 @@ if TYPE_CHECKING:  # ship.py brings numba; only verbs that compute need it
 
 
 @dataclass(frozen=True)
-class FilterSettings:
-    """What a vessel file says of the filter; None where the log itself shall tell."""
-
-    process_ratio: float | None = None  # process to measurement intensity, 1/s^2: the paper's Q/R
-    yaw_rate_std: float | None = None  # rad/s, of the white noise of one sample
-    speed_std: float | None = None  # m/s
-
-
-@dataclass(frozen=True)
 class Vessel:
-    """A ship: its model's coefficients, its steering gear, and how its states are filtered."""
+    """A ship: its model's coefficients, its steering gear, and how its logs are filtered."""
 
     name: str
     coefficients: "Coefficients"
@@ -34,7 +33,8 @@ class Vessel:
     approach_rpm: float = 80.0
     rudder_max: float = 35 * pi / 180  # rad
     rudder_rate: float = 2.5 * pi / 180  # rad/s
-    filter: FilterSettings = FilterSettings()
+    filter: FilterSettings = field(default_factory=FilterSettings)
+    disturbance: DisturbanceSettings = field(default_factory=DisturbanceSettings)
     angle_unit: str = "rad"  # of its file; inside all angles are radians
 
 
@@ -96,20 +96,10 @@ _KEYS: dict[str, dict[str, tuple[float, float]]] = {
         "rate": (0.0, inf),
     },
     "surge": dict.fromkeys(("f", "g", "h"), (-inf, inf)),
-    "filter": {"process_ratio": (0.0, inf), "yaw_rate_std": (0.0, inf), "speed_std": (0.0, inf)},
 }
+_SETTINGS = ("filter", "disturbance")
 _TEXTS = ("name", "angle_unit")
-_POSITIVE = {
-    "T1",
-    "T2",
-    "approach_rpm",
-    "length",
-    "max",
-    "rate",
-    "process_ratio",
-    "yaw_rate_std",
-    "speed_std",
-}
+_POSITIVE = {"T1", "T2", "approach_rpm", "length", "max", "rate"}
 
 
 def load_vessel(preset_or_path: str | os.PathLike[str]) -> tuple[Vessel, str]:
@@ -146,6 +136,9 @@ def parse_vessel(text: str, where: str) -> Vessel:
     except tomllib.TOMLDecodeError as error:
         raise VesselError(f"not a TOML file ({error}); mend that line: {where}") from error
     faults: list[str] = []
+    sections = {key: _section(key, table.pop(key, {}), faults) for key in _SETTINGS}
+    filtering = filter_settings(sections["filter"], faults)
+    observing = disturbance_settings(sections["disturbance"], faults)
     numbers = _numbers(table, faults)
     form = _yaw_form(numbers["yaw"], faults)
     _require(numbers, form, faults)
@@ -161,7 +154,36 @@ def parse_vessel(text: str, where: str) -> Vessel:
     if faults:
         count = f"{len(faults)} faults" if len(faults) > 1 else "one fault"
         raise VesselError(f"{count} in the vessel file: {'; '.join(faults)}: {where}")
-    return _vessel(str(table.get("name", Path(where).stem)), angle_unit, numbers)
+    vessel = _vessel(str(table.get("name", Path(where).stem)), angle_unit, numbers)
+    return replace(vessel, filter=filtering, disturbance=observing)
+
+
+def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
+    """The vessel with settings of its own replaced, such as {"filter.kind": "extended"}.
+
+    The names are those of the vessel file's `[filter]` and `[disturbance]`. Raises `UsageError`
+    with all the faults at once.
+    """
+    faults: list[str] = []
+    tables = {"filter": as_table(vessel.filter), "disturbance": as_table(vessel.disturbance)}
+    for name, value in settings.items():
+        section, _, key = name.partition(".")
+        if section in tables:
+            tables[section][key] = value
+        else:
+            faults.append(f"unknown setting {name!r}, they begin with filter. or disturbance.")
+    filtering = filter_settings(tables["filter"], faults)
+    observing = disturbance_settings(tables["disturbance"], faults)
+    if faults:
+        raise UsageError(f"the settings do not do: {'; '.join(faults)}")
+    return replace(vessel, filter=filtering, disturbance=observing)
+
+
+def _section(name: str, section: object, faults: list[str]) -> Mapping[str, object]:
+    if isinstance(section, dict):
+        return section
+    faults.append(f"[{name}] must be a section")
+    return {}
 
 
 def _numbers(table: Mapping[str, Any], faults: list[str]) -> dict[str, dict[str, float]]:
@@ -184,20 +206,15 @@ def _number(
 ) -> None:
     label = f"{section}.{key}" if section else key
     if key not in _KEYS[section]:
-        known = [*_KEYS[section], *(() if section else (*_TEXTS, *filter(None, _KEYS)))]
+        known = [*_KEYS[section], *(() if section else (*_TEXTS, *filter(None, _KEYS), *_SETTINGS))]
         faults.append(f"unknown key {label!r}{did_you_mean(key, known).replace(';', ',')}")
         return
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        faults.append(f"{label} must be a number, got {value!r}")
-        return
     low, high = _KEYS[section][key]
-    if not isfinite(value):
-        faults.append(f"{label} must be finite, got {value}")
-    elif key in _POSITIVE and value <= 0:
-        faults.append(f"{label} must be positive, got {value:g}")
-    elif not low <= value <= high:
-        faults.append(f"{label} must lie between {low:g} and {high:g}, got {value:g}")
-    into[key] = float(value)
+    fault = number_fault(label, value, low, high, positive=key in _POSITIVE)
+    if fault:
+        faults.append(fault)
+    else:
+        into[key] = float(value)  # type: ignore[arg-type]
 
 
 def _yaw_form(yaw: Mapping[str, float], faults: list[str]) -> tuple[str, ...]:
@@ -259,6 +276,5 @@ def _vessel(name: str, angle_unit: str, numbers: Mapping[str, Mapping[str, float
         approach_rpm=top.get("approach_rpm", defaults.approach_rpm),
         rudder_max=rudder["max"] / per_rad if "max" in rudder else defaults.rudder_max,
         rudder_rate=rudder["rate"] / per_rad if "rate" in rudder else defaults.rudder_rate,
-        filter=FilterSettings(**numbers["filter"]),
         angle_unit=angle_unit,
     )

@@ -19,7 +19,7 @@ from analysis.residuals import judge
 from recorders.sensors import suite
 from recorders.simulate import SimulatedTrial, simulate
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
-from shiplog.vessel import FilterSettings
+from shiplog.settings import FilterSettings
 
 NAMES = ("yaw_rate", "speed", "rudder", "rpm")
 STATE_OF = {"yaw_rate": 0, "speed": 3}

@@ -4,7 +4,8 @@ from pathlib import Path
 import pytest
 
 from shiplog import VesselError, load_vessel
-from shiplog.vessel import PRESETS, FilterSettings, parse_vessel
+from shiplog.settings import FilterSettings
+from shiplog.vessel import PRESETS, parse_vessel
 
 DEG = 180 / pi  # degrees in a radian
 
