@@ -1,4 +1,4 @@
-"""What the sensors make of the truth: rates, jitter, noise, bias, dropouts."""
+"""What the sensors make of the truth: rates, jitter, noise, bias, spikes, dropouts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -27,6 +27,8 @@ class Sensor:
     wave: float = 0.0  # amplitude of a slow sine on the sensor
     wave_tau_secs: float = 10.0  # sin(t / tau)
     bias: float = 0.0
+    spikes: float = 0.0  # share of the samples that are off
+    spike_size: float = 0.0  # by so much, to either side
     dropout: float = 0.0  # share of the samples lost
     dropout_secs: float = 0.0  # how long one loss lasts; 0: single samples
 
@@ -71,6 +73,7 @@ def suite(
         _check_known(channel, setting, sensors)
         sensors[channel] = replace(sensors[channel], **{setting: value})
         _check_range(channel, sensors[channel])
+    _check_spikes(sensors)
     return sensors
 
 
@@ -95,6 +98,14 @@ def _check_range(channel: str, sensor: Sensor) -> None:
         raise UsageError(f"{channel}.rate_hz and {channel}.wave_tau_secs must be positive")
     if sensor.dropout >= 1:
         raise UsageError(f"{channel}.dropout is the share lost: below 1, got {sensor.dropout}")
+    if sensor.spikes > 1:
+        raise UsageError(f"{channel}.spikes is the share off: at most 1, got {sensor.spikes}")
+
+
+def _check_spikes(sensors: Suite) -> None:
+    for channel, sensor in sensors.items():
+        if sensor.spikes and not sensor.spike_size:
+            raise UsageError(f"{channel}.spikes have no size; give {channel}.spike_size, too")
 
 
 def sample_times(sensor: Sensor, duration_secs: float, rng: np.random.Generator) -> FloatArray:
@@ -130,7 +141,14 @@ def corrupt(
         + wave.reshape(-1, *([1] * (truth.ndim - 1)))
         + sensor.bias
     )
-    return reported
+    return reported + _spikes(sensor, shape, rng) if sensor.spikes else reported
+
+
+def _spikes(sensor: Sensor, shape: tuple[int, ...], rng: np.random.Generator) -> FloatArray:
+    """What is off, as the samples are shaped: all components of a sample at once."""
+    own = rng.spawn(1)[0]  # the rest of the noise is then as it would be without
+    off = own.random((shape[0], *[1] * (len(shape) - 1))) < sensor.spikes
+    return sensor.spike_size * np.where(off, own.choice((-1.0, 1.0), shape), 0.0)
 
 
 def delays(sensor: Sensor, count: int, rng: np.random.Generator) -> FloatArray:

@@ -41,8 +41,10 @@ def _add_record(verbs: Any) -> None:  # noqa: ANN401 - argparse keeps that type 
   spiral  pseudo-random  paper
 sensors, each setting in SI:
   --sensor yaw_rate.bias=1e-4 --sensor speed.rate_hz=2 --sensor rudder.dropout=0.02
+  --sensor yaw_rate.spikes=0.001 --sensor yaw_rate.spike_size=0.05
   rate_hz, jitter_secs, delay_secs, white, uniform, uniform_relative, wave, wave_tau_secs,
-  bias, dropout, dropout_secs""",
+  bias, spikes (share of samples off), spike_size (by so much), dropout (share of samples lost),
+  dropout_secs""",
     )
     simulate.add_argument("manoeuvre", metavar="MANOEUVRE", help="such as zigzag-20-20")
     simulate.add_argument(
@@ -67,6 +69,12 @@ sensors, each setting in SI:
     )
     simulate.add_argument(
         "--wave", metavar="DEG@PERIOD", help="a sinusoidal yaw moment worth DEG of rudder"
+    )
+    simulate.add_argument(
+        "--unrest",
+        metavar="DEG[,MM]",
+        help="a white yaw moment and surge force: the standard deviations of their means over a "
+        "second, in degrees of rudder at the approach speed and in mm/s²",
     )
     simulate.add_argument(
         "--truth", metavar="FILE", help="write what really happened there, at 10 Hz"
@@ -176,3 +184,11 @@ def wave(text: str) -> tuple[float, float]:
     if not match or float(match[2]) <= 0:
         raise UsageError(f"--wave wants DEG@PERIOD, such as 0.5@8, got {text!r}")
     return radians(float(match[1])), float(match[2])
+
+
+def unrest(text: str) -> tuple[float, float]:
+    """`0.2,5` as the rudder in rad and the force in m/s²; without one the force is 0."""
+    match = re.fullmatch(rf"{_NUMBER}(?:,{_NUMBER})?", text)
+    if not match:
+        raise UsageError(f"--unrest wants DEG[,MM], such as 0.2,5, got {text!r}")
+    return radians(float(match[1])), float(match[2] or 0) / 1000

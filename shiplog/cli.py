@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .arguments import gust, parser, settings, sources, wave
+from .arguments import gust, parser, settings, sources, unrest, wave
 from .errors import ShiplogError, UsageError
 from .files import is_device, replacing
 
@@ -58,7 +58,8 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
     _require_ours("recorders")
     from recorders.record import record
     from recorders.sensors import suite
-    from recorders.simulate import Gust, WaveMoment, simulate
+    from recorders.simulate import simulate
+    from recorders.voyage import Gust, Unrest, WaveMoment
 
     from .vessel import load_vessel
     from .writer import write
@@ -78,6 +79,7 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
             ),
             gusts=tuple(Gust(*gust(said)) for said in arguments.gust),
             wave=WaveMoment(*wave(arguments.wave)) if arguments.wave else None,
+            unrest=None if arguments.unrest is None else Unrest(*unrest(arguments.unrest)),
             vessel_toml=text,
         )
         tell("write")

@@ -122,6 +122,7 @@ class Forcing(NamedTuple):
     moment: float  # rad/s^3: a yaw moment, as it stands in the equation for w''
     wave: float  # rad/s^3, amplitude of a sinusoidal one
     wave_frequency: float  # rad/s
+    force: float  # m/s^2: a surge force, as it stands in the equation for v'
 
 
 @compiled
@@ -132,7 +133,7 @@ def motion(c: Coefficients, s: State, u: Forcing, t: float, after: float) -> Sta
     return State(
         s.w_dot,
         yaw_acceleration_rate(c, s.w, s.w_dot, s.v, u.n, delta, u.delta_dot) + moment,
-        surge_acceleration(c, s.w, s.v, u.n),
+        surge_acceleration(c, s.w, s.v, u.n) + u.force,
         s.w,
         s.v * cos(s.heading),
         s.v * sin(s.heading),

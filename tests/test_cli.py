@@ -122,6 +122,27 @@ def test_a_gust_and_a_wave_are_put_into_the_simulation() -> None:
     assert np.ptp(moment[400:]) > 2e-7
 
 
+def test_an_unrest_is_put_into_the_simulation_in_degrees_and_millimetres() -> None:
+    simulate = "record simulate pull-out --duration 900 --noise none -o u.mcap --truth t.mcap"
+    assert main([*simulate.split(), "--unrest", "0.5,8"]) == FINE
+    force = read("t.mcap")["surge_disturbance"].values[:9000].reshape(-1, 10).mean(axis=1)
+    assert force.std() == pytest.approx(8e-3, rel=0.1)
+    both = read("t.mcap")["yaw_disturbance"].values
+    assert main([*simulate.split(), "--unrest=0.5"]) == FINE
+    assert np.array_equal(read("t.mcap")["yaw_disturbance"].values, both)
+    assert not read("t.mcap")["surge_disturbance"].values.any()
+
+
+def test_a_sensor_is_given_spikes() -> None:
+    simulate = "record simulate spiral --duration 900 --noise none -o {} {}"
+    spikes = "--sensor yaw_rate.spikes=0.01 --sensor yaw_rate.spike_size=0.05"
+    assert main(simulate.format("a.mcap", "").split()) == FINE
+    assert main(simulate.format("b.mcap", spikes).split()) == FINE
+    away = read("b.mcap")["yaw_rate"].values - read("a.mcap")["yaw_rate"].values
+    assert np.count_nonzero(away) == pytest.approx(90, abs=40)
+    assert np.abs(away[away != 0]) == pytest.approx(0.05)
+
+
 def test_an_unfinished_log_replays_with_a_warning(
     zigzag: SimulatedTrial, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -292,6 +313,16 @@ def test_an_unwritable_output_is_refused(
         "record simulate spiral --gust=2@-5 -o x.mcap",
         "record simulate spiral --gust=2@1e9 -o x.mcap",
         "record simulate spiral --gust=2@10+-3 -o x.mcap",
+        "record simulate spiral --unrest much -o x.mcap",
+        "record simulate spiral --unrest=0.2, -o x.mcap",
+        "record simulate spiral --unrest=0.2,5,1 -o x.mcap",
+        "record simulate spiral --unrest= -o x.mcap",
+        "record simulate spiral --unrest=-0.2 -o x.mcap",
+        "record simulate spiral --unrest=0.2,-5 -o x.mcap",
+        "record simulate spiral --unrest=nan -o x.mcap",
+        "record simulate spiral --unrest=1e999 -o x.mcap",
+        "record simulate spiral --sensor yaw_rate.spikes=2 -o x.mcap",
+        "record simulate spiral --sensor yaw_rate.spikes=0.1 -o x.mcap",
         "record simulate spiral --seed=-1 -o x.mcap",
         "record simulate spiral --duration 1e12 -o x.mcap",
         "record simulate spiral --sensor yaw_rate.rate_hz=1e9 -o x.mcap",

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -73,6 +74,47 @@ def test_a_position_has_noise_in_both_components() -> None:
     assert abs(np.corrcoef(noise.T)[0, 1]) < 0.01
 
 
+@pytest.mark.parametrize("share", [0.001, 0.05, 1.0])
+def test_spikes_have_the_share_and_size_asked_for_to_either_side(share: float) -> None:
+    sensor = Sensor(spikes=share, spike_size=0.05)
+    noise = corrupt(sensor, np.arange(N) / 10.0, np.zeros(N), rng())
+    off = noise[noise != 0]
+    assert len(off) / N == pytest.approx(share, rel=4 / np.sqrt(share * N))
+    assert set(off) == {-0.05, 0.05}
+    assert np.mean(off > 0) == pytest.approx(0.5, abs=2 / np.sqrt(len(off)))
+
+
+def test_spikes_come_alone_as_often_as_chance_has_it() -> None:
+    sensor = Sensor(spikes=0.05, spike_size=1.0)
+    off = corrupt(sensor, np.arange(N) / 10.0, np.zeros(N), rng()) != 0
+    assert abs(np.corrcoef(off[1:], off[:-1])[0, 1]) < 4 / np.sqrt(N)
+
+
+@pytest.mark.parametrize("shape", [(N,), (N, 2)])
+def test_all_but_the_spikes_is_as_without_them(shape: tuple[int, ...]) -> None:
+    plain = Sensor(white=0.1, uniform=0.2)
+    spiky = replace(plain, spikes=0.01, spike_size=3.0)
+    times, truth, one, other = np.arange(N) / 10.0, np.zeros(shape), rng(), rng()
+    away = corrupt(spiky, times, truth, one) - corrupt(plain, times, truth, other)
+    assert sorted(set(np.round(away, 9).ravel())) == [-3, 0, 3]
+    assert np.array_equal(delays(spiky, N, one), delays(plain, N, other))
+
+
+def test_a_size_without_a_share_leaves_all_as_it_was() -> None:
+    times, truth = np.arange(N) / 10.0, np.zeros(N)
+    sized = suite("white", {"yaw_rate.spikes": 0.0, "yaw_rate.spike_size": 0.05})["yaw_rate"]
+    plain = suite("white")["yaw_rate"]
+    assert np.array_equal(corrupt(sized, times, truth, rng()), corrupt(plain, times, truth, rng()))
+
+
+def test_a_spike_puts_all_of_a_position_off() -> None:
+    sensor = Sensor(spikes=0.02, spike_size=30.0)
+    noise = corrupt(sensor, np.arange(N) / 10.0, np.zeros((N, 2)), rng())
+    off = noise != 0
+    assert np.array_equal(off[:, 0], off[:, 1])
+    assert np.mean(off[:, 0]) == pytest.approx(0.02, rel=0.07)
+
+
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
@@ -82,6 +124,11 @@ def test_a_position_has_noise_in_both_components() -> None:
         ({"yaw_rate.white": -1.0}, "not negative"),
         ({"yaw_rate.bias": float("nan")}, "must be finite"),
         ({"yaw_rate.dropout": 1.0}, "below 1"),
+        ({"yaw_rate.spikes": 1.01, "yaw_rate.spike_size": 1.0}, "at most 1"),
+        ({"yaw_rate.spikes": -0.1, "yaw_rate.spike_size": 1.0}, "not negative"),
+        ({"yaw_rate.spikes": 0.1, "yaw_rate.spike_size": -1.0}, "not negative"),
+        ({"yaw_rate.spikes": 0.1, "yaw_rate.spike_size": float("inf")}, "must be finite"),
+        ({"yaw_rate.spikes": 0.1}, "no size; give yaw_rate.spike_size"),
     ],
 )
 def test_a_setting_that_makes_no_sense_is_refused(settings: dict[str, float], said: str) -> None:

@@ -8,9 +8,13 @@ from shiplog import load_vessel
 from shiplog.ship import (
     COEFFICIENT_UNITS,
     Coefficients,
+    Forcing,
+    State,
+    motion,
     rudder_effect,
     rudder_effect_rate,
     steady_speed,
+    step,
     surge_acceleration,
     yaw_acceleration_rate,
 )
@@ -79,6 +83,23 @@ def test_a_ship_stopped_or_astern_has_no_steady_speed_ahead() -> None:
     assert steady_speed(TABLE1, 0.0) == 0
     assert steady_speed(TABLE1, -40.0) == 0
     assert steady_speed(TABLE1._replace(g=0.0), 40.0) == 0
+
+
+def test_a_moment_and_a_force_add_to_yaw_and_surge_alone() -> None:
+    state, calm = State(0.01, 1e-4, 8.0, 0.3, 5.0, 6.0), Forcing(0.2, 0.01, 80.0, 0, 0, 0, 0)
+    free = motion(TABLE1, state, calm, 3.0, 0.1)
+    pushed = motion(TABLE1, state, calm._replace(moment=2e-5, force=0.03), 3.0, 0.1)
+    added = [one - other for one, other in zip(pushed, free, strict=True)]
+    assert added == pytest.approx([0, 2e-5, 0.03, 0, 0, 0], abs=1e-15)
+
+
+def test_a_ship_that_nothing_holds_back_gains_what_the_forces_give() -> None:
+    free = Coefficients(*[0.0] * 12)
+    pushed = Forcing(0.0, 0.0, 0.0, 2e-5, 0.0, 0.0, 0.03)
+    after = step(free, State(0.0, 0.0, 1.0, 0.0, 0.0, 0.0), pushed, 0.0, 2.0)
+    assert after.w_dot == pytest.approx(4e-5)
+    assert after.w == pytest.approx(4e-5)
+    assert after.v == pytest.approx(1.06)
 
 
 def test_every_coefficient_has_a_unit() -> None:

@@ -1,145 +1,18 @@
 from dataclasses import replace
-from math import degrees, radians
+from math import inf, nan, radians
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
-from recorders.manoeuvres import manoeuvre
 from recorders.record import record
 from recorders.sensors import suite
-from recorders.simulate import Gust, Trajectory, WaveMoment, sail, simulate
-from shiplog import UsageError, Vessel, load_vessel, read
-from shiplog.ship import rudder_effect, steady_speed
+from recorders.simulate import simulate
+from recorders.voyage import Unrest
+from shiplog import UsageError, Vessel, read
 
-DEG = np.pi / 180
-
-# manoeuvre, t in s: w in deg/s, w' in deg/s^2, v in m/s, heading in deg
-REFERENCES = [
-    ("turning-circle", 60, 0.646748175, 0.01699870857, 9.88333899, 11.22958),
-    ("turning-circle", 100, 0.567861133, -0.01123471521, 8.14025977, 39.853424),
-    ("turning-circle", 300, 0.539167909, -0.00098587306, 5.9056404, 146.235341),
-    ("turning-circle", 500, 0.521274535, -8.784138e-5, 5.03621554, 251.200178),
-    ("zigzag-10-10", 100, 0.346433769, -0.00694048347, 9.84935389, 18.070377),
-    ("zigzag-10-10", 500, -0.35215684, 0.00453681996, 8.46858912, -11.48115),
-    ("zigzag-20-20", 100, 0.498717637, -0.01475557499, 9.06084792, 29.893113),
-    ("zigzag-20-20", 500, -0.241888963, -0.01717656162, 7.80760042, 32.220491),
-    ("paper", 500, -0.451700125, -0.00084314563, 7.60544314, -27.369603),
-]
-
-
-def sailed(vessel: Vessel, name: str, duration: float = 520.0) -> Trajectory:
-    return sail(vessel, manoeuvre(name, duration, vessel.approach_rpm), duration)
-
-
-@pytest.mark.parametrize(("name", "time", "w", "w_dot", "v", "heading"), REFERENCES)
-def test_the_reference_trajectories_come_out(
-    vessel: Vessel, name: str, time: float, w: float, w_dot: float, v: float, heading: float
-) -> None:
-    truth = sailed(vessel, name).at(np.array([float(time)]))
-    assert truth["yaw_rate"][0] / DEG == pytest.approx(w, abs=1e-7)
-    assert truth["yaw_acceleration"][0] / DEG == pytest.approx(w_dot, abs=1e-7)
-    assert truth["speed"][0] == pytest.approx(v, abs=1e-7)
-    assert truth["heading"][0] / DEG == pytest.approx(heading, abs=2e-6)
-
-
-@pytest.mark.parametrize(
-    ("name", "extrema"),
-    [
-        ("zigzag-10-10", [(24.159, 133.0), (-18.093, 275.8), (19.596, 406.2)]),
-        ("zigzag-20-20", [(36.355, 124.6), (-34.744, 305.4), (33.923, 485.8)]),
-    ],
-)
-def test_the_headings_overshoots_come_out(
-    vessel: Vessel, name: str, extrema: list[tuple[float, float]]
-) -> None:
-    times = np.arange(0.0, 520.0, 0.1)
-    heading = sailed(vessel, name).at(times)["heading"]
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(heading)))) + 1
-    turns = turns[np.abs(heading[turns]) > radians(5)]
-    for (angle, time), at in zip(extrema, turns, strict=True):
-        assert heading[at] / DEG == pytest.approx(angle, abs=6e-4)
-        assert times[at] == pytest.approx(time, abs=0.11)
-
-
-def test_an_independent_integrator_agrees_through_knots_off_the_grid(vessel: Vessel) -> None:
-    vessel = replace(vessel, rudder_rate=2.3456 * DEG)
-    c = vessel.coefficients
-
-    def rates(t: float, x: np.ndarray) -> list[float]:
-        w, w_dot, v = x
-        moving = min(max(t - 10, 0) * vessel.rudder_rate, 35 * DEG)
-        rate = vessel.rudder_rate if 10 < t < 10 + 35 * DEG / vessel.rudder_rate else 0.0
-        ks = c.alpha1 * v + c.alpha2 * 80 * np.exp(-c.alpha3 * v)
-        hull = c.a * w_dot + c.b1 * w + c.b2 * w * abs(w) + c.b3 * w**3
-        return [w_dot, hull + ks * (c.d * moving + c.e * rate), c.f * w**2 + c.g * v**2 + c.h * 80]
-
-    x, knots = np.array([0, 0, steady_speed(c, 80)]), [0, 10, 10 + 35 * DEG / vessel.rudder_rate]
-    for start, end in zip(knots, [*knots[1:], 200.0], strict=True):
-        piece = solve_ivp(rates, (start + 1e-12, end), x, rtol=1e-11, atol=1e-14, method="DOP853")
-        x = piece.y[:, -1]
-    truth = sailed(vessel, "turning-circle", 200.0).at(np.array([200.0]))
-    assert truth["yaw_rate"][0] == pytest.approx(x[0], rel=1e-9)
-    assert truth["speed"][0] == pytest.approx(x[2], rel=1e-9)
-
-
-def test_the_zigzags_rudder_turns_exactly_where_the_heading_is_reached(vessel: Vessel) -> None:
-    trajectory = sailed(vessel, "zigzag-20-20")
-    rate = trajectory.rows[:, 8]
-    turns = np.flatnonzero((rate[1:] != 0) & (rate[:-1] == 0)) + 1
-    headings = trajectory.rows[turns[1:], 4] / DEG
-    assert headings == pytest.approx([20, -20, 20][: len(headings)], abs=1e-9)
-    assert len(headings) == 3
-
-
-def test_the_rudder_never_moves_faster_than_its_gear(vessel: Vessel) -> None:
-    times = np.arange(0, 520, 0.01)
-    rudder = sailed(vessel, "spiral").at(times)["rudder"]
-    assert np.max(np.abs(np.diff(rudder))) <= vessel.rudder_rate * 0.01 * (1 + 1e-9)
-
-
-def test_the_rudder_stops_at_its_stop(vessel: Vessel) -> None:
-    short = replace(vessel, rudder_max=15 * DEG)
-    rudder = sailed(short, "turning-circle").at(np.arange(0.0, 100.0, 1.0))["rudder"]
-    assert rudder.max() == pytest.approx(15 * DEG)
-
-
-def test_the_truth_between_rows_is_integrated_not_interpolated(vessel: Vessel) -> None:
-    trajectory = sailed(vessel, "zigzag-20-20")
-    fine = np.arange(80.0, 90.0, 0.003)
-    w, w_dot = (trajectory.at(fine)[k] for k in ("yaw_rate", "yaw_acceleration"))
-    slope = np.gradient(w, fine, edge_order=2)
-    assert np.max(np.abs(slope - w_dot)[1:-1]) < 1e-8
-
-
-def test_both_readings_of_the_table_sail_and_differ() -> None:
-    turns = {}
-    for preset in ("table1", "table1-rad"):
-        trajectory = sailed(load_vessel(preset)[0], "turning-circle")
-        turns[preset] = trajectory.at(np.array([500.0]))["speed"][0]
-    assert turns["table1"] == pytest.approx(5.03621554, abs=1e-7)
-    assert turns["table1-rad"] > 10  # read in radians, hard over costs 1 % of the speed
-
-
-def test_a_gust_acts_like_so_much_rudder(vessel: Vessel) -> None:
-    straight = manoeuvre("turning-circle-1", 400.0, 80.0)
-    straight = replace(straight, orders=straight.orders[:1])
-    blown = sail(vessel, straight, 400.0, gusts=(Gust(radians(2), 50.0, 100.0),))
-    truth = blown.at(np.array([49.9, 50.1, 149.9, 150.1]))
-    c = vessel.coefficients
-    size = c.d * rudder_effect(c, steady_speed(c, 80), 80) * radians(2)
-    assert truth["yaw_disturbance"] == pytest.approx([0, size, size, 0])
-    assert degrees(truth["yaw_rate"][2]) > 0.1
-
-
-def test_a_wave_moment_has_its_period_and_amplitude(vessel: Vessel) -> None:
-    ordered = manoeuvre("turning-circle", 100.0, 80.0)
-    wavy = sail(vessel, ordered, 100.0, wave=WaveMoment(radians(1), 8.0))
-    truth = wavy.at(np.array([2.0, 4.0, 6.0]))["yaw_disturbance"]
-    assert truth[0] == pytest.approx(-truth[2])
-    assert truth[0] > 0
-    assert truth[1] == pytest.approx(0, abs=1e-18)
+SAMPLE_DATA = Path(__file__).parents[1] / "sample_data"
+UNREST = Unrest(rudder=radians(0.5), force=0.01)
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(
@@ -163,6 +36,87 @@ def test_changing_one_sensor_leaves_the_others_noise_alone(vessel: Vessel) -> No
         next(c for c in trial.channels if c.name == "speed").values for trial in (plain, changed)
     ]
     assert np.array_equal(*speeds)
+
+
+@pytest.mark.parametrize(
+    ("name", "ordered", "duration", "seed"),
+    [
+        ("turning_circle_35", "turning-circle", 500.0, 1),
+        ("zigzag_20_20", "zigzag-20-20", 600.0, 2),
+        ("pseudo_random", "pseudo-random", 600.0, 4),
+    ],
+)
+def test_what_a_seed_gave_when_the_sample_data_were_made_it_still_gives(
+    vessel: Vessel, name: str, ordered: str, duration: float, seed: int
+) -> None:
+    trial = simulate(vessel, ordered, duration_secs=duration, seed=seed)
+    made, truth = read(SAMPLE_DATA / f"{name}.mcap"), read(SAMPLE_DATA / f"{name}.truth.mcap")
+    for kept, given in ((made, trial.channels), (truth, trial.truth(2.0))):
+        for one, other in zip(kept, given, strict=True):
+            assert one.name == other.name
+            assert np.array_equal(one.measured_ns, other.measured_ns)
+            assert np.array_equal(one.received_ns, other.received_ns)
+            assert one.values == pytest.approx(other.values, rel=1e-9, abs=1e-9)
+
+
+def test_an_unrest_repeats_with_its_seed_and_leaves_the_sensors_noise_alone(
+    vessel: Vessel,
+) -> None:
+    def given(seed: int, unrest: Unrest | None) -> dict[str, np.ndarray]:
+        trial = simulate(vessel, "pseudo-random", duration_secs=60.0, seed=seed, unrest=unrest)
+        times = {c.name: (c.measured_ns - c.measured_ns[0]) * 1e-9 for c in trial.channels}
+        noise = {
+            c.name: c.values - trial.trajectory.at(times[c.name])[c.name] for c in trial.channels
+        }
+        pushed = trial.truth()["yaw_disturbance"].values
+        return {"pushed": pushed, "speed": noise["speed"], "rudder": noise["rudder"]}
+
+    one, again, other, calm = given(3, UNREST), given(3, UNREST), given(4, UNREST), given(3, None)
+    assert np.array_equal(one["pushed"], again["pushed"])
+    assert not np.isin(one["pushed"], other["pushed"]).any()
+    assert np.ptp(calm["pushed"]) == 0
+    assert one["speed"] == pytest.approx(calm["speed"], abs=1e-12)
+    assert one["rudder"] == pytest.approx(calm["rudder"], abs=1e-12)
+
+
+def test_an_unrests_bytes_are_those_of_its_seed(vessel: Vessel, tmp_path: Path) -> None:
+    def bytes_of(seed: int) -> bytes:
+        path = tmp_path / "a.mcap"
+        record(simulate(vessel, "spiral", duration_secs=60.0, seed=seed, unrest=UNREST), path)
+        return path.read_bytes()
+
+    assert bytes_of(7) == bytes_of(7) != bytes_of(8)
+
+
+def test_an_unrest_of_nothing_changes_no_sample(vessel: Vessel) -> None:
+    calm = simulate(vessel, "zigzag-20-20", duration_secs=150.0)
+    still = simulate(vessel, "zigzag-20-20", duration_secs=150.0, unrest=Unrest())
+    for one, other in zip(calm.channels, still.channels, strict=True):
+        assert np.array_equal(one.values, other.values)
+
+
+def test_the_truth_tells_of_a_surge_force_only_where_there_was_an_unrest(vessel: Vessel) -> None:
+    calm = simulate(vessel, "spiral", duration_secs=20.0).truth()
+    pushed = simulate(vessel, "spiral", duration_secs=20.0, unrest=UNREST).truth()
+    assert "surge_disturbance" not in [c.name for c in calm]
+    assert pushed["surge_disturbance"].unit == "m/s²"
+    assert len(pushed["surge_disturbance"]) == 201
+
+
+def test_a_longer_trial_begins_with_the_unrest_of_the_shorter(vessel: Vessel) -> None:
+    short, long = (
+        simulate(vessel, "spiral", duration_secs=duration, unrest=UNREST).truth()
+        for duration in (30.0, 60.0)
+    )
+    for name in ("yaw_disturbance", "surge_disturbance"):
+        assert np.array_equal(short[name].values, long[name].values[:301])
+
+
+@pytest.mark.parametrize("size", [-0.1, nan, inf])
+def test_an_unrest_that_is_none_is_refused(vessel: Vessel, size: float) -> None:
+    for unrest in (Unrest(rudder=size), Unrest(force=size)):
+        with pytest.raises(UsageError, match="must be finite and not negative"):
+            simulate(vessel, "spiral", duration_secs=10.0, unrest=unrest)
 
 
 def test_slabs_hold_every_sample_once_in_the_order_of_reception(

@@ -23,7 +23,8 @@ from analysis.sliding import History
 from analysis.weak_form import weak_form
 from recorders.manoeuvres import manoeuvre
 from recorders.sensors import suite
-from recorders.simulate import SimulatedTrial, sail, simulate
+from recorders.simulate import SimulatedTrial, simulate
+from recorders.voyage import sail
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
 from shiplog.compiled import compiled
 from shiplog.ship import (
