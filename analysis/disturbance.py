@@ -1,53 +1,56 @@
 """The disturbance observer: what acted on the ship that the model does not know.
 
-Plant and exosystem are augmented with a constant but unknown disturbance, and the error's poles
-placed on a Butterworth circle. Yaw and surge are designed each for itself; together the placement
-would couple them. Source: "Algorithm of ship course control system watcher for assessing
+Plant and exosystems are augmented with a disturbance of a known kind - constant, ramp, wave - and
+unknown size, and the error's poles placed. Yaw and surge are designed each for itself; together the
+placement would couple them. Source: "Algorithm of ship course control system watcher for assessing
 disturbances and noise measurements", eqs (3), (4).
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import degrees
-from typing import NamedTuple
+from math import degrees, inf, pi, sqrt
 
 import numpy as np
 
-from shiplog.compiled import compiled
-from shiplog.ship import (
-    INPUTS,
-    Coefficients,
-    rudder_effects,
-    surge_acceleration,
-    yaw_acceleration_rate,
-    yaw_stiffness,
-)
+from shiplog.errors import UsageError
+from shiplog.settings import DisturbanceSettings, as_table, disturbance_settings, number_fault
+from shiplog.ship import INPUTS, Coefficients, rudder_effects, yaw_stiffness
 from shiplog.thinned import Thinned
 from shiplog.types import FloatArray, Signals
 
-from .design.observer import Observer, butterworth_poles, discrete_observer
+from .design.force import ForceModel, Sampling, force_observer
+from .filters.noise import Noise
 from .gauge import Gauge, gauge
 from .inputs import last_inputs
-from .kalman import Noise
 from .moments import Moments
+from .ship_observer import observe, ship_observer, starting, surge_plant, yaw_plant
 
-YAW_FREQUENCY = 0.05  # rad/s, the paper's
-SURGE_FREQUENCY = 0.02  # rad/s: surge is slower and its sensor noisier
-SETTLING = 5.0  # over the frequency: the paper's transient time
 DISTURBANCE_UNITS = {  # in SI, as people read it, and the factor from the one to the other
     "yaw": ("rad/s³", "0.001 deg/s³", degrees(1) * 1e3),
     "rudder": ("rad", "deg", degrees(1)),
     "surge": ("m/s²", "mm/s²", 1e3),
+    "yaw_wave": ("rad/s³", "0.001 deg/s³", degrees(1) * 1e3),
+    "surge_wave": ("m/s²", "mm/s²", 1e3),
 }
+CONSTANT = DisturbanceSettings()
+FASTEST = 10.0  # poles times interval: beyond it a sample is forgotten by the next
+QUICKEST_WAVE = 0.9 * pi  # frequency times interval: near Nyquist's the noise in it has no bound
+LOST = 1e6  # in SI: what an observer says that has lost the ship
 
 
 @dataclass(frozen=True, eq=False)
 class Disturbance:
-    """Specific disturbances on the signals' clock: what they add to the equations of motion."""
+    """Specific disturbances on the signals' clock: what they add to the equations of motion.
+
+    `yaw` and `surge` are the slow part, constant or ramp, and zero where neither was asked for; the
+    waves are beside it, and None where they were not.
+    """
 
     yaw: FloatArray  # (n,) rad/s^3, added to w''
     surge: FloatArray  # (n,) m/s^2, added to v'
     rudder: FloatArray  # (n,) rad: the rudder that would do, at the speed then, what `yaw` does
+    yaw_wave: FloatArray | None = None  # (n,) rad/s^3
+    surge_wave: FloatArray | None = None  # (n,) m/s^2
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,8 @@ class Course:
     """A disturbance over a trial, its first transient left out.
 
     The standard deviation is what sensor noise leaves once an observer has settled, the ship
-    turning as she usually did; an error of the model counts as a disturbance.
+    turning as she usually did; an error of the model counts as a disturbance. That of a wave is of
+    its value, and where the wave is well above it of its amplitude.
     """
 
     unit: str
@@ -67,68 +71,93 @@ class Course:
     std: float  # NaN where no rudder would do it
     settling_secs: float  # before it what is seen is the observer's own transient
 
+    @property
+    def amplitude(self) -> float:
+        """Of a wave: that of a sinusoid of its variance, less what sensor noise has of this."""
+        left = self.rms**2 - self.mean**2 - self.std**2
+        return np.nan if np.isnan(left) else sqrt(2 * max(left, 0.0))
+
 
 class ForceObserver:
-    """Observes a yaw moment and a surge force in slabs; where nothing is measured they are held.
+    """Observes a yaw moment and a surge force in slabs, each of the kinds that `settings` names.
 
-    The inputs must be known throughout.
+    `wave_frequency`, rad/s, is needed where a wave is one of them. Where nothing is measured, a
+    constant is held, a ramp goes on for a while (`design.force_observer`), a wave turns on. The
+    inputs must be known throughout.
+
+    Raises `UsageError` for settings that are none, a wave of no frequency, or one that is too quick
+    for a sensor or too slow to be told from the slow part, and for a model that is not finite.
     """
 
-    def __init__(self, model: Coefficients, noise: Noise, usual: Gauge) -> None:
-        self._model, self._usual = model, usual
-        self._turning = yaw_stiffness(model, usual.turning)
-        self._interval = float(usual.interval_secs[0])
-        yaw = _yaw_observer(model, self._turning, self._interval)
-        surge = _surge_observer(model, usual.ahead, float(usual.interval_secs[1]))
-        self._gains = yaw.correction, surge.correction
-        self._yaw_std = float(yaw.noise_gain[2] * noise.measurement_std[0])
-        self._surge_std = float(surge.noise_gain[1] * noise.measurement_std[1])
-        self._state = ObserverState(float(usual.first[0]), 0.0, 0.0, float(usual.first[1]), 0.0)
+    def __init__(
+        self,
+        model: Coefficients,
+        noise: Noise,
+        usual: Gauge,
+        settings: DisturbanceSettings = CONSTANT,
+        wave_frequency: float | None = None,
+    ) -> None:
+        self._model = model
+        wanted = wanted_forces(settings, wave_frequency, usual)
+        turning = yaw_stiffness(model, usual.turning)
+        yaw = force_observer(yaw_plant(model, turning), *wanted["yaw"])
+        surge = force_observer(surge_plant(model, usual.ahead), *wanted["surge"])
+        forces = yaw.force, surge.force
+        self._observer = ship_observer(model, turning, *forces, *wanted["yaw"])
+        self._state = starting(self._observer, usual)
         # a ship without way has a rudder that does nothing: its angle is then not a number
         self._least_steering = 1e-3 * abs(model.d) * usual.steering
         self._steering = Thinned()
-        settling = {"yaw": SETTLING / YAW_FREQUENCY, "surge": SETTLING / SURGE_FREQUENCY}
-        settling["rudder"] = settling["yaw"]
-        self._courses = {
-            name: _CourseWatch(secs, usual.count, usual.dt_secs) for name, secs in settling.items()
-        }
+        self._stds: dict[str, float] = {}
+        self._courses: dict[str, _CourseWatch] = {}
+        names = ("yaw", "rudder", "surge", "yaw_wave", "surge_wave")
+        for name in names if "wave" in settings.models else names[:3]:
+            output, design = (1, surge) if name.startswith("surge") else (0, yaw)
+            std = design.stds[int(name.endswith("wave"))]
+            self._stds[name] = float(std * noise.measurement_std[output])
+            watch = _CourseWatch(design.settling_secs, usual.count, usual.dt_secs)
+            self._courses[name] = watch
 
     def step(self, slab: Signals, following: Mapping[str, float]) -> Disturbance:
         """Observe the next slab; `following` are the inputs at the instant after it."""
         delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
-        rows, self._state = _observe(
-            self._model, self._state, slab["yaw_rate"], slab["speed"], delta, n, slab.dt_secs,
-            *self._gains, self._turning, self._interval,
+        rows, self._state = observe(
+            self._model, self._observer, self._state, slab["yaw_rate"], slab["speed"], delta, n,
+            slab.dt_secs,
         )  # fmt: skip
-        steering = self._model.d * rudder_effects(self._model, rows[:, 2], slab["rpm"])
+        rows[~(np.abs(rows) < LOST)] = np.nan
+        v, yaw, yaw_wave, surge, surge_wave = rows
+        steering = self._model.d * rudder_effects(self._model, v, slab["rpm"])
         self._steering.add(np.abs(steering))
         works = np.abs(steering) > self._least_steering
         with np.errstate(divide="ignore", invalid="ignore"):
-            rudder = np.where(works, rows[:, 1] / steering, np.nan)
-        found = Disturbance(yaw=rows[:, 1], surge=rows[:, 3], rudder=rudder)
+            rudder = np.where(works, yaw / steering, np.nan)
+        found = Disturbance(yaw, surge, rudder)
+        if "yaw_wave" in self._courses:
+            found = Disturbance(yaw, surge, rudder, yaw_wave, surge_wave)
         for name, watch in self._courses.items():
             watch.add(getattr(found, name))
         return found
 
     def result(self) -> dict[str, Course]:
-        """What was observed, once all was: of `yaw`, `rudder` and `surge`."""
+        """What was observed, once all was: `yaw`, `rudder`, `surge`, and the waves asked for."""
         usual = self._steering.median()
-        stds = {
-            "yaw": self._yaw_std,
-            "rudder": self._yaw_std / usual if usual > 0 else np.nan,
-            "surge": self._surge_std,
-        }
+        stds = self._stds | {"rudder": self._stds["yaw"] / usual if usual > 0 else np.nan}
         return {
-            name: self._courses[name].result(std, DISTURBANCE_UNITS[name][0])
-            for name, std in stds.items()
+            name: watch.result(stds[name], DISTURBANCE_UNITS[name][0])
+            for name, watch in self._courses.items()
         }
 
 
 def observe_disturbance(
-    signals: Signals, model: Coefficients, noise: Noise
+    signals: Signals,
+    model: Coefficients,
+    noise: Noise,
+    settings: DisturbanceSettings = CONSTANT,
+    wave_frequency: float | None = None,
 ) -> tuple[Disturbance, dict[str, Course]]:
     """The disturbance in signals that are all there, and what comes of it; as `ForceObserver`."""
-    observing = ForceObserver(model, noise, gauge(signals, model))
+    observing = ForceObserver(model, noise, gauge(signals, model), settings, wave_frequency)
     found = observing.step(signals, last_inputs(signals))
     return found, observing.result()
 
@@ -166,71 +195,58 @@ class _CourseWatch:
         )
 
 
-def _yaw_observer(c: Coefficients, stiffness: float, interval: float) -> Observer:
-    """Of (w, w', m): the yaw moment m constant, the rate measured."""
-    A = np.array([[0.0, 1.0, 0.0], [stiffness, c.a, 1.0], [0.0, 0.0, 0.0]])
-    C = np.array([[1.0, 0.0, 0.0]])
-    return discrete_observer(A, C, butterworth_poles(3, YAW_FREQUENCY), interval)
+def wanted_forces(
+    settings: DisturbanceSettings, wave_frequency: float | None, usual: Gauge
+) -> dict[str, tuple[ForceModel, Sampling]]:
+    """What is to be observed in `yaw` and in `surge`, and of what samples.
 
-
-def _surge_observer(c: Coefficients, speed: float, interval: float) -> Observer:
-    """Of (v, s): the surge force s constant, the speed measured."""
-    A = np.array([[2 * c.g * speed, 1.0], [0.0, 0.0]])
-    C = np.array([[1.0, 0.0]])
-    return discrete_observer(A, C, butterworth_poles(2, SURGE_FREQUENCY), interval)
-
-
-class ObserverState(NamedTuple):
-    """The motion and what disturbs it."""
-
-    w: float
-    w_dot: float
-    moment: float  # rad/s^3
-    v: float
-    force: float  # m/s^2
-
-
-@compiled
-def _observe(
-    c: Coefficients,
-    x: ObserverState,
-    w_measured: FloatArray,
-    v_measured: FloatArray,
-    delta: FloatArray,
-    n: FloatArray,
-    dt: float,
-    yaw: FloatArray,
-    surge: FloatArray,
-    turning: float,
-    interval: float,
-) -> tuple[FloatArray, ObserverState]:
-    """Rows of w, yaw disturbance, v, surge disturbance, (n, 4), and what the next slab begins with.
-
-    The yaw correction was designed for the stiffness `turning`; what w' is given follows the
-    stiffness of the moment, so that the poles stay where they were placed. `delta` and `n` are one
-    longer than the rest.
+    Raises `UsageError` for settings that are none, and for what those samples do not tell.
     """
-    count = len(w_measured)
-    rows = np.empty((count, 4))
-    w, w_dot, moment, v, force = x
-    for k in range(count):
-        if np.isfinite(w_measured[k]):
-            error = w_measured[k] - w
-            stiffer = (yaw_stiffness(c, w) - turning) * interval
-            w_dot = w_dot + (yaw[1] + stiffer) * error
-            w, moment = w + yaw[0] * error, moment + yaw[2] * error
-        if np.isfinite(v_measured[k]):
-            error = v_measured[k] - v
-            v, force = v + surge[0] * error, force + surge[1] * error
-        rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = w, moment, v, force
-        # Heun's step of the model, the disturbances constant
-        rate = (delta[k + 1] - delta[k]) / dt
-        w1 = yaw_acceleration_rate(c, w, w_dot, v, n[k], delta[k], rate) + moment
-        v1 = surge_acceleration(c, w, v, n[k]) + force
-        w_end, w_dot_end, v_end = w + dt * w_dot, w_dot + dt * w1, v + dt * v1
-        w2 = yaw_acceleration_rate(c, w_end, w_dot_end, v_end, n[k + 1], delta[k + 1], rate)
-        v2 = surge_acceleration(c, w_end, v_end, n[k + 1])
-        w = w + dt * (w_dot + w_dot_end) / 2
-        w_dot = w_dot + dt * (w1 + w2 + moment) / 2
-        v = v + dt * (v1 + v2 + force) / 2
-    return rows, ObserverState(w, w_dot, moment, v, force)
+    faults: list[str] = []
+    disturbance_settings(as_table(settings), faults)
+    if faults:
+        raise UsageError("; ".join(faults))
+    degree = 1 if "ramp" in settings.models else 0 if "constant" in settings.models else None
+    wave = _wave(wave_frequency) if "wave" in settings.models else None
+    wanted = {}
+    frequencies = {"yaw": settings.yaw_frequency, "surge": settings.surge_frequency}
+    for output, (name, frequency) in enumerate(frequencies.items()):
+        interval = float(usual.interval_secs[output])
+        longest = float(usual.longest_steps[output]) * usual.dt_secs
+        model = ForceModel(degree, wave, settings.spectrum, frequency)
+        _require_told(name, model, interval)
+        wanted[name] = model, Sampling(interval, longest, usual.dt_secs)
+    return wanted
+
+
+def _wave(frequency: float | None) -> float:
+    if frequency is None:
+        raise UsageError(
+            "disturbance.models has a wave whose frequency nobody knows; give"
+            " disturbance.wave_frequency, rad/s, or leave 'wave' out"
+        )
+    fault = number_fault("disturbance.wave_frequency", frequency, -inf, inf, positive=True)
+    if fault:
+        raise UsageError(fault)
+    return float(frequency)
+
+
+def _require_told(name: str, model: ForceModel, interval: float) -> None:
+    """Refuse what the samples of yaw or surge, so many seconds apart, do not tell."""
+    wave, slow = model.wave, model.frequency
+    if slow * interval >= FASTEST:
+        raise UsageError(
+            f"disturbance.{name}_frequency of {slow:.3g} rad/s is beyond samples every"
+            f" {interval:.3g} s; lower it below {FASTEST / interval:.3g}"
+        )
+    without = "or leave 'wave' out of disturbance.models"
+    if wave is not None and wave * interval >= QUICKEST_WAVE:
+        raise UsageError(
+            f"{name} measured every {interval:.3g} s shows no wave of {wave:.3g} rad/s; lower"
+            f" disturbance.wave_frequency below {QUICKEST_WAVE / interval:.3g}, {without}"
+        )
+    if wave is not None and model.degree is not None and wave <= slow:
+        raise UsageError(
+            f"in {name} a wave of {wave:.3g} rad/s is not told from what is slow, followed at"
+            f" {slow:.3g}; lower disturbance.{name}_frequency, {without}"
+        )

@@ -15,8 +15,8 @@ from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, factor
 
 from .disturbance import DISTURBANCE_UNITS
+from .filters.passage import OUTPUT_STATES
 from .gauge import Gauge
-from .kalman import OUTPUT_STATES
 from .pipeline import Slab
 
 POINTS = 20_000  # a series: more than a screen has, and quickly drawn
@@ -97,6 +97,9 @@ class Sketch:
             value = estimates.states[:, state] * scale
             band = banded("estimate", value, GUIDE * estimates.stds[:, state] * scale, colour)
             drawn[f"{name}/state"] = Series("state", at, band, spiky=self._spiky)
+            if state == 0 and estimates.wave is not None:
+                line = Line("wave", estimates.wave * scale, CYAN)
+                drawn[f"{name}/wave"] = Series("wave", at, (line,), spiky=True)
             line = Line("residual", normalised, colour)
             drawn[f"residual_{name}/normalised"] = Series("normalised", times, (line,), spiky=True)
         return drawn
@@ -112,10 +115,14 @@ class Sketch:
 
     def _disturbances(self, slab: Slab) -> dict[str, Series]:
         drawn, found = {}, slab.disturbance
+        at, waves = slab.signals.time_secs, {"yaw": found.yaw_wave, "surge": found.surge_wave}
         for name, values in (("yaw", found.yaw), ("surge", found.surge)):
-            line = Line("disturbance", values * DISTURBANCE_UNITS[name][2], RED, 1.5)
-            series = Series("observed", slab.signals.time_secs, (line,))
-            drawn[f"disturbance_{name}/observed"] = series
+            scale, wave = DISTURBANCE_UNITS[name][2], waves[name]
+            line = Line("disturbance", values * scale, RED, 1.5)
+            drawn[f"disturbance_{name}/observed"] = Series("observed", at, (line,))
+            if wave is not None:
+                line = Line("wave", wave * scale, CYAN)
+                drawn[f"disturbance_{name}/harmonic"] = Series("harmonic", at, (line,), spiky=True)
         return drawn
 
 

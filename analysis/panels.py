@@ -66,7 +66,13 @@ def _output(drawn: Drawn, name: str) -> Panel:
     measured, state = drawn[f"{name}/measured"], drawn[f"{name}/state"]
     title = f"{_words(name)} [{CATALOGUE[name].display_unit}]"
     axis = limits(measured.lines[0].values, state.lines[-1].values)
-    return Panel(name, title, (measured, state), axis)
+    waves = _if_drawn(drawn, f"{name}/wave")
+    return Panel(name, title, (measured, state, *waves), axis)
+
+
+def _if_drawn(drawn: Drawn, entity: str) -> tuple[Series, ...]:
+    """A series that is there only if it was asked for."""
+    return (drawn[entity],) if entity in drawn else ()
 
 
 def _input(drawn: Drawn, name: str) -> Panel:
@@ -81,12 +87,12 @@ def _disturbance(findings: Findings, drawn: Drawn, name: str) -> Panel:
     values = observed.lines[0].values
     settled = observed.time_secs >= course.settling_secs
     kept = values[settled] if settled.mean() > 0.5 else values
-    noise = GUIDE * course.std * scale
+    noise, waves = GUIDE * course.std * scale, _if_drawn(drawn, f"disturbance_{name}/harmonic")
     return Panel(
         f"disturbance_{name}",
         f"{name} disturbance [{unit}]",
-        (_guides(findings, "±2σ of sensor noise", noise), observed),
-        limits(kept, np.array([-1.5, 1.5]) * noise),
+        (_guides(findings, "±2σ of sensor noise", noise), observed, *waves),
+        limits(kept, np.array([-1.5, 1.5]) * noise, *(w.lines[0].values for w in waves)),
     )
 
 

@@ -11,8 +11,8 @@ from shiplog import Channel, TrialLog
 from shiplog.ship import COEFFICIENT_UNITS, OUTPUTS
 from shiplog.types import FloatArray, TimeArray
 
+from .filters.passage import STATES
 from .identification import Identification
-from .kalman import STATES
 from .pipeline import Analysis
 from .sliding import History
 
@@ -99,9 +99,10 @@ def _estimated(analysis: Analysis) -> Iterator[Channel]:
         yield _single(analysis, f"{name}_squared", "verdict", judged.normalised_squared)
         yield _single(analysis, f"{name}_expected", "verdict", judged.expected[1])
         yield _single(analysis, f"{name}_whiteness", "verdict", judged.whiteness_p)
-    for kind, values in (("yaw", found.yaw), ("rudder", found.rudder), ("surge", found.surge)):
-        yield _blocks(analysis, f"{kind}_disturbance", "estimate", values)
-        yield _single(analysis, f"{kind}_disturbance", "std", analysis.courses[kind].std)
+        yield _single(analysis, f"{name}_gated", "count", float(judged.gated))
+    for kind, course in analysis.courses.items():
+        yield _blocks(analysis, f"{kind}_disturbance", "estimate", getattr(found, kind))
+        yield _single(analysis, f"{kind}_disturbance", "std", course.std)
 
 
 def _identified(analysis: Analysis, found: Identification, history: History) -> Iterator[Channel]:

@@ -17,7 +17,8 @@ from shiplog.types import FloatArray
 from .chart import Chart, draw_track
 from .drawing import CYAN, GREEN, GREY, ORANGE, RED, Series, Sketch
 from .panels import Panel, coefficient_panels, equation_panels
-from .pipeline import Analysis, Findings, Plan, Slab
+from .pipeline import Analysis, Findings, Slab
+from .plan import Plan
 
 ROWS_SENT = 1 << 16  # at once
 WHOLE_RUN = rrb.TimeAxis(
@@ -28,7 +29,7 @@ WHOLE_RUN = rrb.TimeAxis(
 ROWS = [1.3, 0.9, 1.0, 0.9]  # heights: outputs, inputs, disturbances, residuals
 KEY = """\
 *Grey: measured, or in the model. Blue, orange: estimated, of yaw and of surge, ±2σ. \
-Green: inputs. Red: disturbance; between the grey lines it may be sensor noise. \
+Green: inputs. Red: disturbance; between the grey lines it may be sensor noise. Cyan: waves. \
 Coefficients: in the title over the whole trial, ±2σ; as a line at the end of each window. \
 A gap: not measured, or a window that cannot tell.*
 

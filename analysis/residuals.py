@@ -14,6 +14,7 @@ from .moments import Moments
 
 LAGS = 20
 FEWEST = 40  # measurements, or pairs of them at a lag, to tell anything
+MANY_GATED = 0.01  # of all: spikes are fewer
 SIGNIFICANCE = 0.01
 
 # The variance of the normalised innovation squared, times the number of innovations: 2 is that of
@@ -34,11 +35,23 @@ class OutputResiduals:
     normalised_squared: float  # mean of (innovation / expected std)^2; 1 if the noise is right
     expected: tuple[float, float]  # the 99 % band of that mean for white innovations
     whiteness_p: float  # NaN with too few samples to tell
+    gated: int  # measurements that were not believed, and are not counted above
 
     @property
     def white(self) -> bool | None:
         """Whether the test at 1 % finds nothing against it; None: too few samples to tell."""
         return None if isnan(self.whiteness_p) else self.whiteness_p >= SIGNIFICANCE
+
+    @property
+    def caution(self) -> str:
+        """A warning where more was gated than spikes explain."""
+        share = self.gated / max(self.gated + self.count, 1)
+        if share <= MANY_GATED:
+            return ""
+        return (
+            f"{self.name}: {share:.1%} of the samples were gated, too many for spikes: the model "
+            "or the noise stated does not fit; look at the residuals, or widen filter.gate"
+        )
 
     @property
     def consistent(self) -> bool:
@@ -58,10 +71,14 @@ class ResidualTest:
     def __init__(self, name: str, unit: str, usual_step: float, *, noise_measured: bool) -> None:
         self._name, self._unit, self._noise_measured = name, unit, noise_measured
         self._innovations, self._normalised = Moments(), Moments()
-        self._products = _Products(usual_step)
+        self._products, self._gated = _Products(usual_step), 0
 
-    def add(self, innovations: FloatArray, innovation_stds: FloatArray) -> None:
+    def add(
+        self, innovations: FloatArray, innovation_stds: FloatArray, gated: NDArray[np.bool_]
+    ) -> None:
         """Take the next innovations, (n,) with NaN where nothing was measured."""
+        self._gated += int(np.count_nonzero(gated))
+        innovations = np.where(gated, np.nan, innovations)
         self._innovations.add(innovations)
         self._normalised.add(innovations / innovation_stds)
         self._products.add(innovations)
@@ -69,7 +86,8 @@ class ResidualTest:
     def result(self) -> OutputResiduals:
         """The verdict on all of them."""
         count = self._innovations.count
-        half = 2.576 * sqrt((MEASURED_NOISE if self._noise_measured else STATED_NOISE) / count)
+        variance = MEASURED_NOISE if self._noise_measured else STATED_NOISE
+        half = 2.576 * sqrt(variance / count) if count else float("nan")
         return OutputResiduals(
             self._name,
             self._unit,
@@ -78,6 +96,7 @@ class ResidualTest:
             self._normalised.mean_square,
             (1 - half, 1 + half),
             self._products.whiteness(self._innovations.mean, count),
+            self._gated,
         )
 
 
@@ -93,7 +112,7 @@ def judge(
     steps = np.diff(np.flatnonzero(np.isfinite(innovations)))
     usual_step = float(np.median(steps)) if len(steps) else 1.0
     judging = ResidualTest(name, unit, usual_step, noise_measured=noise_measured)
-    judging.add(innovations, innovation_stds)
+    judging.add(innovations, innovation_stds, np.zeros(len(innovations), bool))
     return judging.result()
 
 

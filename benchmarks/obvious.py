@@ -22,7 +22,7 @@ import rerun as rr
 from mcap.reader import make_reader
 from scipy.linalg import expm
 
-from analysis.kalman import Noise
+from analysis.filters.noise import Noise
 from shiplog import Signals
 from shiplog.ship import Coefficients
 from shiplog.types import FloatArray

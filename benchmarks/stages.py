@@ -19,11 +19,11 @@ STAGES = {
     "check": ("survey", "quality", "stuck", "doubts", "rudder_sign", "gyro_bias"),
     "one clock": ("clock", "inputs"),
     "gauge": ("gauge", "first_model"),
-    "filter": ("kalman", "residuals"),
-    "disturbance": ("disturbance",),
+    "filter": ("pseudo_input", "three_state", "smoother", "tuning", "residuals"),
+    "disturbance": ("disturbance", "ship_observer"),
     "coefficients": ("weak_form", "sliding", "identification", "two_stack", "newey_west"),
     "track": ("track",),
-    "review": ("panels", "drawing", "chart", "rerun_view", "summary"),
+    "review": ("panels", "drawing", "chart", "rerun_view", "summary", "tables"),
 }
 REST = "the rest"
 _STAGE_OF = {module: stage for stage, modules in STAGES.items() for module in modules}
@@ -52,9 +52,9 @@ class _Watch:
 
     def __call__(self, frame: "FrameType", event: str, _: object) -> None:
         if event == "call":
-            package, _, module = frame.f_globals.get("__name__", "").partition(".")
+            package, *inner = frame.f_globals.get("__name__", "").split(".")
             ours = package in ("shiplog", "analysis")
-            stage = _STAGE_OF.get(module) if ours else None
+            stage = _STAGE_OF.get(inner[-1]) if ours and inner else None
             self._count()
             self._stack.append(stage or self._stack[-1])
         elif event == "return" and len(self._stack) > 1:

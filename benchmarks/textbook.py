@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from analysis.kalman import Noise
+from analysis.filters.noise import Noise
 from shiplog import Signals
 from shiplog.ship import Coefficients
 from shiplog.types import FloatArray
@@ -16,7 +16,7 @@ I = np.eye(5)
 
 
 class Filtered(NamedTuple):
-    """A row a sample, the fields as those of `analysis.kalman.Estimates`."""
+    """A row a sample, the fields as those of `analysis.filters.passage.Estimates`."""
 
     states: FloatArray
     stds: FloatArray

@@ -3,7 +3,7 @@
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
-from analysis.kalman import Noise
+from analysis.filters.noise import Noise
 from shiplog import Signals
 from shiplog.ship import Coefficients
 from shiplog.types import FloatArray

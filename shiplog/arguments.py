@@ -2,6 +2,7 @@
 
 import argparse
 import re
+import tomllib
 from collections.abc import Sequence
 from math import radians
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 from . import __version__
 from .errors import UsageError
+from .settings import DISTURBANCES, FILTERS
 
 
 def parser() -> argparse.ArgumentParser:
@@ -107,6 +109,25 @@ def _add_replay(verbs: Any) -> None:  # noqa: ANN401
         help="which of several sources of a channel to use",
     )
     replay.add_argument(
+        "--filter", choices=FILTERS, help="of the states (default: the vessel file's, pseudo-input)"
+    )
+    replay.add_argument("--smooth", action="store_true", help="the states, from the end back too")
+    replay.add_argument(
+        "--wave", action="store_true", help="tell waves in the yaw rate from the ship's own turning"
+    )
+    replay.add_argument(
+        "--disturbance",
+        metavar="MODELS",
+        help=f"what to observe, some of {','.join(DISTURBANCES)} (default: constant)",
+    )
+    replay.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="any setting of the vessel file's [filter] and [disturbance]: filter.gate=4",
+    )
+    replay.add_argument(
         "-o", "--output", metavar="FILE", help="the review (default: LOG's name with .rrd, here)"
     )
     replay.add_argument(
@@ -164,6 +185,25 @@ def sources(texts: Sequence[str]) -> dict[str, str]:
         if not re.fullmatch(r"[^=]+=[^=]+", text):
             raise UsageError(f"--source wants CHANNEL=SOURCE, such as speed=doppler, got {text!r}")
     return dict(text.split("=") for text in texts)
+
+
+def replay_settings(parsed: argparse.Namespace) -> dict[str, object]:
+    """The settings of filter and disturbances that the command line gives, by their names."""
+    found: dict[str, object] = {}
+    for text in parsed.set:
+        name, equals, value = text.partition("=")
+        try:
+            found[name] = tomllib.loads(f"value = {value}")["value"] if equals else None
+        except tomllib.TOMLDecodeError:
+            found[name] = value  # a word needs no quotes here
+        if not (name and value):
+            raise UsageError(f"--set wants KEY=VALUE, such as filter.gate=4, got {text!r}")
+    if parsed.filter:
+        found["filter.kind"] = parsed.filter
+    if parsed.disturbance:
+        found["disturbance.models"] = parsed.disturbance.split(",")
+    flags = {"filter.smooth": parsed.smooth, "filter.wave": parsed.wave}
+    return found | {name: True for name, given in flags.items() if given}
 
 
 _NUMBER = r"([-+]?\d*\.?\d+(?:e[-+]?\d+)?)"

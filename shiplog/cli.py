@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .arguments import gust, parser, settings, sources, unrest, wave
+from .arguments import gust, parser, replay_settings, settings, sources, unrest, wave
 from .errors import ShiplogError, UsageError
 from .files import is_device, replacing
 
@@ -118,7 +118,8 @@ def _run_info(arguments: argparse.Namespace) -> int:
 def _run_replay(arguments: argparse.Namespace) -> int:
     _require_ours("analysis")
     from analysis.pipeline import Replay
-    from analysis.summary import markdown, summarise
+    from analysis.summary import summarise
+    from analysis.tables import markdown
 
     from .log_file import open_log
     from .vessel import load_vessel
@@ -129,12 +130,12 @@ def _run_replay(arguments: argparse.Namespace) -> int:
     output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
     _require_distinct([output, arguments.json], [arguments.log, arguments.vessel])
     _require_suffix(".rrd", output)
-    chosen = sources(arguments.source)
+    chosen, preferred = replay_settings(arguments), sources(arguments.source)
     with _progress("analysis") as tell:
         tell("read")
-        log = open_log(arguments.log).preferring(chosen)
+        log = open_log(arguments.log).preferring(preferred)
         try:
-            replay = Replay(log, vessel, on_step=tell)
+            replay = Replay(log, vessel, settings=chosen, on_step=tell)
         except ShiplogError:
             _warn(log.warnings)  # they may explain it
             raise
@@ -268,7 +269,7 @@ def _print_tables(findings: "Findings", *, to_stderr: bool) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from analysis.summary import sections
+    from analysis.tables import sections
 
     console = Console(stderr=to_stderr, highlight=False, markup=False)  # [deg] is a unit
     for section in sections(findings):

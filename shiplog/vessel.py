@@ -164,6 +164,8 @@ def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
     The names are those of the vessel file's `[filter]` and `[disturbance]`. Raises `UsageError`
     with all the faults at once.
     """
+    if not settings:
+        return vessel
     faults: list[str] = []
     tables = {"filter": as_table(vessel.filter), "disturbance": as_table(vessel.disturbance)}
     for name, value in settings.items():

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from analysis.kalman import filter_states
+from analysis.filters.kinds import filter_states
 from analysis.pipeline import analyse
 from analysis.rerun_view import write_review
 from benchmarks import filters, logs, measure, replays

@@ -7,12 +7,14 @@ import pytest
 from conftest import InSlabs, as_log
 from faults import bias, dropout, freeze, spike
 
-from analysis.pipeline import FITTED, NEEDED, STEPS, Analysis, Replay, analyse
-from analysis.summary import markdown
+from analysis.pipeline import STEPS, Analysis, Replay, analyse
+from analysis.plan import FITTED, NEEDED
+from analysis.tables import markdown
 from analysis.weak_form import weak_form
 from recorders.sensors import suite
 from recorders.simulate import START_NS, SimulatedTrial, simulate
 from shiplog import Channel, LogError, TrialLog, Vessel, VesselError
+from shiplog.errors import UsageError
 from shiplog.foreign import read_table
 from shiplog.layout import load_layout
 from shiplog.schema import GEOGRAPHIC
@@ -27,7 +29,8 @@ def without(log: TrialLog, name: str) -> TrialLog:
 def test_the_steps_are_told_in_their_order(zigzag_log: TrialLog) -> None:
     told: list[tuple[str, float]] = []
     analyse(zigzag_log, on_step=lambda step, share: told.append((step, share)))
-    assert tuple(dict.fromkeys(step for step, _ in told)) == STEPS
+    smoothing = "look ahead"  # which is asked for elsewhere
+    assert list(dict.fromkeys(step for step, _ in told)) == [s for s in STEPS if s != smoothing]
     shares = [share for step, share in told if step == "replay"]
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
@@ -367,6 +370,56 @@ def test_the_slabs_of_a_replay_come_once(zigzag_log: TrialLog) -> None:
     assert replay.findings.clock is replay.plan.clock
     with pytest.raises(ValueError, match="come once"):
         next(replay.slabs())
+
+
+@pytest.mark.parametrize("kind", ["pseudo-input", "extended"])
+def test_a_log_cut_anywhere_is_smoothed_the_same(zigzag_log: TrialLog, kind: str) -> None:
+    settings = {"filter.kind": kind, "filter.smooth": True}
+    whole = analyse(zigzag_log, settings=settings)
+    cut = analyse(InSlabs(zigzag_log, [0.05, 100.0, 100.3, 333.0]), settings=settings)
+    for one, other in (
+        (whole.estimates.states, cut.estimates.states),
+        (whole.estimates.stds, cut.estimates.stds),
+    ):
+        np.testing.assert_allclose(one / np.abs(one).max(axis=0), other / np.abs(one).max(axis=0))
+    assert np.array_equal(
+        whole.estimates.innovations, cut.estimates.innovations, equal_nan=True
+    )  # which are the filter's
+
+
+def test_smoothing_leaves_the_innovations_and_makes_the_states_surer(
+    zigzag_log: TrialLog, zigzag_analysis: Analysis
+) -> None:
+    found = analyse(zigzag_log, settings={"filter.smooth": True})
+    assert found.residuals == zigzag_analysis.residuals
+    assert np.all(found.estimates.stds <= zigzag_analysis.estimates.stds * (1 + 1e-9))
+    assert found.estimates.states[-1] == pytest.approx(zigzag_analysis.estimates.states[-1])
+
+
+def test_a_spike_is_gated_counted_and_does_no_harm(
+    zigzag_log: TrialLog, zigzag_analysis: Analysis
+) -> None:
+    spiked = spike("yaw_rate", 150.0, np.radians(1.0))(zigzag_log)
+    found = analyse(spiked)
+    assert found.residuals[0].gated == 1
+    away = np.abs(found.estimates.states - zigzag_analysis.estimates.states)
+    assert np.all(away < 0.3 * zigzag_analysis.estimates.stds)
+    believing = analyse(spiked, settings={"filter.gate": 1e6})
+    assert believing.residuals[0].gated == 0
+    assert believing.residuals[0].normalised_squared > found.residuals[0].normalised_squared
+
+
+def test_more_gated_than_spikes_explain_is_warned_of(zigzag_log: TrialLog) -> None:
+    found = analyse(zigzag_log, settings={"filter.gate": 1.0})
+    assert any("samples were gated, too many for spikes" in said for said in found.warnings)
+
+
+def test_settings_that_do_not_do_are_refused_before_any_work(zigzag_log: TrialLog) -> None:
+    told: list[str] = []
+    for log in (zigzag_log, replace(zigzag_log, vessel_toml=None)):
+        with pytest.raises(UsageError, match=r"filter\.kind must be one of"):
+            Replay(log, settings={"filter.kind": "kalman"}, on_step=lambda s, _: told.append(s))
+    assert not told
 
 
 KVLCC2 = Path(__file__).parents[2] / "shared" / "data" / "kvlcc2"

@@ -1,5 +1,6 @@
 """The sample data: each replays as its reference says, and tells the truth that lies beside it."""
 
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from analysis.check import compare, logs_in
 from analysis.pipeline import analyse
 from shiplog import load_vessel, read
+from shiplog.settings import DISTURBANCES, FILTERS, SMOOTHED
 from shiplog.vessel import PRESETS
 
 SAMPLES = Path(__file__).parents[1] / "sample_data"
@@ -33,6 +35,30 @@ def test_every_sample_is_filtered_nearer_to_its_truth(log: Path) -> None:
         measured = found.signals[name][there] - true
         better = 3 if "dropouts" not in log.name or name == "speed" else 1  # a bias stays
         assert np.std(measured) / np.std(estimated) > better
+
+
+KINDS = [(kind, False) for kind in FILTERS] + [(kind, True) for kind in SMOOTHED]
+SETS = [list(s) for n in (1, 2, 3) for s in combinations(DISTURBANCES, n)]
+
+
+@pytest.mark.parametrize(("kind", "smooth"), KINDS)
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
+def test_every_filter_replays_every_sample(log: Path, kind: str, smooth: bool) -> None:
+    found = analyse(read(log), settings={"filter.kind": kind, "filter.smooth": smooth})
+    estimates = found.estimates
+    assert np.isfinite(estimates.states).all()
+    assert np.isfinite(estimates.stds).all()
+    believed = sum(residuals.count for residuals in found.residuals)
+    assert believed > 0.7 * np.isfinite(estimates.innovations).sum()
+
+
+@pytest.mark.parametrize("models", SETS, ids="+".join)
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
+def test_every_disturbance_is_observed_in_every_sample(log: Path, models: list[str]) -> None:
+    found = analyse(read(log), settings={"disturbance.models": models})
+    assert np.isfinite(found.disturbance.yaw).all()
+    assert np.isfinite(found.disturbance.surge).all()
+    assert (found.disturbance.yaw_wave is None) == ("wave" not in models)
 
 
 def test_the_samples_are_small_and_carry_all_that_is_promised() -> None:

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 from itertools import pairwise
 from math import pi
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ import shiplog
 from analysis.chart import draw_track
 from analysis.disturbance import Disturbance
 from analysis.drawing import Line, Series, Sketch, Thinning, _Samples
-from analysis.kalman import Estimates
+from analysis.filters.passage import Estimates
 from analysis.panels import Drawn, coefficient_panels, equation_panels, limits
 from analysis.pipeline import Analysis, Slab, analyse
 from analysis.rerun_view import write_review
@@ -45,14 +45,22 @@ def replayed(**sensors: float) -> Analysis:
     return analyse(shiplog.TrialLog("zigzag_20_20.mcap", trial.channels, {}, text))
 
 
+Whole = TypeVar("Whole", Estimates, Disturbance)
+
+
+def cut_of(whole: Whole, cut: slice) -> Whole:
+    arrays = {f.name: getattr(whole, f.name) for f in fields(whole)}
+    return replace(whole, **{name: a[cut] for name, a in arrays.items() if a is not None})
+
+
 def part_of(analysis: Analysis, start: int, stop: int) -> Slab:
     """A slab of the trial, though what was identified and the track are whole in each."""
     cut = slice(start, stop)
     estimates, found = analysis.estimates, analysis.disturbance
     return Slab(
         analysis.signals.part(start, stop),
-        Estimates(*(getattr(estimates, f.name)[cut] for f in fields(estimates))),
-        Disturbance(*(getattr(found, f.name)[cut] for f in fields(found))),
+        cut_of(estimates, cut),
+        cut_of(found, cut),
         analysis.yaw_history,
         analysis.surge_history,
         analysis.track,

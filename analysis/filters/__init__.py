@@ -1,0 +1,1 @@
+"""States from signals: filters that share one account of what they did, and the smoother."""

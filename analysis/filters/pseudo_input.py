@@ -1,0 +1,221 @@
+"""The Kalman filter with pseudo-inputs: Burylin's five states, his misprints mended."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.design.discrete import discretise
+from analysis.design.pseudo_input import pseudo_input_matrices
+from analysis.gauge import Gauge
+from shiplog.compiled import compiled
+from shiplog.settings import FilterSettings
+from shiplog.ship import (
+    INPUTS,
+    OUTPUTS,
+    Coefficients,
+    rudder_effect,
+    rudder_effect_rate,
+    surge_acceleration,
+    yaw_acceleration_rate,
+    yaw_stiffness,
+)
+from shiplog.types import FloatArray, Signals
+
+from .noise import Noise
+from .passage import OUTPUT_STATES, STATES, Estimates, Trace
+from .steps import believable, correct, project, propagate
+
+
+class MotionState(NamedTuple):
+    """x of the paper's five-state model."""
+
+    w: float
+    w_dot: float
+    w_ddot: float
+    v: float
+    v_dot: float
+
+
+class PseudoInputFilter:
+    """The five-state model of the identification paper, filtering yaw rate and speed in slabs.
+
+    The mean is propagated by the exact nonlinear derivative (A x + B u with corrected
+    pseudo-inputs, `design.pseudo_input_matrices`), the covariance by A, as the paper has it. Where
+    an output is NaN there is no correction; the inputs must be known throughout.
+    Source: Burylin, eqs (4)-(6).
+    """
+
+    def __init__(
+        self, model: Coefficients, noise: Noise, usual: Gauge, settings: FilterSettings
+    ) -> None:
+        A, _ = pseudo_input_matrices(model, 1.0)
+        self.outputs = np.eye(len(STATES))[list(OUTPUT_STATES)]
+        self._model, self._r, self._gate = model, noise.measurement_std**2, settings.gate
+        per_state = np.repeat(noise.process_ratio * self._r * usual.interval_secs, (3, 2))
+        F, Q = discretise(A, np.diag(per_state), usual.dt_secs)
+        self._F, self._Q = np.ascontiguousarray(F), np.ascontiguousarray(Q)
+        self._x, self._P = _start(model, usual)
+        self._off = np.zeros(len(OUTPUTS), np.int64)
+        self._last_rate = np.zeros(1)  # of the rudder
+
+    def step(self, slab: Signals, following: Mapping[str, float]) -> Estimates:
+        """Filter the next slab; `following` are the inputs at the instant after it."""
+        return self._run(slab, following, keep=False)[0]
+
+    def trace(self, slab: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
+        """As `step`, and how it came about."""
+        return self._run(slab, following, keep=True)
+
+    def told(
+        self,
+        slab: Signals,  # noqa: ARG002 - the states are the filter's own
+        following: Mapping[str, float],  # noqa: ARG002
+        states: FloatArray,
+        covariances: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, None]:
+        """States (n, 5) and their standard deviations."""
+        variances = np.diagonal(covariances, axis1=1, axis2=2)
+        return states, np.sqrt(np.maximum(variances, 0.0)), None
+
+    def _run(
+        self, slab: Signals, following: Mapping[str, float], *, keep: bool
+    ) -> tuple[Estimates, Trace]:
+        measured = np.column_stack([slab[name] for name in OUTPUTS])
+        delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
+        rows, innovations, gated, trace = _filter(
+            self._model, self._x, self._P, self._F, self._Q, measured, self._r, self._gate,
+            self.outputs, delta, n, slab.dt_secs, self._last_rate, self._off, keep,
+        )  # fmt: skip
+        count = len(STATES)
+        told = Estimates(
+            rows[:, :count], np.sqrt(rows[:, count:]), innovations[:, :2],
+            np.sqrt(innovations[:, 2:]), gated,
+        )  # fmt: skip
+        x, P, K, e, S = trace
+        F = np.repeat(self._F[None], len(P), axis=0)
+        return told, Trace(x, P, F, K, e, S)
+
+
+def _start(c: Coefficients, usual: Gauge) -> tuple[FloatArray, FloatArray]:
+    """The first values measured, their rates from the model at rest; as unsure as they vary."""
+    w, v = usual.first
+    delta, n = (usual.head[name][0] for name in INPUTS)
+    w_ddot = yaw_acceleration_rate(c, w, 0.0, v, n, delta, 0.0)
+    start = np.array([w, 0.0, w_ddot, v, surge_acceleration(c, w, v, n)])
+    dw, dv = usual.spread + 1e-9
+    rate = abs(c.a) + 1e-3
+    spread = np.array([dw, rate * dw, rate**2 * dw, dv, 1e-2 * dv])
+    return start, np.diag(spread**2)
+
+
+_Kept = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+
+
+@compiled
+def _filter(
+    c: Coefficients,
+    x: FloatArray,
+    P: FloatArray,
+    F: FloatArray,
+    Q: FloatArray,
+    measured: FloatArray,
+    r: FloatArray,
+    gate: float,
+    C: FloatArray,
+    delta: FloatArray,
+    n: FloatArray,
+    dt: float,
+    last_rate: FloatArray,
+    off: NDArray[np.int64],
+    keep: bool,
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], _Kept]:
+    """Rows of states and variances, (n, 10), of innovations and theirs, (n, 4), what was gated.
+
+    And, if it is to be kept, a trace. `x`, `P`, `last_rate` and `off` go on to the next slab;
+    `delta` and `n` are one longer.
+    """
+    count, size = len(measured), len(x)
+    rows, told = np.empty((count, 2 * size)), np.empty((count, 4))
+    gated = np.zeros((count, 2), np.bool_)
+    kept = count if keep else 0
+    xs, Ps = np.empty((kept, size)), np.empty((kept, size, size))
+    Ks, es, Ss = np.zeros((kept, 2, size)), np.zeros((kept, 2)), np.ones((kept, 2))
+    FP, Pc = np.empty((size, size)), np.empty(size)
+    for k in range(count):
+        delta_dot, n_dot = (delta[k + 1] - delta[k]) / dt, (n[k + 1] - n[k]) / dt
+        # a rudder that starts or stops makes w'' jump
+        x[2] += rudder_effect(c, x[3], n[k]) * c.e * (delta_dot - last_rate[0])
+        last_rate[0] = delta_dot
+        for output in range(2):
+            S = project(P, C[output], Pc) + r[output]
+            innovation = measured[k, output]
+            for i in range(size):
+                innovation -= C[output, i] * x[i]
+            told[k, output], told[k, 2 + output] = innovation, S
+            if not np.isfinite(innovation):
+                continue
+            if not believable(innovation, S, gate, output, off):
+                gated[k, output] = True
+                continue
+            K = Pc / S
+            correct(x, P, K, Pc, innovation, S)
+            if keep:
+                Ks[k, output], es[k, output], Ss[k, output] = K, innovation, S
+        for i in range(size):
+            rows[k, i], rows[k, size + i] = x[i], max(P[i, i], 0.0)
+        if keep:
+            xs[k], Ps[k] = x, P
+        _predict(c, x, delta[k], delta_dot, n[k], n_dot, dt)
+        propagate(P, F, Q, FP)
+    return rows, told, gated, (xs, Ps, Ks, es, Ss)
+
+
+@compiled
+def _predict(
+    c: Coefficients,
+    x: FloatArray,
+    delta: float,
+    delta_dot: float,
+    n: float,
+    n_dot: float,
+    dt: float,
+) -> None:
+    """One Runge-Kutta step of x' = A x + B u, the rudder and the revolutions moving evenly."""
+    s = MotionState(x[0], x[1], x[2], x[3], x[4])
+    k1 = motion(c, s, delta, delta_dot, n, n_dot)
+    half_delta, half_n = delta + delta_dot * dt / 2, n + n_dot * dt / 2
+    k2 = motion(c, _moved(s, k1, dt / 2), half_delta, delta_dot, half_n, n_dot)
+    k3 = motion(c, _moved(s, k2, dt / 2), half_delta, delta_dot, half_n, n_dot)
+    k4 = motion(c, _moved(s, k3, dt), delta + delta_dot * dt, delta_dot, n + n_dot * dt, n_dot)
+    for i in range(5):
+        x[i] += dt / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i])
+
+
+@compiled
+def motion(
+    c: Coefficients, x: MotionState, delta: float, delta_dot: float, n: float, n_dot: float
+) -> MotionState:
+    """A x + B u, row by row, with the pseudo-inputs written out."""
+    ks = rudder_effect(c, x.v, n)
+    ks_dot = rudder_effect_rate(c, x.v, x.v_dot, n, n_dot)
+    steering = c.d * delta + c.e * delta_dot
+    return MotionState(
+        x.w_dot,
+        yaw_acceleration_rate(c, x.w, x.w_dot, x.v, n, delta, delta_dot),
+        c.a * x.w_ddot + yaw_stiffness(c, x.w) * x.w_dot + ks_dot * steering + ks * c.d * delta_dot,
+        surge_acceleration(c, x.w, x.v, n),
+        2 * c.f * x.w * x.w_dot + 2 * c.g * x.v * x.v_dot + c.h * n_dot,
+    )
+
+
+@compiled
+def _moved(x: MotionState, rate: MotionState, h: float) -> MotionState:
+    return MotionState(
+        x.w + h * rate.w,
+        x.w_dot + h * rate.w_dot,
+        x.w_ddot + h * rate.w_ddot,
+        x.v + h * rate.v,
+        x.v_dot + h * rate.v_dot,
+    )

@@ -1,0 +1,370 @@
+"""Filters of three states, w, w' and v, by the ship's own equations; what else is told follows.
+
+Their gains differ: the extended Kalman filter finds the best one at each instant, the steady-state
+and the quality filter keep one for ever (`gains`), the per-tick observer places the same poles anew
+at each instant. All say how unsure they are by the same recursion, which holds for any gain.
+A wave in the yaw rate, where asked for, is two states more, seen in the measurement alone: what is
+left as yaw rate is the ship's slow turning.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, expm, solve_discrete_lyapunov
+
+from analysis.design.discrete import discretise
+from analysis.gauge import Gauge
+from shiplog.compiled import compiled
+from shiplog.settings import FilterSettings
+from shiplog.ship import (
+    INPUTS,
+    OUTPUTS,
+    Coefficients,
+    rudder_effect_rate,
+    surge_acceleration,
+    yaw_acceleration_rate,
+    yaw_stiffness,
+)
+from shiplog.types import FloatArray, Signals
+
+from .gains import Channel, channels, discrete_gain, ticked_gain
+from .noise import Noise
+from .passage import Estimates, Trace
+from .steps import believable, correct, project, propagate
+
+BEST, FIXED, TICKED = range(3)  # gains
+_GAINS = {"extended": BEST, "steady-state": FIXED, "quality": FIXED, "per-tick": TICKED}
+_STATES = 3  # beside the wave's
+
+
+class ThreeStateFilter:
+    """Filters yaw rate and speed in slabs; the inputs must be known throughout.
+
+    `settings.chosen` is one of `extended`, `steady-state`, `quality` and `per-tick`.
+    Source: the extended Kalman filter is Jazwinski's, "Stochastic processes and filtering theory",
+    1970, theorem 8.1; the others are those of `gains`.
+    """
+
+    def __init__(
+        self, model: Coefficients, noise: Noise, usual: Gauge, settings: FilterSettings
+    ) -> None:
+        yaw, surge = channels(model, noise, usual)
+        self._model, self._r, self._gate = model, noise.measurement_std**2, settings.gate
+        self._wave = _wave_block(yaw, usual.dt_secs)
+        size = _STATES + len(self._wave.F)
+        self.outputs = np.zeros((len(OUTPUTS), size))
+        of_yaw = [0, 1, *range(_STATES, size)]
+        self.outputs[0, of_yaw] = yaw.C[0]
+        self.outputs[1, 2] = 1.0
+        self._Q = _process_noise(model, noise, usual, self._wave)
+        self._gain = _GAINS[settings.chosen]
+        # the best gain forgets the start at once; any other goes on from the first measurement
+        best = self._gain == BEST
+        spread = usual.spread + 1e-9 if best else noise.measurement_std
+        self._x, self._P = _start(model, usual, spread, self._wave)
+        self._off = np.zeros(len(OUTPUTS), np.int64)
+        self._fixed = np.zeros((len(OUTPUTS), size))
+        self._poles = np.zeros(size, np.complex128)
+        if self._gain != BEST:
+            self._design(settings, yaw, surge)
+        self._interval = usual.interval_secs
+        self._wave_between = np.ascontiguousarray(expm(yaw.A[2:, 2:] * yaw.interval_secs))
+
+    def _design(self, settings: FilterSettings, yaw: Channel, surge: Channel) -> None:
+        of_yaw = [0, 1, *range(_STATES, len(self._fixed[0]))]
+        gain, poles = discrete_gain(settings, yaw)
+        self._fixed[0, of_yaw], self._poles[of_yaw] = gain, poles
+        gain, poles = discrete_gain(settings, surge)
+        self._fixed[1, 2], self._poles[2] = gain[0], poles[0]
+
+    def step(self, slab: Signals, following: Mapping[str, float]) -> Estimates:
+        """Filter the next slab; `following` are the inputs at the instant after it."""
+        return self._run(slab, following, keep=False)[0]
+
+    def trace(self, slab: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
+        """As `step`, and how it came about."""
+        return self._run(slab, following, keep=True)
+
+    def told(
+        self,
+        slab: Signals,
+        following: Mapping[str, float],
+        states: FloatArray,
+        covariances: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+        """w, w', w'', v, v' (n, 5), their standard deviations, and the wave."""
+        delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
+        rows = _all_told(self._model, states, covariances, delta, n, slab.dt_secs)
+        return rows[:, :5], np.sqrt(rows[:, 5:]), self._seen_wave(states)
+
+    def _run(
+        self, slab: Signals, following: Mapping[str, float], *, keep: bool
+    ) -> tuple[Estimates, Trace]:
+        measured = np.column_stack([slab[name] for name in OUTPUTS])
+        delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
+        correction = _Correction(
+            self.outputs, self._r, self._gate, self._gain, self._fixed, self._poles,
+            self._interval, self._wave_between,
+        )  # fmt: skip
+        states, rows, innovations, gated, trace = _filter(
+            self._model, self._x, self._P, self._Q, self._wave.F, correction, measured, delta, n,
+            slab.dt_secs, self._off, keep,
+        )  # fmt: skip
+        told = Estimates(
+            rows[:, :5], np.sqrt(rows[:, 5:]), innovations[:, :2], np.sqrt(innovations[:, 2:]),
+            gated, self._seen_wave(states),
+        )  # fmt: skip
+        return told, Trace(states, *trace)
+
+    def _seen_wave(self, states: FloatArray) -> FloatArray | None:
+        seen = self.outputs[0, _STATES:]
+        return states[:, _STATES:] @ seen if len(seen) else None
+
+
+class _Block(NamedTuple):
+    """States that move by themselves, from one instant to the next."""
+
+    F: FloatArray  # (k, k)
+    Q: FloatArray  # (k, k)
+
+
+def _wave_block(yaw: Channel, dt: float) -> _Block:
+    """The wave's states are the yaw channel's beyond w and w'."""
+    A, G = yaw.A[2:, 2:], yaw.G[2:]
+    if not len(A):
+        return _Block(np.zeros((0, 0)), np.zeros((0, 0)))
+    F, Q = discretise(A, G @ yaw.Q @ G.T, dt)
+    return _Block(np.ascontiguousarray(F), Q)
+
+
+def _process_noise(c: Coefficients, noise: Noise, usual: Gauge, wave: _Block) -> FloatArray:
+    """What is added to the covariance from one instant to the next, (s, s)."""
+    speed = usual.ahead
+    A = np.array(
+        [
+            [0.0, 1.0, 0.0],
+            [yaw_stiffness(c, usual.turning), c.a, 0.0],
+            [0.0, 0.0, 2 * c.g * speed],
+        ]
+    )
+    q = noise.process_ratio * noise.measurement_std**2 * usual.interval_secs
+    _, Q = discretise(A, np.diag([0.0, *q]), usual.dt_secs)
+    return np.ascontiguousarray(block_diag(Q, wave.Q))
+
+
+def _start(
+    c: Coefficients, usual: Gauge, spread: FloatArray, wave: _Block
+) -> tuple[FloatArray, FloatArray]:
+    """The first values measured, as unsure as `spread`, and not turning faster."""
+    w, v = usual.first
+    rate = (abs(c.a) + 1e-3) * (usual.spread[0] + 1e-9)
+    stds = np.array([spread[0], rate, spread[1]])
+    of_wave = solve_discrete_lyapunov(wave.F, wave.Q) if len(wave.F) else wave.Q
+    return (
+        np.concatenate(([w, 0.0, v], np.zeros(len(wave.F)))),
+        np.ascontiguousarray(block_diag(np.diag(stds**2), of_wave)),
+    )
+
+
+class _Correction(NamedTuple):
+    """What is measured, and by which gain it is taken in."""
+
+    C: FloatArray  # (2, s)
+    r: FloatArray  # (2,)
+    gate: float
+    gain: int
+    fixed: FloatArray  # (2, s)
+    poles: NDArray[np.complex128]  # (s,) of the yaw's and the surge's states, from sample to sample
+    interval: FloatArray  # (2,) s
+    wave: FloatArray  # (k, k) from a sample of the yaw rate to the next
+
+
+_Kept = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+
+
+@compiled
+def _filter(
+    c: Coefficients,
+    x: FloatArray,
+    P: FloatArray,
+    Q: FloatArray,
+    wave: FloatArray,
+    by: _Correction,
+    measured: FloatArray,
+    delta: FloatArray,
+    n: FloatArray,
+    dt: float,
+    off: NDArray[np.int64],
+    keep: bool,
+) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_], _Kept]:
+    """The states (n, s), rows of what is told and its variances, (n, 10), of innovations, (n, 4).
+
+    And what was gated, and, if it is to be kept, the rest of a trace. `x`, `P` and `off` go on to
+    the next slab; `delta` and `n` are one longer.
+    """
+    count, size = len(measured), len(x)
+    xs, rows, told = np.empty((count, size)), np.empty((count, 10)), np.empty((count, 4))
+    gated = np.zeros((count, 2), np.bool_)
+    kept = count if keep else 0
+    Ps, Fs = np.empty((kept, size, size)), np.empty((kept, size, size))
+    Ks, es, Ss = np.zeros((kept, 2, size)), np.zeros((kept, 2)), np.ones((kept, 2))
+    F, FP, Pc = np.zeros((size, size)), np.empty((size, size)), np.empty(size)
+    J = np.zeros((3, 3))
+    F[3:, 3:] = wave
+    for k in range(count):
+        delta_dot, n_dot = (delta[k + 1] - delta[k]) / dt, (n[k + 1] - n[k]) / dt
+        for output in range(2):
+            S = project(P, by.C[output], Pc) + by.r[output]
+            innovation = measured[k, output]
+            for i in range(size):
+                innovation -= by.C[output, i] * x[i]
+            told[k, output], told[k, 2 + output] = innovation, S
+            if not np.isfinite(innovation):
+                continue
+            if not believable(innovation, S, by.gate, output, off):
+                gated[k, output] = True
+                continue
+            if by.gain == TICKED:
+                linearise(c, x, delta[k], delta_dot, n[k], J)
+            K = _gain(by, Pc, S, J, output)
+            correct(x, P, K, Pc, innovation, S)
+            if keep:
+                Ks[k, output], es[k, output], Ss[k, output] = K, innovation, S
+        xs[k] = x
+        tell(c, x, P, delta[k], delta_dot, n[k], rows[k])
+        if keep:
+            Ps[k] = P
+        predict(c, x, F, delta[k], delta_dot, n[k], n_dot, dt)
+        if keep:
+            Fs[k] = F
+        propagate(P, F, Q, FP)
+    return xs, rows, told, gated, (Ps, Fs, Ks, es, Ss)
+
+
+@compiled
+def _gain(by: _Correction, Pc: FloatArray, S: float, J: FloatArray, output: int) -> FloatArray:
+    """The gain (s,) of an output, of which P c and c P c + r are given."""
+    if by.gain == BEST:
+        best: FloatArray = Pc / S
+        return best
+    if by.gain == FIXED:
+        fixed: FloatArray = by.fixed[output].copy()
+        return fixed
+    return ticked_gain(J, by.wave, by.C[output], by.poles, by.interval[output], output)
+
+
+@compiled
+def _all_told(
+    c: Coefficients,
+    states: FloatArray,
+    covariances: FloatArray,
+    delta: FloatArray,
+    n: FloatArray,
+    dt: float,
+) -> FloatArray:
+    rows = np.empty((len(states), 10))
+    for k in range(len(states)):
+        rate = (delta[k + 1] - delta[k]) / dt
+        tell(c, states[k], covariances[k], delta[k], rate, n[k], rows[k])
+    return rows
+
+
+@compiled
+def tell(
+    c: Coefficients,
+    x: FloatArray,
+    P: FloatArray,
+    delta: float,
+    delta_dot: float,
+    n: float,
+    row: FloatArray,
+) -> None:
+    """w, w', w'', v, v' and their variances, (10,); what is no state follows from the model."""
+    w, w_dot, v = x[0], x[1], x[2]
+    J = np.zeros((3, 3))
+    linearise(c, x, delta, delta_dot, n, J)
+    row[0], row[1], row[3] = w, w_dot, v
+    row[2] = yaw_acceleration_rate(c, w, w_dot, v, n, delta, delta_dot)
+    row[4] = surge_acceleration(c, w, v, n)
+    row[5], row[6], row[8] = P[0, 0], P[1, 1], P[2, 2]
+    row[7], row[9] = _variance(J[1], P), _variance(J[2], P)
+    for i in range(5, 10):
+        row[i] = max(row[i], 0.0)
+
+
+@compiled
+def _variance(slope: FloatArray, P: FloatArray) -> float:
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += slope[i] * P[i, j] * slope[j]
+    return total
+
+
+@compiled
+def linearise(
+    c: Coefficients, x: FloatArray, delta: float, delta_dot: float, n: float, J: FloatArray
+) -> None:
+    """The derivatives of w', w'' and v' by w, w' and v, into J (3, 3)."""
+    w, v = x[0], x[2]
+    J[0, 1] = 1.0
+    J[1, 0] = yaw_stiffness(c, w)
+    J[1, 1] = c.a
+    J[1, 2] = rudder_effect_rate(c, v, 1.0, n, 0.0) * (c.d * delta + c.e * delta_dot)
+    J[2, 0], J[2, 2] = 2 * c.f * w, 2 * c.g * v
+
+
+@compiled
+def predict(
+    c: Coefficients,
+    x: FloatArray,
+    F: FloatArray,
+    delta: float,
+    delta_dot: float,
+    n: float,
+    n_dot: float,
+    dt: float,
+) -> None:
+    """One Runge-Kutta step of the ship, and of its derivative by the state into F[:3, :3].
+
+    The rudder and the revolutions move evenly; the wave, beyond the third state, goes by F.
+    """
+    eye = np.eye(3)
+    J, slopes = np.zeros((3, 3)), np.zeros((4, 3, 3))
+    rates, at = np.empty((4, 3)), np.empty(3)
+    for stage in range(4):
+        share = (0.0, 0.5, 0.5, 1.0)[stage]
+        h = share * dt
+        for i in range(3):
+            at[i] = x[i] + (h * rates[stage - 1, i] if stage else 0.0)
+        turned, turns = delta + delta_dot * h, n + n_dot * h
+        rates[stage, 0] = at[1]
+        rates[stage, 1] = yaw_acceleration_rate(c, at[0], at[1], at[2], turns, turned, delta_dot)
+        rates[stage, 2] = surge_acceleration(c, at[0], at[2], turns)
+        linearise(c, at, turned, delta_dot, turns, J)
+        for i in range(3):
+            for j in range(3):
+                slopes[stage, i, j] = J[i, j]
+                if stage:
+                    for m in range(3):
+                        slopes[stage, i, j] += h * J[i, m] * slopes[stage - 1, m, j]
+    for i in range(3):
+        x[i] += dt / 6 * (rates[0, i] + 2 * rates[1, i] + 2 * rates[2, i] + rates[3, i])
+        for j in range(3):
+            sum_of = slopes[0, i, j] + 2 * slopes[1, i, j] + 2 * slopes[2, i, j] + slopes[3, i, j]
+            F[i, j] = eye[i, j] + dt / 6 * sum_of
+    _turn_wave(x, F)
+
+
+@compiled
+def _turn_wave(x: FloatArray, F: FloatArray) -> None:
+    size = len(x)
+    if size > 3:
+        turned = np.zeros(size)
+        for i in range(3, size):
+            for j in range(3, size):
+                turned[i] += F[i, j] * x[j]
+        for i in range(3, size):
+            x[i] = turned[i]

@@ -1,0 +1,233 @@
+"""What is known of a trial before it is replayed, from two passes over its log.
+
+First it is surveyed; then it is put on one clock to see what its signals usually do, and to fit
+what is fitted to the whole of it.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import sqrt
+
+import numpy as np
+
+from shiplog import Channel, LogError, Signals, Vessel
+from shiplog.clock import Clock, on_clock, set_clock
+from shiplog.gyro_bias import GyroWatch
+from shiplog.quality import faults
+from shiplog.rudder_sign import RudderWatch
+from shiplog.settings import DisturbanceSettings, FilterSettings
+from shiplog.ship import INPUTS, OUTPUTS, Coefficients
+from shiplog.survey import Survey, survey_log
+from shiplog.types import FloatArray, Log
+from shiplog.vessel import parse_vessel, with_settings
+
+from .doubts import doubtful, silent_ends
+from .filters.noise import Noise
+from .filters.tuning import noise_of, wave_in
+from .first_model import BARE, fit_first_model
+from .gauge import Gauge, Gauger
+from .identification import Identifier
+from .inputs import InputHold
+from .weak_form import WeakForm
+
+FITTED = "a first model, fitted to this log"
+FEWEST = 4  # samples of an output: their third difference shows its noise
+NEEDED = (*OUTPUTS, *INPUTS)
+USUAL_SEA = 0.6  # rad/s, where no wave shows
+
+Tell = Callable[[str, float], None]  # the step, and the share of it that is done
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What is known of a trial before it is replayed."""
+
+    survey: Survey
+    clock: Clock
+    vessel: Vessel
+    model_origin: str  # where the model came from, in words
+    usual: Gauge
+    noise: Noise
+    observed: DisturbanceSettings  # the vessel's, with what the log tells of a wave
+    warnings: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The log's."""
+        return self.survey.name
+
+    @property
+    def as_usual(self) -> bool:
+        """Whether filter and observer are those of a vessel file that says nothing of them."""
+        usual = FilterSettings().chosen, DisturbanceSettings().models
+        return (self.vessel.filter.chosen, self.observed.models) == usual
+
+
+class Planner:
+    """Goes through a log twice; `yaw` and `surge` then know the whole trial's equations."""
+
+    def __init__(
+        self, log: Log, vessel: Vessel | None, settings: Mapping[str, object], tell: Tell
+    ) -> None:
+        self._log, self._tell = log, tell
+        self._warnings: list[str] = []
+        stated = _stated_model(log, vessel, settings)
+        survey, clock = self._surveyed()
+        usual, self.yaw, self.surge = self._gauged(survey, clock, stated[0] if stated else None)
+        tell("model", 0.0)
+        vessel, origin = stated or (with_settings(self._first_model(usual), settings), FITTED)
+        noise = self._noise(vessel, survey, clock, usual)
+        observed = self._observed(vessel, usual, noise)
+        self.plan = Plan(
+            survey, clock, vessel, origin, usual, noise, observed, tuple(self._warnings)
+        )
+
+    def _surveyed(self) -> tuple[Survey, Clock]:
+        """The first time through the log."""
+        self._tell("check", 0.0)
+        found = survey_log(self._log, strict=True)
+        lacking = [name for name in NEEDED if name not in found]
+        if lacking:
+            has = ", ".join(sorted({channel.name for channel in found}))
+            raise LogError(
+                f"no channel {lacking[0]!r} in {found.name}; it has {has or 'none'}; "
+                f"a replay needs {', '.join(NEEDED)}"
+            )
+        also = tuple(name for name in ("heading", "position") if name in found)
+        self._warnings += [*self._log.warnings, *faults(found, (*NEEDED, *also))]
+        return found, set_clock(self._log, found, channels=NEEDED, optional=("heading",))
+
+    def _gauged(
+        self, found: Survey, clock: Clock, vessel: Vessel | None
+    ) -> tuple[Gauge, Identifier, Identifier]:
+        """The second time: what is usual, and the whole trial's yaw and surge equations.
+
+        For these one must know how far apart samples stand on the clock, which is only told by
+        then. It is nearly always what the survey lets expect; where not, they are made once more.
+        """
+        alphas = vessel.coefficients if vessel else BARE
+        doubts = RudderWatch(found), GyroWatch(found)
+        holding, gauger = InputHold(clock), Gauger(alphas)
+        expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in OUTPUTS]
+        equations = _Equations(alphas, clock, np.maximum(np.round(expected), 1.0))
+        watches = holding.add_raw, *(doubt.add for doubt in doubts)
+        for signals in signals_of(self._log, clock, self._tell, "one clock", *watches):
+            gauger.add(holding.step(signals))
+            equations.add(signals, gauger.fastest)
+        usual = gauger.result()
+        if not np.array_equal(usual.intervals, equations.intervals):
+            equations = _Equations(alphas, clock, usual.intervals)
+            for signals in signals_of(self._log, clock, self._tell, "one clock"):
+                equations.add(signals, usual.fastest)
+        _require_outputs(self._log, usual)
+        self._warnings += doubtful(found, NEEDED)
+        self._warnings += [said for doubt in doubts if (said := doubt.result())]
+        self._warnings += [*silent_ends(found, clock, NEEDED), *holding.said()]
+        return usual, equations.yaw, equations.surge
+
+    def _first_model(self, usual: Gauge) -> Vessel:
+        vessel = fit_first_model(self.yaw, self.surge, usual, self._log.name)
+        model = vessel.coefficients
+        if not (model.a < 0 and model.g <= 0 and model.h >= 0):
+            self._warnings.append(
+                "the model fitted to this log is no ship's: too little moves in it to tell"
+            )
+        return vessel
+
+    def _noise(self, vessel: Vessel, found: Survey, clock: Clock, usual: Gauge) -> Noise:
+        settings = _averaged(vessel.filter, found, clock.dt_secs)
+        noise = noise_of(usual, vessel.coefficients, settings)
+        if settings.wave and noise.wave is None:
+            self._warnings.append(
+                "no wave stands out of the yaw rate's residual: none is told from the ship's "
+                "turning; state filter.wave_frequency and filter.wave_std if there is one"
+            )
+        return noise
+
+    def _observed(self, vessel: Vessel, usual: Gauge, noise: Noise) -> DisturbanceSettings:
+        """What shall be observed, with the frequency of a wave if the file does not state it."""
+        wanted = vessel.disturbance
+        if "wave" not in wanted.models or wanted.wave_frequency is not None:
+            return wanted
+        wave = wave_in(usual, vessel.coefficients, noise, vessel.filter)
+        if wave is not None and wave.stands_out:
+            return replace(wanted, wave_frequency=wave.frequency)
+        self._warnings.append(
+            f"no wave stands out of the yaw rate's residual: one of {USUAL_SEA:g} rad/s is"
+            " observed, where the sea often is; state disturbance.wave_frequency"
+        )
+        return replace(wanted, wave_frequency=USUAL_SEA)
+
+
+def signals_of(
+    log: Log,
+    clock: Clock,
+    tell: Tell,
+    step: str,
+    *watches: Callable[[tuple[Channel, ...]], None],
+) -> Iterator[Signals]:
+    """A log on its clock; each slab of it is shown to the watches before it is placed."""
+
+    def watched() -> Iterator[tuple[Channel, ...]]:
+        for slab in log.slabs():
+            for watch in watches:
+                watch(slab)
+            yield slab
+
+    tell(step, 0.0)
+    for signals in on_clock(watched(), clock):
+        yield signals
+        tell(step, (signals.first + len(signals)) / clock.count)
+
+
+class _Equations:
+    """The whole trial's equations of yaw and surge, from signals in slabs."""
+
+    def __init__(self, alphas: Coefficients, clock: Clock, intervals: FloatArray) -> None:
+        self.intervals = intervals
+        self._weak_form = weak_form_of(alphas, clock, intervals)
+        count = self._weak_form.row_count
+        self.yaw = Identifier(self._weak_form.yaw, count, constant=True)
+        self.surge = Identifier(self._weak_form.surge, count)
+
+    def add(self, signals: Signals, fastest: float) -> None:
+        """Take the next signals; `fastest` is the greatest speed so far, m/s."""
+        yaw_rows, surge_rows = self._weak_form.step(signals, fastest)
+        self.yaw.add(yaw_rows)
+        self.surge.add(surge_rows)
+
+
+def weak_form_of(model: Coefficients, clock: Clock, intervals: FloatArray) -> WeakForm:
+    """The equations in integral form; the inputs are known at every instant, but for their gaps."""
+    return WeakForm(model, clock.count, clock.dt_secs, (*intervals.tolist(), 1.0, 1.0))
+
+
+def _stated_model(
+    log: Log, given: Vessel | None, settings: Mapping[str, object]
+) -> tuple[Vessel, str] | None:
+    """The vessel that is known beforehand, with the settings given in place of its own."""
+    if given is not None:
+        return with_settings(given, settings), "given"
+    if log.vessel_toml is not None:
+        carried = parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}")
+        return with_settings(carried, settings), "carried by the log"
+    with_settings(Vessel("", BARE), settings)  # what is wrong with them is said before any work
+    return None
+
+
+def _require_outputs(log: Log, usual: Gauge) -> None:
+    for name, count in zip(OUTPUTS, usual.measured, strict=True):
+        if count < FEWEST:
+            raise LogError(
+                f"channel {name!r} has {count} samples while the others are there too, "
+                f"and {FEWEST} are needed; check the recorder or choose another log: {log.name}"
+            )
+
+
+def _averaged(settings: FilterSettings, found: Survey, dt_secs: float) -> FilterSettings:
+    """The noise stated for one sample, as it is in the mean of those that share an instant."""
+    stds = []
+    for name, std in zip(OUTPUTS, (settings.yaw_rate_std, settings.speed_std), strict=True):
+        together = max(1.0, dt_secs / found[name].usual_secs)
+        stds.append(None if std is None else std / sqrt(together))
+    return replace(settings, yaw_rate_std=stds[0], speed_std=stds[1])

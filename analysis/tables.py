@@ -1,0 +1,180 @@
+"""What a replay found as tables and words: for the terminal, and for Rerun's page."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import degrees, isfinite, pi
+
+import numpy as np
+
+from shiplog.units import CATALOGUE, factor
+
+from .disturbance import DISTURBANCE_UNITS
+from .pipeline import Findings
+from .plan import FITTED
+from .residuals import OutputResiduals
+
+DISTURBANCES = {
+    "rudder": "yaw, as rudder",
+    "yaw": "yaw",
+    "yaw_wave": "yaw, wave",
+    "surge": "surge",
+    "surge_wave": "surge, wave",
+}
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table for people."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    remarks: tuple[str, ...] = ()
+
+
+def sections(findings: Findings) -> tuple[Section, ...]:
+    """The summary as tables, in the units people use, and its verdicts in words."""
+    return (
+        _log_section(findings),
+        _filter_section(findings),
+        _disturbance_section(findings),
+        _coefficient_section(findings),
+    )
+
+
+def markdown(findings: Findings) -> str:
+    """The summary as a page of text."""
+    blocks = [f"# {findings.name}"]
+    log, *found = sections(findings)
+    for section in (*found, log):  # what was found first: a page is read from its top
+        blocks += [f"## {section.title}", _markdown_table(section.columns, section.rows)]
+        blocks += [f"*{remark}*" for remark in section.remarks]
+    if findings.warnings:
+        blocks += ["## Warnings", "\n".join(f"- {warning}" for warning in findings.warnings)]
+    return "\n\n".join(blocks) + "\n"
+
+
+def _markdown_table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    columns = [column or " " for column in columns]
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _log_section(findings: Findings) -> Section:
+    survey, rows = findings.survey, []
+    for channel in survey:
+        rate = f"{1 / channel.usual_secs:.3g} Hz" if channel.usual_secs else ""
+        gaps = "none"
+        if channel.gaps:
+            longest = max(length for _, length in channel.gaps)
+            gaps = f"{len(channel.gaps)}, the longest {longest:.1f} s"
+        rows.append((channel.topic, f"{channel.samples}", rate, gaps))
+    start = np.datetime64(survey.span_ns[0], "ns").astype("M8[s]")
+    title = f"Log, {survey.duration_secs:.0f} s from {start} UTC"
+    return Section(title, ("channel", "samples", "rate", "gaps"), tuple(rows))
+
+
+def _filter_section(findings: Findings) -> Section:
+    fitted = findings.model_origin == FITTED
+    model = FITTED if fitted else f"{findings.vessel.name} ({findings.model_origin})"
+    rows, remarks = [], [f"Model: {model}.", _chosen(findings)]
+    for residuals in findings.residuals:
+        unit = CATALOGUE[residuals.name].display_unit
+        rms = residuals.rms * factor(residuals.unit, unit)
+        rows.append(
+            (
+                f"{residuals.name} [{unit}]",
+                f"{rms:.3g}",
+                f"{residuals.normalised_squared:.4g}",
+                f"{residuals.whiteness_p:.2g}",
+                f"{residuals.gated}",
+            )
+        )
+        remarks.append(_verdict(residuals))
+    columns = ("output", "innovation rms", "normalised, squared (1)", "whiteness p", "gated")
+    return Section("Filter", columns, tuple(rows), tuple(remarks))
+
+
+def _chosen(findings: Findings) -> str:
+    """Which filter it was, in words."""
+    settings, wave = findings.vessel.filter, findings.noise.wave
+    smoothed = ", smoothed from the end back" if settings.smooth else ""
+    said = f"Filter: {settings.chosen}{smoothed}; gated: off by over {settings.gate:g} σ."
+    if wave is None:
+        return said
+    return (
+        f"{said} Waves of {degrees(wave.std):.2g} deg/s rms about {wave.frequency:.3g} rad/s "
+        f"({2 * pi / wave.frequency:.3g} s) are told from the ship's turning."
+    )
+
+
+def _verdict(residuals: OutputResiduals) -> str:
+    size = ""
+    if not residuals.consistent:
+        larger = residuals.normalised_squared > residuals.expected[1]
+        size = f"; they are {'larger' if larger else 'smaller'} than the noise assumed"
+    if residuals.white is None:
+        return f"{residuals.name}: the innovations cannot be told to be white or not{size}."
+    if residuals.white:
+        return f"{residuals.name}: innovations are white (test at 1 %){size}."
+    return (
+        f"{residuals.name}: innovations are NOT white (test at 1 %){size}: "
+        "the model or the noise does not explain the data."
+    )
+
+
+def _disturbance_section(findings: Findings) -> Section:
+    rows = []
+    for name, label in DISTURBANCES.items():
+        if name not in findings.courses:
+            continue
+        course, (_, unit, scale) = findings.courses[name], DISTURBANCE_UNITS[name]
+        values = (course.mean, course.rms, course.last, course.std)
+        rows.append(
+            (f"{label} [{unit}]", *(f"{v * scale:.3g}" if isfinite(v) else "" for v in values))
+        )
+    columns = ("disturbance", "mean", "rms", "at the end", "std by noise")
+    caution = (
+        "As rudder: the angle that would do the same at the speed then. "
+        "The std is by sensor noise alone; an error of the model counts as a disturbance."
+    )
+    remarks = [f"Models: {_observed(findings)}.", caution]
+    if findings.model_origin == FITTED:
+        remarks.append("The model was fitted to this log: this is what it leaves unexplained.")
+    return Section("Disturbance observed", columns, tuple(rows), tuple(remarks))
+
+
+def _observed(findings: Findings) -> str:
+    """Which disturbances were looked for, in words."""
+    settings = findings.observed
+    said = ", ".join(settings.models)
+    if settings.wave_frequency is None or "wave" not in settings.models:
+        return said
+    return f"{said} of {settings.wave_frequency:.3g} rad/s"
+
+
+def _coefficient_section(findings: Findings) -> Section:
+    model, rows = findings.vessel.coefficients._asdict(), []
+    for found in (findings.yaw, findings.surge):
+        for name, coefficient in found.coefficients.items():
+            value, std = f"{coefficient.value:.4g}", f"{coefficient.std:.2g}"
+            if not coefficient.determined:
+                value, std = "not determined", f"{coefficient.std:.2g}" if std != "nan" else ""
+            rows.append((name, value, std, coefficient.unit, f"{model[name]:.4g}"))
+    if findings.model_origin == FITTED:  # beside itself it would only seem confirmed
+        rows = [(*row[:-1], "") for row in rows]
+    remark = (
+        f"Condition of the scaled regressors: yaw {findings.yaw.condition:.0f}, "
+        f"surge {findings.surge.condition:.0f}. "
+        "Not determined: the log cannot tell it from the others, or not even its sign. "
+        "Two standard deviations are about a 95 % interval, less where a few seconds tell all. "
+        "A gyro's bias goes into b1, b2, b3 and e."
+    )
+    remarks = [remark]
+    if findings.model_origin == FITTED:
+        remarks.append(
+            "With no model the rudder is taken to work in proportion to the speed (α = 1, 0, 0): "
+            "d and e are not to be laid beside those of a vessel whose slipstream is known."
+        )
+    columns = ("coefficient", "from this log", "std", "unit", "in the model")
+    return Section("Coefficients", columns, tuple(rows), tuple(remarks))

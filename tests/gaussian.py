@@ -1,0 +1,104 @@
+"""Linear Gaussian models without a recursion: all states of a run at once, and what they cost."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.stats import chi2
+
+
+def held(A: np.ndarray, Q: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """exp(A dt), and the covariance of white noise of intensity Q after dt, by quadrature."""
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    at = dt / 2 * (1 + nodes)
+    spread = [w * expm(A * t) @ Q @ expm(A * t).T for w, t in zip(weights, at, strict=True)]
+    return expm(A * dt), dt / 2 * np.sum(spread, axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearRun:
+    """x about its mean: x+ = F x + noise of Q, the first of covariance P; y = C x + noise of r."""
+
+    mean: np.ndarray  # (n, s) of the states, if nothing is measured
+    F: np.ndarray
+    Q: np.ndarray
+    P: np.ndarray
+    C: np.ndarray  # (2, s)
+    r: np.ndarray  # (2,) variances
+
+    def covariance(self) -> np.ndarray:
+        """(n s, n s) of all states of the run."""
+        n, s = self.mean.shape
+        whole, own = np.empty((n, s, n, s)), self.P
+        for i in range(n):
+            later = own
+            for j in range(i, n):
+                whole[j, :, i], whole[i, :, j] = later, later.T
+                later = self.F @ later
+            own = self.F @ own @ self.F.T + self.Q
+        return whole.reshape(n * s, n * s)
+
+    def given(self, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """States (n, s) and covariances (n, s, s), all that is not NaN in (n, 2) being known."""
+        n, s = self.mean.shape
+        prior = self.covariance()
+        seen = np.isfinite(measured).ravel()
+        H = np.kron(np.eye(n), self.C)[seen]
+        S = H @ prior @ H.T + np.diag(np.tile(self.r, n)[seen])
+        gain = np.linalg.solve(S, H @ prior).T
+        off = measured.ravel()[seen] - H @ self.mean.ravel()
+        states = self.mean + (gain @ off).reshape(n, s)
+        blocks = (prior - gain @ H @ prior).reshape(n, s, n, s)
+        return states, np.array([blocks[k, :, k] for k in range(n)])
+
+    def filtered(self, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As `given`, each instant's by what was measured until then."""
+        states, covariances = [], []
+        for k in range(len(measured)):
+            known = np.where(np.arange(len(measured))[:, None] <= k, measured, np.nan)
+            x, P = self.given(known)
+            states.append(x[k])
+            covariances.append(P[k])
+        return np.array(states), np.array(covariances)
+
+    def drawn(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        """True states (n, s) and what is measured of them, (n, 2), at every instant."""
+        n, s = self.mean.shape
+        off = np.empty((n, s))
+        off[0] = draws(rng, self.P, 1)[0]
+        for k, noise in enumerate(draws(rng, self.Q, n - 1)):
+            off[k + 1] = self.F @ off[k] + noise
+        states = self.mean + off
+        return states, states @ self.C.T + np.sqrt(self.r) * rng.standard_normal((n, 2))
+
+
+def draws(rng: np.random.Generator, covariance: np.ndarray, count: int) -> np.ndarray:
+    """(count, s) of a covariance that may be singular."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    return rng.standard_normal((count, len(root))) @ root.T
+
+
+def normalised_squared(errors: np.ndarray, covariances: np.ndarray) -> np.ndarray:
+    """e' P^-1 e of errors (..., s), the units being any."""
+    scale = np.sqrt(np.diagonal(covariances, axis1=-2, axis2=-1))
+    P = covariances / (scale[..., :, None] * scale[..., None, :])
+    e = errors / scale
+    return np.einsum("...i,...i->...", e, np.linalg.solve(P, e[..., None])[..., 0])
+
+
+def apart(
+    found: tuple[np.ndarray, np.ndarray], expected: tuple[np.ndarray, np.ndarray]
+) -> tuple[float, float]:
+    """How far states and covariances are from those expected, in these' standard deviations."""
+    (x, P), (states, covariances) = found, expected
+    scale = np.sqrt(np.diagonal(covariances, axis1=-2, axis2=-1))
+    off = np.abs(P - covariances) / (scale[..., :, None] * scale[..., None, :])
+    return float(np.max(np.abs(x - states) / scale)), float(np.max(off))
+
+
+def band(count: int) -> tuple[float, float]:
+    """Where 99 % of chi-squared numbers of that many degrees of freedom are."""
+    low, high = chi2.ppf([0.005, 0.995], count)
+    return float(low), float(high)

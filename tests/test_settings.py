@@ -1,0 +1,145 @@
+"""The settings of filter and observer, from a vessel file, the command line and Python alike."""
+
+from dataclasses import fields
+
+import pytest
+
+from shiplog import Vessel, load_vessel
+from shiplog.arguments import parser, replay_settings
+from shiplog.errors import UsageError, VesselError
+from shiplog.settings import (
+    DISTURBANCES,
+    FILTERS,
+    SMOOTHED,
+    DisturbanceSettings,
+    FilterSettings,
+    as_table,
+    disturbance_settings,
+    filter_settings,
+)
+from shiplog.vessel import PRESETS, parse_vessel, with_settings
+
+
+def faults_of(section: str, table: dict[str, object]) -> str:
+    faults: list[str] = []
+    parse = filter_settings if section == "filter" else disturbance_settings
+    parse(table, faults)
+    return "; ".join(faults)
+
+
+def given(*arguments: str) -> dict[str, object]:
+    return replay_settings(parser().parse_args(["replay", "x.mcap", *arguments]))
+
+
+def test_what_a_vessel_file_leaves_out_is_the_papers() -> None:
+    vessel, _ = load_vessel("table1")
+    assert vessel.filter.chosen == "pseudo-input"
+    assert not vessel.filter.smooth
+    assert vessel.disturbance.models == ("constant",)
+    assert (vessel.disturbance.yaw_frequency, vessel.disturbance.spectrum) == (0.05, "butterworth")
+
+
+@pytest.mark.parametrize("kind", FILTERS)
+def test_every_filter_can_be_named_in_a_vessel_file(kind: str) -> None:
+    text = PRESETS["table1"] + f'kind = "{kind}"\ngate = 4\n'
+    vessel = parse_vessel(text, "ship.toml")
+    assert vessel.filter.chosen == kind
+    assert vessel.filter.gate == 4.0
+
+
+@pytest.mark.parametrize("models", [["wave"], ["constant", "wave"], list(DISTURBANCES)])
+def test_every_disturbance_can_be_named_in_a_vessel_file(models: list[str]) -> None:
+    vessel = parse_vessel(f"{PRESETS['table1']}\n[disturbance]\nmodels = {models}\n", "ship.toml")
+    assert vessel.disturbance.models == tuple(models)
+
+
+@pytest.mark.parametrize("settings", [FilterSettings(kind="quality"), DisturbanceSettings()])
+def test_settings_are_their_table_and_back(settings: FilterSettings | DisturbanceSettings) -> None:
+    faults: list[str] = []
+    parse = filter_settings if isinstance(settings, FilterSettings) else disturbance_settings
+    assert parse(as_table(settings), faults) == settings
+    assert not faults
+
+
+def test_a_wave_is_told_by_a_filter_that_has_room_for_it() -> None:
+    assert FilterSettings(wave=True).chosen == "extended"
+    said = faults_of("filter", {"kind": "pseudo-input", "wave": True})
+    assert said == "filter.kind = 'pseudo-input' has no room for a wave; take 'extended'"
+
+
+@pytest.mark.parametrize("kind", [kind for kind in FILTERS if kind not in SMOOTHED])
+def test_what_has_not_the_best_gain_is_not_smoothed(kind: str) -> None:
+    said = faults_of("filter", {"kind": kind, "smooth": True})
+    assert said.endswith("take 'pseudo-input' or 'extended'")
+    assert kind in said
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value", "said"),
+    [
+        ("filter", "kind", "kalman", "filter.kind must be one of pseudo-input, steady-state"),
+        ("filter", "smooth", 1, "filter.smooth must be true or false, got 1"),
+        ("filter", "gate", 0, "filter.gate must be positive, got 0"),
+        ("filter", "gate", "6", "filter.gate must be a number, got '6'"),
+        ("filter", "shift", -0.1, "filter.shift must lie between 0 and inf, got -0.1"),
+        ("filter", "wave_damping", 2.0, "filter.wave_damping must lie between -inf and 1, got 2"),
+        ("filter", "speed_std", float("nan"), "filter.speed_std must be finite, got nan"),
+        ("filter", "yaw_rate_std", True, "filter.yaw_rate_std must be a number, got True"),
+        ("filter", "shfit", 0.1, "unknown key 'filter.shfit', did you mean 'shift'?"),
+        ("disturbance", "models", [], "must be a list of some of constant, ramp, wave, got []"),
+        ("disturbance", "models", "wave", "must be a list of some of constant, ramp, wave"),
+        ("disturbance", "models", ["swell"], "must be a list of some of constant, ramp, wave"),
+        ("disturbance", "spectrum", "bessel", "disturbance.spectrum must be one of butterworth"),
+        ("disturbance", "yaw_frequency", -1, "disturbance.yaw_frequency must be positive, got -1"),
+    ],
+)
+def test_a_value_that_does_not_do_is_named(
+    section: str, key: str, value: object, said: str
+) -> None:
+    assert said in faults_of(section, {key: value})
+
+
+def test_a_section_that_is_none_and_other_faults_are_told_together() -> None:
+    with pytest.raises(VesselError, match=r"2 faults.*\[filter\] must be a section"):
+        parse_vessel('filter = 3\nlength = "long"\n' + PRESETS["table1"].split("[filter]")[0], "x")
+
+
+def test_settings_given_stand_above_the_vessels_own(vessel: Vessel) -> None:
+    changed = with_settings(vessel, {"filter.kind": "extended", "disturbance.models": ["ramp"]})
+    assert changed.filter.kind == "extended"
+    assert changed.filter.process_ratio == vessel.filter.process_ratio
+    assert changed.disturbance.models == ("ramp",)
+    assert changed.coefficients == vessel.coefficients
+    assert with_settings(vessel, {}) is vessel
+
+
+def test_settings_of_another_kind_are_refused_all_at_once(vessel: Vessel) -> None:
+    with pytest.raises(UsageError) as caught:
+        with_settings(vessel, {"yaw.T1": 3.0, "filter.gate": -1.0, "disturbance.modles": ["wave"]})
+    for said in ("'yaw.T1'", "filter.gate must be positive", "did you mean 'models'?"):
+        assert said in str(caught.value)
+
+
+def test_the_command_line_gives_them_by_name() -> None:
+    assert given() == {}
+    assert given("--filter", "quality", "--set", "filter.shift=0.2") == {
+        "filter.kind": "quality",
+        "filter.shift": 0.2,
+    }
+    assert given("--smooth", "--wave") == {"filter.smooth": True, "filter.wave": True}
+    assert given("--disturbance", "ramp,wave", "--set", "disturbance.spectrum=binomial") == {
+        "disturbance.models": ["ramp", "wave"],
+        "disturbance.spectrum": "binomial",
+    }
+    assert given("--set", 'disturbance.models=["ramp"]') == {"disturbance.models": ["ramp"]}
+
+
+@pytest.mark.parametrize("text", ["filter.gate", "=3", "filter.gate="])
+def test_a_setting_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="--set wants KEY=VALUE"):
+        given("--set", text)
+
+
+def test_every_field_states_what_it_may_be() -> None:
+    for kind in (FilterSettings, DisturbanceSettings):
+        assert all("kind" in field.metadata for field in fields(kind))
