@@ -1,7 +1,7 @@
 """What a paper prints against what shiplog computes: tables and pictures of a Markdown page.
 
 A script calls `page` first, then `say`, `table`, `grid` and `picture`; what it prints is its page
-in docs/. Pictures go to docs/images/papers, or to the folder that `--figures` names.
+in docs/. Pictures go to a folder of docs/images, or to the one that `--figures` names.
 """
 
 import argparse
@@ -51,8 +51,12 @@ class Row(NamedTuple):
     remark: str = ""
 
 
-def page(title: str) -> None:
-    """The page's title; reads the command line and sets how pictures look."""
+def page(title: str, pictures: str = "papers") -> None:
+    """The page's title; reads the command line and sets how pictures look.
+
+    They go to the folder `pictures` of docs/images, unless the command line names another.
+    """
+    _command_line().set_defaults(figures=DOCS / "images" / pictures)
     _folder()
     mpl.use("Agg")
     mpl.rcParams.update(STYLE)
@@ -100,18 +104,19 @@ def number(value: float, digits: int = 6) -> str:
 
 
 @cache
-def _folder() -> Path:
+def _command_line() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        description="Print a paper's numbers beside ours as a Markdown page, and draw its figures."
+        description="Print numbers as a Markdown page of the docs, and draw its figures."
     )
     parser.add_argument(
-        "--figures",
-        metavar="FOLDER",
-        type=Path,
-        default=DOCS / "images" / "papers",
-        help="where the pictures go (docs/images/papers)",
+        "--figures", metavar="FOLDER", type=Path, help="where the pictures go (docs/images/...)"
     )
-    folder: Path = parser.parse_args().figures
+    return parser
+
+
+@cache
+def _folder() -> Path:
+    folder: Path = _command_line().parse_args().figures
     return folder
 
 
