@@ -1,20 +1,57 @@
 """numba's `njit` with a type: the compiled functions read like the equations they are."""
 
 import os
+import shutil
 import tempfile
+import time
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 from typing import TypeVar, cast
-
-if "NUMBA_CACHE_DIR" not in os.environ and not os.access(Path(__file__).parent, os.W_OK):
-    # installed where the user may not write: keep the compiled code beside their other caches
-    _home_cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    _parent = _home_cache if os.access(_home_cache, os.W_OK) else Path(tempfile.gettempdir())
-    os.environ["NUMBA_CACHE_DIR"] = str(_parent / f"shiplog-{os.getuid()}")
 
 import numba
 
 F = TypeVar("F", bound=Callable[..., object])
+
+OUTDATED_SECS = 86_400.0  # machine code of other sources may still be another process's
+
+
+def _kept() -> Path:
+    """Where machine code is kept: a folder named after all that is compiled.
+
+    Machine code holds what it calls, and numba looks at the file of the caller alone: without this
+    a change in one module would leave the old loops of another running.
+    """
+    ours, digest = Path(__file__).parents[1], sha256()
+    for package in ("shiplog", "recorders", "analysis"):
+        for path in sorted((ours / package).rglob("*.py")):
+            source = path.read_bytes()
+            if b"@compiled" in source:
+                digest.update(source)
+    where = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _usual_place()
+    return where / f"shiplog-{digest.hexdigest()[:16]}"
+
+
+def _usual_place() -> Path:
+    """Beside the package, or, where the user may not write, beside their other caches."""
+    beside = Path(__file__).parent
+    if os.access(beside, os.W_OK):
+        return beside / "__pycache__"
+    home = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    return (home if os.access(home, os.W_OK) else Path(tempfile.gettempdir())) / (
+        f"shiplog-{os.getuid()}"
+    )
+
+
+def _forget_others(kept: Path) -> None:
+    for other in kept.parent.glob("shiplog-*"):
+        if other != kept and time.time() - other.stat().st_mtime > OUTDATED_SECS:
+            shutil.rmtree(other, ignore_errors=True)
+
+
+KEPT = _kept()
+numba.config.CACHE_DIR = str(KEPT)
+_forget_others(KEPT)
 
 
 def compiled(function: F) -> F:
@@ -24,6 +61,4 @@ def compiled(function: F) -> F:
 
 def is_compiled(package: str) -> bool:
     """Whether machine code of a package of ours is kept from an earlier run."""
-    kept = os.environ.get("NUMBA_CACHE_DIR")
-    place = Path(kept) if kept else Path(__file__).parents[1] / package
-    return next(place.rglob("*.nbi"), None) is not None
+    return next(KEPT.rglob(f"{package}*/*.nbi"), None) is not None

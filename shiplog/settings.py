@@ -46,6 +46,7 @@ class FilterSettings:
     speed_std: float | None = _number(positive=True)  # m/s
     # pseudo-input: process to measurement intensity, 1/s^2, the paper's Q/R
     process_ratio: float | None = _number(positive=True)
+    as_printed: bool = _flag()  # pseudo-input: without the jumps that the rudder makes
     # the others: how fast the estimate follows what is measured, rad/s
     yaw_bandwidth: float | None = _number(positive=True)
     surge_bandwidth: float | None = _number(positive=True)

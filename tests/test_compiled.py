@@ -1,28 +1,58 @@
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import shiplog
+
 CODE = """
-import sys
-from shiplog.compiled import compiled, is_compiled
-print(is_compiled("shiplog"), end=" ")
-from shiplog.ship import Coefficients, rudder_effect
+from shiplog.compiled import is_compiled
+print(is_compiled("shiplog"), is_compiled("analysis"), end=" ")
+from shiplog.ship import Coefficients, rudder_effect, surge_acceleration
 c = Coefficients(*[1.0] * 12)
-print(rudder_effect(c, 0.0, 2.0), is_compiled("shiplog"))
+print(rudder_effect(c, 0.0, 2.0), is_compiled("shiplog"), is_compiled("analysis"))
 """
 
 
+def said(kept: Path, where: Path) -> list[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", CODE],
+        env=os.environ | {"NUMBA_CACHE_DIR": str(kept)},
+        cwd=where,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.split()
+
+
 def test_machine_code_is_kept_for_later_runs_and_a_first_run_is_known(tmp_path: Path) -> None:
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    said = [
-        subprocess.run(
-            [sys.executable, "-c", CODE],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout.split()
-        for _ in range(2)
-    ]
-    assert said == [["False", "2.0", "True"], ["True", "2.0", "True"]]
+    first, second = said(tmp_path, tmp_path), said(tmp_path, tmp_path)
+    assert first == ["False", "False", "2.0", "True", "False"]
+    assert second == ["True", "False", "2.0", "True", "False"]
+
+
+def test_machine_code_of_other_sources_is_not_taken(tmp_path: Path) -> None:
+    """What a loop calls may stand in another file, which numba does not look at."""
+    home = Path(shiplog.__file__).parents[1]
+    for package in ("shiplog", "analysis", "recorders"):
+        shutil.copytree(
+            home / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
+        )
+    kept = tmp_path / "kept"
+    assert said(kept, tmp_path)[0] == "False"
+    assert said(kept, tmp_path)[0] == "True"
+    other = tmp_path / "analysis" / "moments.py"
+    other.write_text(other.read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    assert said(kept, tmp_path)[0] == "False"
+
+
+def test_outdated_machine_code_is_deleted_and_recent_is_left(tmp_path: Path) -> None:
+    old, recent = tmp_path / "shiplog-0123", tmp_path / "shiplog-4567"
+    for folder in (old, recent):
+        folder.mkdir()
+    os.utime(old, (0, 0))
+    said(tmp_path, tmp_path)
+    assert not old.exists()
+    assert recent.exists()

@@ -35,14 +35,15 @@ def test_a_page_is_what_its_script_prints(script: Path, tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    kind, name = ("methods", "methods") if script == METHODS else ("papers", f"papers_{script.stem}")
-    page = (PROJECT / "docs" / f"{name}.md").read_text(encoding="utf-8")
-    pictures = re.findall(rf"images/{kind}/([\w.]+)\)", page)
+    kind = "methods" if script == METHODS else "papers"
+    page = PROJECT / "docs" / f"{'' if script == METHODS else 'papers_'}{script.stem}.md"
+    printed = page.read_text(encoding="utf-8")
+    pictures = re.findall(rf"images/{kind}/([\w.]+)\)", printed)
     assert sorted(pictures) == sorted(path.name for path in tmp_path.iterdir())
     assert all((PROJECT / "docs" / "images" / kind / name).is_file() for name in pictures)
     if RECORDED not in done.stdout:
-        page = page.split(RECORDED)[0]
-    assert skeleton(done.stdout) == skeleton(page)
+        printed = printed.split(RECORDED)[0]
+    assert skeleton(done.stdout) == skeleton(printed)
 
 
 def test_every_paper_has_its_page_in_the_index() -> None:

@@ -14,7 +14,11 @@ from filter_runs import (
 )
 from gaussian import apart
 
-from analysis.design.pseudo_input import pseudo_input_matrices, pseudo_inputs
+from analysis.design.pseudo_input import (
+    printed_input_matrix,
+    pseudo_input_matrices,
+    pseudo_inputs,
+)
 from analysis.filters.kinds import filter_states, make_filter
 from analysis.filters.noise import Noise
 from analysis.filters.pseudo_input import MotionState, motion
@@ -26,7 +30,7 @@ from recorders.sensors import suite
 from recorders.simulate import SimulatedTrial, simulate
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
 from shiplog.settings import FilterSettings
-from shiplog.ship import OUTPUTS
+from shiplog.ship import INPUTS, OUTPUTS, rudder_effect
 
 NAMES = ("yaw_rate", "speed", "rudder", "rpm")
 STATE_OF = {"yaw_rate": 0, "speed": 3}
@@ -180,3 +184,30 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_is_a_
     for found in trace.covariances[1:]:
         P = run.F @ P @ run.F.T + run.Q
         np.testing.assert_allclose(found, P, rtol=1e-9)
+
+
+def test_as_printed_the_jump_of_the_rudder_is_missing_from_the_yaw_jerk(vessel: Vessel) -> None:
+    trial = simulate(vessel, "zigzag-20-20", duration_secs=60.0, sensors=suite("none"))
+    signals = resample(TrialLog("trial", trial.channels), channels=(*OUTPUTS, *INPUTS))
+    c, usual = vessel.coefficients, gauge(signals, vessel.coefficients)
+    noise = Noise(np.array([1e-5, 1e-2]), np.full(2, 1e-4))
+    ours, printed = (
+        make_filter(c, noise, usual, replace(STATED, as_printed=flag)).step(
+            signals, last_inputs(signals)
+        )
+        for flag in (False, True)
+    )
+    starts = int(np.flatnonzero(np.diff(signals["rudder"]))[0])
+    assert np.array_equal(ours.states[:starts], printed.states[:starts])
+    v, rate = ours.states[starts, 3], np.diff(signals["rudder"])[starts] / signals.dt_secs
+    jump = rudder_effect(c, v, signals["rpm"][starts]) * c.e * rate
+    missing = ours.states[starts, 2] - printed.states[starts, 2]
+    assert missing == pytest.approx(jump, rel=0.02)
+
+
+def test_the_matrix_as_printed_is_not_the_derivative_and_ours_is(vessel: Vessel) -> None:
+    c = vessel.coefficients
+    right, printed = pseudo_input_matrices(c, 1.0)[1], printed_input_matrix(c)
+    assert printed.shape == (5, 19)
+    wrong = np.flatnonzero(np.any(right[:, :19] != printed, axis=1))
+    assert wrong.tolist() == [2, 4]  # the rows of w''' and v''

@@ -111,6 +111,13 @@ def test_one_sample_within_the_gate_makes_the_filter_patient_again() -> None:
     assert believed([*once, 20.0, 1.0, 20.0])[-3:] == [True, True, False]
 
 
+def test_what_is_believed_is_so_until_the_filter_has_come_up_to_it() -> None:
+    """Within the gate is not enough: noise alone takes it there and out again."""
+    once = [20.0] * (PATIENCE + 1)
+    assert believed([*once, 11.9, 13.0, -2.1, 13.0])[PATIENCE:] == [True] * 5
+    assert believed([*once, 13.0, 1.9, 13.0])[-3:] == [True, True, False]
+
+
 def test_each_output_has_its_own_patience() -> None:
     off = np.zeros(2, np.int64)
     for _ in range(PATIENCE):

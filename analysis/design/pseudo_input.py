@@ -31,6 +31,21 @@ def pseudo_input_matrices(c: Coefficients, side: float) -> tuple[FloatArray, Flo
     return A, B
 
 
+def printed_input_matrix(c: Coefficients) -> FloatArray:
+    """B as Burylin's (5) prints it, for w > 0, its short rows filled up with zeros, (5, 19).
+
+    Kept to be laid beside `pseudo_input_matrices`: with it A x + B u is not the derivative.
+    """
+    b4, b5, b6, b7 = c.alpha1 * c.d, c.alpha2 * c.d, c.alpha1 * c.e, c.alpha2 * c.e
+    B = np.zeros((5, 19))
+    B[1, [3, 4, 6, 7, 8, 9]] = c.b2, c.b3, b4, b6, b5, b7
+    B[2, [6, 7, 8, 9, 10]] = b4, -b5 * c.alpha3, b5, b4, b5
+    B[2, [12, 14, 15, 16, 17]] = c.b2, 3 * c.b3, b6, b7, -b7 * c.alpha3
+    B[3, [2, 3, 5]] = c.h, c.f, c.g
+    B[4, [10, 11, 12]] = c.h, 2 * c.f, 2 * c.g
+    return B
+
+
 def pseudo_inputs(
     x: FloatArray, delta: float, delta_dot: float, n: float, n_dot: float, alpha3: float
 ) -> FloatArray:

@@ -43,8 +43,9 @@ class PseudoInputFilter:
 
     The mean is propagated by the exact nonlinear derivative (A x + B u with corrected
     pseudo-inputs, `design.pseudo_input_matrices`), the covariance by A, as the paper has it. Where
-    an output is NaN there is no correction; the inputs must be known throughout.
-    Source: Burylin, eqs (4)-(6).
+    an output is NaN there is no correction; the inputs must be known throughout. The paper's own
+    reading, in which w'' goes on evenly when the rudder starts or stops, so that nothing is left to
+    tell e by, is kept for comparison: `settings.as_printed`. Source: Burylin, eqs (4)-(6).
     """
 
     def __init__(
@@ -53,6 +54,7 @@ class PseudoInputFilter:
         A, _ = pseudo_input_matrices(model, 1.0)
         self.outputs = np.eye(len(STATES))[list(OUTPUT_STATES)]
         self._model, self._r, self._gate = model, noise.measurement_std**2, settings.gate
+        self._jumps = not settings.as_printed
         per_state = np.repeat(noise.process_ratio * self._r * usual.interval_secs, (3, 2))
         F, Q = discretise(A, np.diag(per_state), usual.dt_secs)
         self._F, self._Q = np.ascontiguousarray(F), np.ascontiguousarray(Q)
@@ -86,7 +88,7 @@ class PseudoInputFilter:
         delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
         rows, innovations, gated, trace = _filter(
             self._model, self._x, self._P, self._F, self._Q, measured, self._r, self._gate,
-            self.outputs, delta, n, slab.dt_secs, self._last_rate, self._off, keep,
+            self.outputs, delta, n, slab.dt_secs, self._last_rate, self._jumps, self._off, keep,
         )  # fmt: skip
         count = len(STATES)
         told = Estimates(
@@ -128,6 +130,7 @@ def _filter(
     n: FloatArray,
     dt: float,
     last_rate: FloatArray,
+    jumps: bool,
     off: NDArray[np.int64],
     keep: bool,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], _Kept]:
@@ -145,8 +148,8 @@ def _filter(
     FP, Pc = np.empty((size, size)), np.empty(size)
     for k in range(count):
         delta_dot, n_dot = (delta[k + 1] - delta[k]) / dt, (n[k + 1] - n[k]) / dt
-        # a rudder that starts or stops makes w'' jump
-        x[2] += rudder_effect(c, x[3], n[k]) * c.e * (delta_dot - last_rate[0])
+        if jumps:  # a rudder that starts or stops makes w'' do so
+            x[2] += rudder_effect(c, x[3], n[k]) * c.e * (delta_dot - last_rate[0])
         last_rate[0] = delta_dot
         for output in range(2):
             S = project(P, C[output], Pc) + r[output]

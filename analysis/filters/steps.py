@@ -39,7 +39,7 @@ def believable(
             off[output] = 0
         return True
     off[output] = 0 if distance <= gate * gate else off[output] + 1
-    return off[output] == 0 or off[output] > PATIENCE
+    return bool(off[output] == 0 or off[output] > PATIENCE)
 
 
 @compiled

@@ -17,7 +17,11 @@ from printed import AMBER, BLUE, GREEN, GREY, RED, Row, grid, number, page, pict
 from scipy.integrate import solve_ivp
 
 from analysis.design.discrete import discretise
-from analysis.design.pseudo_input import pseudo_input_matrices, pseudo_inputs
+from analysis.design.pseudo_input import (
+    printed_input_matrix,
+    pseudo_input_matrices,
+    pseudo_inputs,
+)
 from analysis.identification import identify
 from analysis.sliding import History
 from analysis.weak_form import weak_form
@@ -368,18 +372,6 @@ def formulas() -> None:
     )
 
 
-def printed_matrix(c: Coefficients) -> FloatArray:
-    """B as printed, for w > 0, its rows filled up with zeros, (5, 19)."""
-    b4, b5, b6, b7 = c.alpha1 * c.d, c.alpha2 * c.d, c.alpha1 * c.e, c.alpha2 * c.e
-    B = np.zeros((5, 19))
-    B[1, [3, 4, 6, 7, 8, 9]] = c.b2, c.b3, b4, b6, b5, b7
-    B[2, [6, 7, 8, 9, 10]] = b4, -b5 * c.alpha3, b5, b4, b5
-    B[2, [12, 14, 15, 16, 17]] = c.b2, 3 * c.b3, b6, b7, -b7 * c.alpha3
-    B[3, [2, 3, 5]] = c.h, c.f, c.g
-    B[4, [10, 11, 12]] = c.h, 2 * c.f, 2 * c.g
-    return B
-
-
 def point() -> None:
     """A x + B u at one point, right and as printed, beside the derivative itself."""
     c = vessel_of("table1-rad").coefficients  # the numbers as printed, in whatever angles
@@ -407,7 +399,7 @@ def point() -> None:
         (now[0], jerks[0], now[1], jerks[1]),
         (A @ x + B @ u)[1:],
         (A @ x + B @ misprinted)[1:],
-        (A @ x + printed_matrix(c) @ misprinted[:19])[1:],
+        (A @ x + printed_input_matrix(c) @ misprinted[:19])[1:],
     )
     rows = [
         (name, *(number(float(value), 8) for value in values))
