@@ -51,7 +51,7 @@ class FilterSettings:
     yaw_bandwidth: float | None = _number(positive=True)
     surge_bandwidth: float | None = _number(positive=True)
     shift: float = _number(0.1, least=0.0)  # quality: every pole is left of half of it, 1/s
-    damping: float = _number(0.0, least=0.0)  # quality: its G on the yaw acceleration
+    damping: float = _number(0.0, least=0.0)  # quality: its G on the yaw acceleration, over R
     yaw_decay: float | None = _number(positive=True)  # per-tick: minus its poles, both, 1/s
     surge_decay: float | None = _number(positive=True)  # per-tick: minus its pole, 1/s
     wave: bool = _flag()  # waves in the yaw rate are told from the ship's own turning

@@ -103,7 +103,7 @@ def test_a_wave_is_seen_in_the_measurement_alone(vessel: Vessel) -> None:
 def test_the_poles_of_i_minus_k_c_f_are_those_told(
     vessel: Vessel, kind: str, dt: float, wave: Wave | None
 ) -> None:
-    settings = FilterSettings(kind=kind, damping=1e-9, yaw_decay=0.08, surge_decay=0.03)
+    settings = FilterSettings(kind=kind, damping=0.1, yaw_decay=0.08, surge_decay=0.03)
     for channel in both(vessel.coefficients, dt, 0.1, wave):
         gain, poles = discrete_gain(settings, channel)
         assert same_poles(closed(channel, gain), poles)
@@ -158,8 +158,8 @@ def test_without_shift_and_damping_a_quality_filter_is_the_steady_state_one(
 def test_damping_takes_the_yaw_acceleration_for_noisier_in_a_quality_filter(vessel: Vessel) -> None:
     """Source of the oracle: Antonov's (6), as white noise A ξ in the state and none in y."""
     yaw, _ = both(vessel.coefficients, 0.5, 0.1)
-    settings = FilterSettings(kind="quality", shift=0.0, damping=1e-9)
-    G = np.diag([0.0, 1e-9])
+    settings = FilterSettings(kind="quality", shift=0.0, damping=0.4)
+    G = np.diag([0.0, 0.4 * yaw.R])
     extra = np.linalg.cholesky(yaw.A @ G @ yaw.A.T + yaw.G @ yaw.Q @ yaw.G.T + 1e-30 * np.eye(2))
     noisier = replace(yaw, G=extra, Q=np.eye(2))
     gain, _ = discrete_gain(settings, yaw)

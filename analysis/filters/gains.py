@@ -22,6 +22,8 @@ from shiplog.types import FloatArray
 
 from .noise import Noise
 
+FORGETTING = 0.2  # of a wave's frequency: how fast its error decays, where poles are stated
+
 
 @dataclass(frozen=True, eq=False)
 class Channel:
@@ -76,15 +78,15 @@ def _poles(settings: FilterSettings, channel: Channel) -> ComplexArray:
     if settings.chosen == "quality":
         damped = np.zeros(A.shape)
         if len(A) > 1:
-            damped[1, 1] = settings.damping
+            damped[1, 1] = settings.damping * channel.R
         return quality_filter(A, C, G @ Q @ G.T, R, G=damped, shift=settings.shift).poles
     poles = kalman_gain(A, G, C, Q, R).poles
-    if settings.chosen == "per-tick":
-        if len(A) == 1 and settings.surge_decay is not None:
-            poles = np.array([-settings.surge_decay + 0j])
-        if len(A) == 2 and settings.yaw_decay is not None:
-            poles = np.full(2, -settings.yaw_decay + 0j)
-    return poles
+    decay = settings.yaw_decay if len(A) > 1 else settings.surge_decay
+    if settings.chosen != "per-tick" or decay is None:
+        return poles
+    wave = np.linalg.eigvals(A[2:, 2:]).astype(complex)
+    wave.real -= FORGETTING * np.abs(wave)
+    return np.concatenate((np.full(len(A[:2]), -decay + 0j), wave))
 
 
 @compiled
@@ -128,9 +130,15 @@ def ticked_gain(
 
 @compiled
 def _exponential(A: FloatArray) -> FloatArray:
-    """exp A of a small A: from sample to sample a ship hardly moves."""
+    """exp A: the series of A halved until it is small, and squared as often."""
+    halvings = 0
+    while np.abs(A).sum() > 2.0**halvings:
+        halvings += 1
+    small = A / 2.0**halvings
     total, term = np.eye(len(A)), np.eye(len(A))
     for k in range(1, 20):
-        term = term @ A / k
+        term = term @ small / k
         total += term
+    for _ in range(halvings):
+        total = total @ total
     return total

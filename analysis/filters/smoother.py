@@ -23,6 +23,8 @@ from shiplog.types import FloatArray, Signals
 
 from .passage import Estimates, Filter, Trace
 
+ROUNDING = 1e-9  # of a variance: no less is left of it in the difference
+
 
 class Adjoint(NamedTuple):
     """What all measurements after an instant say of the state then."""
@@ -215,4 +217,5 @@ def _smoothed(
             for j in range(size):
                 states[k, i] -= P[k, i, j] * slopes[k, j]
                 covariances[k, i, j] = P[k, i, j] - covariances[k, i, j]
+            covariances[k, i, i] = max(covariances[k, i, i], ROUNDING * P[k, i, i])
     return states, covariances

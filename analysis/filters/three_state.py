@@ -37,6 +37,7 @@ from .steps import believable, correct, project, propagate
 BEST, FIXED, TICKED = range(3)  # gains
 _GAINS = {"extended": BEST, "steady-state": FIXED, "quality": FIXED, "per-tick": TICKED}
 _STATES = 3  # beside the wave's
+NEARLY = 1.5  # times the gain designed for ever, which the best one need not quite fall to
 
 
 class ThreeStateFilter:
@@ -60,10 +61,8 @@ class ThreeStateFilter:
         self.outputs[1, 2] = 1.0
         self._Q = _process_noise(model, noise, usual, self._wave)
         self._gain = _GAINS[settings.chosen]
-        # the best gain forgets the start at once; any other goes on from the first measurement
-        best = self._gain == BEST
-        spread = usual.spread + 1e-9 if best else noise.measurement_std
-        self._x, self._P = _start(model, usual, spread, self._wave)
+        self._x, self._P = _start(model, usual, self._wave)
+        self._settled = np.zeros(len(OUTPUTS), np.bool_)
         self._off = np.zeros(len(OUTPUTS), np.int64)
         self._fixed = np.zeros((len(OUTPUTS), size))
         self._poles = np.zeros(size, np.complex128)
@@ -110,7 +109,7 @@ class ThreeStateFilter:
         )  # fmt: skip
         states, rows, innovations, gated, trace = _filter(
             self._model, self._x, self._P, self._Q, self._wave.F, correction, measured, delta, n,
-            slab.dt_secs, self._off, keep,
+            slab.dt_secs, self._off, self._settled, keep,
         )  # fmt: skip
         told = Estimates(
             rows[:, :5], np.sqrt(rows[:, 5:]), innovations[:, :2], np.sqrt(innovations[:, 2:]),
@@ -154,13 +153,11 @@ def _process_noise(c: Coefficients, noise: Noise, usual: Gauge, wave: _Block) ->
     return np.ascontiguousarray(block_diag(Q, wave.Q))
 
 
-def _start(
-    c: Coefficients, usual: Gauge, spread: FloatArray, wave: _Block
-) -> tuple[FloatArray, FloatArray]:
-    """The first values measured, as unsure as `spread`, and not turning faster."""
+def _start(c: Coefficients, usual: Gauge, wave: _Block) -> tuple[FloatArray, FloatArray]:
+    """The first values measured, not turning faster; as unsure as they vary."""
     w, v = usual.first
-    rate = (abs(c.a) + 1e-3) * (usual.spread[0] + 1e-9)
-    stds = np.array([spread[0], rate, spread[1]])
+    dw, dv = usual.spread + 1e-9
+    stds = np.array([dw, (abs(c.a) + 1e-3) * dw, dv])
     of_wave = solve_discrete_lyapunov(wave.F, wave.Q) if len(wave.F) else wave.Q
     return (
         np.concatenate(([w, 0.0, v], np.zeros(len(wave.F)))),
@@ -197,12 +194,13 @@ def _filter(
     n: FloatArray,
     dt: float,
     off: NDArray[np.int64],
+    settled: NDArray[np.bool_],
     keep: bool,
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_], _Kept]:
     """The states (n, s), rows of what is told and its variances, (n, 10), of innovations, (n, 4).
 
-    And what was gated, and, if it is to be kept, the rest of a trace. `x`, `P` and `off` go on to
-    the next slab; `delta` and `n` are one longer.
+    And what was gated, and, if it is to be kept, the rest of a trace. `x`, `P`, `off` and `settled`
+    go on to the next slab; `delta` and `n` are one longer.
     """
     count, size = len(measured), len(x)
     xs, rows, told = np.empty((count, size)), np.empty((count, 10)), np.empty((count, 4))
@@ -228,7 +226,7 @@ def _filter(
                 continue
             if by.gain == TICKED:
                 linearise(c, x, delta[k], delta_dot, n[k], J)
-            K = _gain(by, Pc, S, J, output)
+            K = _gain(by, Pc, S, J, output, settled)
             correct(x, P, K, Pc, innovation, S)
             if keep:
                 Ks[k, output], es[k, output], Ss[k, output] = K, innovation, S
@@ -244,15 +242,28 @@ def _filter(
 
 
 @compiled
-def _gain(by: _Correction, Pc: FloatArray, S: float, J: FloatArray, output: int) -> FloatArray:
-    """The gain (s,) of an output, of which P c and c P c + r are given."""
+def _gain(
+    by: _Correction,
+    Pc: FloatArray,
+    S: float,
+    J: FloatArray,
+    output: int,
+    settled: NDArray[np.bool_],
+) -> FloatArray:
+    """The gain (s,) of an output, of which P c and c P c + r are given.
+
+    A gain that is designed is that of a filter which has forgotten its start; until then it is the
+    best one, which falls towards it.
+    """
+    best: FloatArray = Pc / S
     if by.gain == BEST:
-        best: FloatArray = Pc / S
         return best
-    if by.gain == FIXED:
-        fixed: FloatArray = by.fixed[output].copy()
-        return fixed
-    return ticked_gain(J, by.wave, by.C[output], by.poles, by.interval[output], output)
+    designed: FloatArray = by.fixed[output].copy()
+    if by.gain == TICKED:
+        designed = ticked_gain(J, by.wave, by.C[output], by.poles, by.interval[output], output)
+    measured = 2 * output  # w or v
+    settled[output] |= best[measured] <= NEARLY * designed[measured]
+    return designed if settled[output] else best
 
 
 @compiled
