@@ -12,6 +12,7 @@ Guillaumin, Lilly and Early, "The debiased Whittle likelihood", 2019; Guillaumin
 and Simons, "The debiased spatial Whittle likelihood", 2022, of what is missing.
 """
 
+import warnings
 from dataclasses import dataclass
 from math import ceil, exp, inf, log, nan, pi, sqrt
 
@@ -31,9 +32,11 @@ LOWEST = 0.25  # rad/s: a ship turns below it, and seas and swell are above
 BEGIN = 0.7  # of the lowest frequency: where the spectrum is fitted from
 HIGHEST_SHARE = 0.9  # of half the sensor's rate
 FEWEST = 100  # measurements, to tell anything
+FEWEST_ORDINATES = 32  # of the spectrum
 CYCLES = 6.0  # of the lowest frequency in a segment: two of its ordinates are the taper's own
 SEGMENT = 16_384  # instants: in most logs more than is needed to resolve a wave
 TAPERED = 0.2  # the share of a segment that a cosine fades out; it costs a ninth of what is known
+LEAST_DAMPING = 1e-7  # as good as none, of a regular wave
 BROADEST = 0.5  # damping: beyond it there is no wave, but a red part
 LEAST_DECAY = 0.5  # ζ ω0 times a segment: a wave that fades more slowly shows no fading
 ROUNDING = 1e-12  # of the largest value: a residual that changes by less is constant
@@ -52,8 +55,8 @@ class Wave:
     damping: float
     std: float  # rad/s
     evidence: float  # 2 log likelihood ratio of the spectrum with the wave against the one without
-    needed: float = 0.0  # evidence that noise alone does not reach in 99 logs of 100
-    contrast: float = inf  # how far the spectrum is higher than beside it, in standard errors
+    needed: float = 0.0  # what evidence noise alone reaches in one log of 100 at the most
+    contrast: float = inf  # by how much the spectrum is higher than beside it, standard errors
 
     @property
     def stands_out(self) -> bool:
@@ -89,23 +92,17 @@ def fit_wave(
     K places one in a hundred logs exceeds 2 ln(100 K). K is the number of ordinates searched.
 
     None where it cannot be told: of fewer than 100 measurements, of a residual that never changes,
-    or of a log too short, or sampled too seldom, for six periods of the lowest frequency. A wave
-    that is stated altogether is known even there, with evidence NaN. Raises `UsageError` for a
+    of less than six periods of the frequency stated, or of a sensor too slow for the lowest one. A
+    wave that is stated altogether is known even there, with evidence NaN. Raises `UsageError` for a
     number out of range, and for a frequency beyond half the sensor's rate.
     """
-    for name, value in (("frequency", frequency), ("damping", damping), ("std", std)):
-        if value is not None:
-            number(f"the wave's {name}", value, least=np.finfo(float).tiny)
+    _positive("lowest", lowest)
+    _positive("the wave's frequency", frequency)
+    _positive("the wave's damping", damping)
+    _positive("the wave's std", std)
     if damping is not None and damping > 1:
         raise UsageError(f"the wave's damping is {damping:g}; expected one of at most 1")
-    number("lowest", lowest, least=np.finfo(float).tiny)
-    number("interval", interval, least=1.0)
-    half_rate = pi / (interval * number("dt_secs", dt_secs, least=np.finfo(float).tiny))
-    if frequency is not None and frequency >= half_rate:
-        raise UsageError(
-            f"the wave's frequency is {frequency:g} rad/s, and a sample every"
-            f" {interval * dt_secs:g} s shows none beyond {half_rate:g}; state a lower one"
-        )
+    half_rate = _half_rate(dt_secs, interval, frequency)
     seen = _spectrum(np.asarray(residual, np.float64), dt_secs, half_rate, lowest, frequency)
     if seen is None:
         if frequency is None or damping is None or std is None:
@@ -123,6 +120,23 @@ def fit_wave(
         needed=2 * log(places / FALSE_CLAIMS),
         contrast=_contrast(seen, omega, exp(found[_DAMPING])),
     )
+
+
+def _half_rate(dt_secs: float, interval: float, frequency: float | None) -> float:
+    """The frequency beyond which the sensor shows nothing, rad/s."""
+    _positive("dt_secs", dt_secs)
+    half_rate = pi / (number("interval", interval, least=1.0) * dt_secs)
+    if frequency is not None and frequency >= half_rate:
+        raise UsageError(
+            f"the wave's frequency is {frequency:g} rad/s, and a sample every"
+            f" {interval * dt_secs:g} s shows none beyond {half_rate:g}; state a lower one"
+        )
+    return half_rate
+
+
+def _positive(name: str, value: float | None) -> None:
+    if value is not None:
+        number(name, value, least=np.finfo(float).tiny)
 
 
 def _logarithms(
@@ -145,7 +159,7 @@ class _Spectrum:
     power: FloatArray  # (k,)
     unit: float  # rad^2/s^2: white noise of this variance has that mean
     first: int
-    searched: FloatArray  # (2,) rad/s, from where to where a wave may be
+    searched: tuple[float, float]  # rad/s, from where to where a wave may be
     overlap: FloatArray  # (length,) of the tapers with themselves, by lag; the middle one twice
     half: int  # of the transform's length
     dt_secs: float
@@ -183,12 +197,13 @@ def _spectrum(
     length = taper.shape[1]
     slowest = CYCLES * 2 * pi / (length * dt_secs)
     lowest, highest = max(lowest, slowest), HIGHEST_SHARE * half_rate
-    if 2 * lowest > highest or (frequency is not None and frequency < slowest):
-        return None
+    searched = (lowest, highest) if frequency is None else (frequency, frequency)
     half = next_fast_len(length // 2 + 1, real=True)
     omega = pi / (half * dt_secs) * np.arange(half)
     omega = omega[: np.searchsorted(omega, half_rate)]
-    first = int(np.searchsorted(omega, BEGIN * min(lowest, frequency or lowest)))
+    first = int(np.searchsorted(omega, BEGIN * min(lowest, searched[0])))
+    if searched[0] < slowest or searched[1] < searched[0] or len(omega) - first < FEWEST_ORDINATES:
+        return None
     energy = float(np.sum(taper**2))
     power = _squared(values * taper, 2 * half)[: len(omega)] / energy
     unit = float(np.mean(power[first:]))
@@ -199,9 +214,8 @@ def _spectrum(
     overlap[half] *= 2.0  # where the transform's symmetric halves meet
     alike = _squared(taper**2, 2 * half)[: len(omega)] / energy**2  # ordinates, by their distance
     return _Spectrum(
-        omega, power / unit, unit, first,
-        np.array([lowest, highest] if frequency is None else [frequency, frequency]),
-        overlap, half, dt_secs, 1 / float(alike[0] + 2 * np.sum(alike[1:])),
+        omega, power / unit, unit, first, searched, overlap, half, dt_secs,
+        1 / float(alike[0] + 2 * np.sum(alike[1:])),
     )  # fmt: skip
 
 
@@ -222,11 +236,12 @@ def _squared(rows: FloatArray, size: int) -> FloatArray:
 
 def _likeliest(seen: _Spectrum, known: FloatArray) -> tuple[FloatArray, float]:
     """The parameters' logarithms, of which those `known` stay, and the evidence for the wave."""
-    white, *reds = _backgrounds(seen)
-    alone, without = _least(seen, [white, *reds], np.isin(np.arange(6), (_WHITE, _RED, _RATE)))
-    # the background alone may have taken a wave for its red part
+    white, red = _backgrounds(seen)
+    alone, without = _least(seen, [white, red], np.isin(np.arange(6), (_WHITE, _RED, _RATE)))
+    # the background alone may have taken a wave for its red part; a regular wave is far from others
     beside, above = _likeliest_place(seen, alone), _likeliest_place(seen, white)
-    pairs = ((alone, beside), (white, beside), (white, above))
+    regular = np.array([*above[:2], log(LEAST_DAMPING)])
+    pairs = ((alone, beside), (white, above), (white, regular))
     starts = [np.concatenate((background[:3], place)) for background, place in pairs]
     free = np.isnan(known)
     found, with_it = _least(seen, [np.where(free, start, known) for start in starts], free)
@@ -234,13 +249,12 @@ def _likeliest(seen: _Spectrum, known: FloatArray) -> tuple[FloatArray, float]:
 
 
 def _backgrounds(seen: _Spectrum) -> list[FloatArray]:
-    """White noise as low as the spectrum anywhere is, and red parts as high as it begins."""
+    """White noise as low as the spectrum anywhere is, with little red or what it begins with."""
     parts = [float(np.mean(part)) for part in np.array_split(seen.fitted, 16)]
-    starts = [[min(parts), 1e-3, seen.begin / 2]]
-    for rate in (seen.begin / 2, sqrt(seen.begin * seen.end)):
-        red = parts[0] * seen.dt_secs * (seen.begin**2 + rate**2) / (2 * rate)
-        starts.append([min(parts), red, rate])
-    return [np.log([*start, 1e-12, sqrt(seen.begin * seen.end), 0.1]) for start in starts]
+    rate = seen.begin / 2
+    red = parts[0] * seen.dt_secs * (seen.begin**2 + rate**2) / (2 * rate)
+    no_wave = 1e-12, sqrt(seen.begin * seen.end), 0.1
+    return [np.log([min(parts), part, rate, *no_wave]) for part in (1e-3, red)]
 
 
 def _likeliest_place(seen: _Spectrum, background: FloatArray) -> FloatArray:
@@ -252,7 +266,7 @@ def _likeliest_place(seen: _Spectrum, background: FloatArray) -> FloatArray:
     ratios, excess = (
         np.cumsum(np.insert(values, 0, 0.0)) for values in (seen.fitted / mean, seen.fitted - mean)
     )
-    low, high = seen.searched + seen.resolution * np.array([-1, 1])
+    low, high = seen.searched[0] - seen.resolution, seen.searched[1] + seen.resolution
     best, run = -inf, slice(0, 1)
     for width in 2 ** np.arange(int(np.log2(len(omega)))):
         x = np.maximum((ratios[width:] - ratios[:-width]) / width, 1.0)
@@ -265,7 +279,9 @@ def _likeliest_place(seen: _Spectrum, background: FloatArray) -> FloatArray:
     frequency = np.clip(np.sum(above * omega[run]) / np.sum(above), *seen.searched)
     # over all ordinates of the transform; a slow sensor's repeat those of the band
     variance = max(excess[run.stop] - excess[run.start], 1e-3) / len(seen.omega)
-    damping = np.clip((run.stop - run.start) * seen.resolution / (3 * frequency), 1e-3, 0.4)
+    # a wave's (∫S)²/∫S² is 2π ζ ω0, and half of it where the ordinates are exponential
+    width = np.sum(above) ** 2 / np.sum(above**2) * seen.resolution
+    damping = np.clip(width / (pi * frequency), 1e-4, 0.4)
     return np.log([variance, frequency, damping])
 
 
@@ -283,7 +299,7 @@ def _least(
 def _descended(
     seen: _Spectrum, start: FloatArray, free: NDArray[np.bool_]
 ) -> tuple[FloatArray, float]:
-    low = np.log([1e-4, 1e-8, seen.begin / 10, 1e-8, seen.searched[0], 1e-8])
+    low = np.log([1e-4, 1e-8, seen.begin / 10, 1e-8, seen.searched[0], LEAST_DAMPING])
     high = np.log([1e2, 1e8, seen.end / 2, 1e4, seen.searched[1], BROADEST])
     start = np.where(free, np.clip(start, low, high), start)
     narrow = max(exp(start[_DAMPING]), seen.resolution / exp(start[_FREQUENCY]) / 3)
@@ -298,14 +314,17 @@ def _descended(
         value, slope = _unlikelihood(seen, parameters(taken))
         return value, slope[free] * steps
 
-    found = minimize(
-        unlikelihood,
-        np.zeros(len(steps)),
-        jac=True,
-        method="SLSQP",
-        bounds=np.column_stack((low - start, high - start))[free] / steps[:, None],
-        options={"ftol": 1e-5, "maxiter": 200},
-    )
+    bounds = np.column_stack((low - start, high - start))[free] / steps[:, None]
+    with warnings.catch_warnings():  # that a step was cut at a bound
+        warnings.simplefilter("ignore", RuntimeWarning)
+        found = minimize(
+            unlikelihood,
+            np.zeros(len(steps)),
+            jac=True,
+            method="SLSQP",
+            bounds=bounds,
+            options={"ftol": 1e-5, "maxiter": 200},
+        )
     return parameters(found.x), float(found.fun)
 
 
@@ -317,9 +336,8 @@ def _held_power(seen: _Spectrum, found: FloatArray) -> float:
     """
     background, wave = _mean(seen, found)
     own = wave > background
-    seen_of_it = float(np.sum((seen.fitted - background)[own]))
-    share = seen_of_it / float(np.sum(wave[own])) if seen_of_it > 0 else 1.0
-    return share * exp(found[_POWER])
+    excess = float(np.sum((seen.fitted - background)[own]))
+    return exp(found[_POWER]) * (excess / float(np.sum(wave[own])) if excess > 0 else 1.0)
 
 
 def _contrast(seen: _Spectrum, frequency: float, damping: float) -> float:
@@ -368,9 +386,7 @@ def _shapes(seen: _Spectrum, theta: FloatArray) -> FloatArray:
     folded = np.zeros((5, seen.half + 1))
     rate, frequency, damping = np.exp(theta[[_RATE, _FREQUENCY, _DAMPING]])
     _folded(seen.overlap, seen.dt_secs, rate, frequency, damping, folded)
-    shapes = dct(folded, type=1, axis=1)[:, seen.first : len(seen.omega)]
-    shapes[[0, 2]] = np.maximum(shapes[[0, 2]], 1e-15)  # a transform's rounding can be negative
-    return shapes
+    return np.asarray(dct(folded, type=1, axis=1)[:, seen.first : len(seen.omega)])
 
 
 @compiled

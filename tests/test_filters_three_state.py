@@ -244,7 +244,7 @@ def test_any_other_gain_is_kept_in_a_straight_ship_once_the_best_one_has_fallen_
     measured[::3, 1] = np.nan
     signals = signals_of(measured, delta, n, dt)
     usual = gauge(signals, c)
-    settings = FilterSettings(kind=kind)
+    settings = FilterSettings(kind=kind, gate=1e6)
     K = np.zeros((2, 3))
     of_yaw, of_surge = channels(c, NOISE, usual)
     K[0, :2], K[1, 2:] = (discrete_gain(settings, one)[0] for one in (of_yaw, of_surge))
