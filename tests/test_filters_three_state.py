@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from analysis.filters.gains import channels, discrete_gain
 from analysis.filters.kinds import filter_states, make_filter
 from analysis.filters.noise import Noise
-from analysis.filters.three_state import predict, tell
+from analysis.filters.ship_step import predict, tell
 from analysis.filters.tuning import noise_of
 from analysis.gauge import Gauge, gauge
 from analysis.inputs import last_inputs
