@@ -148,11 +148,11 @@ def samples() -> None:
     say(
         "Once settled, the best gain is the steady-state one: to its filter a ship is nearly"
         " linear. The quality filter forgets sooner than the noise asks for, and pays. The gyro of"
-        " the last log is off by 0.02 °/s, five times its noise, and no filter of yaw rate and speed alone"
-        " can know it; the more one trusts the model, the more it disbelieves the gyro, and the"
-        " speed bears it. The paper's noise holds a sine of 63 s, which is taken for motion as far"
-        " as the filter follows that fast, by the smoother too: where noise is not what a filter is"
-        " told, smoothing need not help."
+        " the last log is off by 0.02 °/s, five times its noise, and no filter of yaw rate and"
+        " speed alone can know it; the more one trusts the model, the more it disbelieves the"
+        " gyro, and the speed bears it. The paper's noise holds a sine of 63 s, which is taken for"
+        " motion as far as the filter follows that fast, by the smoother too: where noise is not"
+        " what a filter is told, smoothing need not help."
     )
 
 
