@@ -9,16 +9,8 @@ from scipy.signal import butter, freqs, lfilter, sosfilt, tf2ss, welch
 from scipy.stats import gamma
 
 from analysis.design.shaping import wave_filter
-from analysis.wave_fit import (
-    LEAST_CONTRAST,
-    Wave,
-    _likeliest,
-    _mean,
-    _Spectrum,
-    _spectrum,
-    _unlikelihood,
-    fit_wave,
-)
+from analysis.wave_fit import LEAST_CONTRAST, Wave, _likeliest, fit_wave
+from analysis.whittle import Spectrum, mean_periodogram, spectrum_of, unlikelihood
 from shiplog import UsageError
 from shiplog.types import FloatArray
 
@@ -26,8 +18,8 @@ Noise = Callable[[np.random.Generator, int, float], FloatArray]
 
 # duration s, step s, frequency rad/s, damping, standard deviation in that of the white noise
 CLEAR = [
-    (1000.0, 0.2, 0.8, 0.1, 1.0),
-    (3000.0, 0.5, 0.8, 0.3, 3.0),
+    (1000.0, 0.4, 0.8, 0.1, 1.0),
+    (3000.0, 1.0, 0.8, 0.3, 3.0),
     (1000.0, 0.5, 1.5, 0.1, 3.0),
     (3000.0, 0.5, 1.0, 0.05, 0.5),
     (3000.0, 1.0, 2.0, 0.05, 1.0),
@@ -35,11 +27,11 @@ CLEAR = [
 SHORT = [
     (300.0, 0.2, 2.0, 0.05, 3.0),
     (300.0, 0.5, 1.0, 0.1, 1.0),
-    (300.0, 0.1, 2.0, 0.3, 0.5),
-    (1000.0, 0.2, 0.5, 0.3, 1.0),
+    (300.0, 0.2, 2.0, 0.3, 0.7),
+    (1000.0, 0.4, 0.5, 0.3, 1.0),
     (3000.0, 1.0, 0.3, 0.05, 0.3),
 ]
-MOST = 0.9  # of the seeds
+MOST = 7 / 8  # of the seeds
 
 
 def discrete(
@@ -123,7 +115,7 @@ def test_a_clear_waves_filter_is_found_nearly_as_well_as_can_be(
     secs: float, dt: float, frequency: float, damping: float, std: float
 ) -> None:
     true = (frequency, damping, std)
-    found = [fitted(at_sea(seed, secs, dt, *true), dt) for seed in range(10)]
+    found = [fitted(at_sea(seed, secs, dt, *true), dt) for seed in range(8)]
     errors = np.array([off(wave, *true) for wave in found])
     assert share_within(errors, 1.05, 1.6, 1.15).min() >= MOST
     assert all(wave.stands_out for wave in found)
@@ -136,7 +128,7 @@ def test_a_short_logs_or_a_broad_waves_filter_is_found_less_exactly(
     secs: float, dt: float, frequency: float, damping: float, std: float
 ) -> None:
     true = (frequency, damping, std)
-    found = [fitted(at_sea(seed, secs, dt, *true), dt) for seed in range(10)]
+    found = [fitted(at_sea(seed, secs, dt, *true), dt) for seed in range(8)]
     errors = np.array([off(wave, *true) for wave in found])
     assert share_within(errors, 1.12, 2.2, 1.25).min() >= MOST
     assert np.mean([wave.stands_out for wave in found]) >= MOST
@@ -163,7 +155,7 @@ def test_a_regular_wave_has_its_frequency_its_std_and_little_damping(
     secs: float, dt: float, frequency: float, std: float
 ) -> None:
     time_secs = np.arange(0, secs, dt)
-    for seed in range(5):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         wave = std * np.sqrt(2) * np.sin(frequency * time_secs + rng.uniform(0, 2 * pi))
         found = fitted(wave + rng.standard_normal(len(wave)), dt)
@@ -198,12 +190,12 @@ def slowly(residual: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize(("sensor", "interval"), [(with_gaps, 1.0), (slowly, 5.0)])
-@pytest.mark.parametrize("frequency", [0.8, 3.0])
+@pytest.mark.parametrize("frequency", [0.8, 2.0])
 def test_gaps_and_a_slow_sensor_do_no_harm(
     sensor: Callable[[FloatArray], FloatArray], interval: float, frequency: float
 ) -> None:
     true = (frequency, 0.1, 1.5)
-    found = [fitted(sensor(at_sea(s, 1000.0, 0.1, *true)), 0.1, interval) for s in range(4)]
+    found = [fitted(sensor(at_sea(s, 1500.0, 0.2, *true)), 0.2, interval) for s in range(4)]
     errors = np.array([off(wave, *true) for wave in found])
     assert share_within(errors, 1.05, 1.6, 1.15).min() >= MOST
     assert all(wave.stands_out for wave in found)
@@ -216,6 +208,12 @@ def test_a_wave_is_found_above_what_the_model_does_not_know_of_the_ship() -> Non
         found = fitted(at_sea(seed, 1500.0, dt, *true) + red, dt)
         assert np.all(np.abs(off(found, *true)) < np.log([1.05, 1.6, 1.15]))
         assert found.stands_out
+
+
+def test_a_slow_wave_stands_out_in_a_few_periods() -> None:
+    found = [fitted(at_sea(s, 300.0, 0.2, 0.3, 0.05, 1.0), 0.2) for s in range(8)]
+    assert np.mean([wave.stands_out for wave in found]) >= MOST
+    assert [wave.frequency for wave in found] == pytest.approx([0.3] * 8, rel=0.1)
 
 
 def test_no_unit_matters() -> None:
@@ -283,7 +281,7 @@ def test_noise_claims_a_wave_in_one_log_of_a_hundred_at_the_most(red: float) -> 
     claims = 0
     for seed in range(150):
         rng = np.random.default_rng(seed)
-        found = fitted(rng.standard_normal(250) + red_of(rng, 250, 1.0, 0.05, red), 1.0)
+        found = fitted(rng.standard_normal(200) + red_of(rng, 200, 1.0, 0.05, red), 1.0)
         claims += found.evidence > found.needed
     assert claims <= 1
 
@@ -344,14 +342,14 @@ def test_a_wave_stands_out_where_it_is_likely_and_a_peak() -> None:
 # ---- the likelihood
 
 
-def seen_of(residual: FloatArray, dt: float) -> _Spectrum:
-    seen = _spectrum(residual, dt, pi / dt, 0.25, None)
+def seen_of(residual: FloatArray, dt: float) -> Spectrum:
+    seen = spectrum_of(residual, dt, pi / dt, 0.25, None)
     assert seen is not None
     return seen
 
 
 def brute_means(
-    residual: FloatArray, dt: float, seen: _Spectrum, covariances: list[FloatArray]
+    residual: FloatArray, dt: float, seen: Spectrum, covariances: list[FloatArray]
 ) -> list[FloatArray]:
     """E |sum w x e^-iωt|^2 / sum w^2 as a double sum over what was measured."""
     n = len(residual)
@@ -377,7 +375,7 @@ def test_the_mean_periodogram_is_the_double_sum_over_what_was_measured() -> None
     red = 4.0 * np.exp(-0.2 * tau * dt)
     white = np.where(tau == 0, 0.7, 0.0)
     theta = np.log([0.7, 4.0, 0.2, std**2, frequency, damping])
-    background, of_wave = _mean(seen, theta)
+    background, of_wave = mean_periodogram(seen, theta)
     expected = brute_means(residual, dt, seen, [red + white, wave])
     assert background == pytest.approx(expected[0], rel=1e-9)
     assert of_wave == pytest.approx(expected[1], rel=1e-9)
@@ -386,9 +384,9 @@ def test_the_mean_periodogram_is_the_double_sum_over_what_was_measured() -> None
 def test_the_slope_of_the_likelihood_is_its_difference() -> None:
     seen = seen_of(with_gaps(at_sea(9, 300.0, 0.5, 0.8, 0.15, 1.3)), 0.5)
     theta = np.log([0.4, 0.3, 0.3, 0.7, 0.9, 0.2])
-    _, slope = _unlikelihood(seen, theta)
+    _, slope, _ = unlikelihood(seen, theta)
     for i, step in enumerate(1e-5 * np.eye(6)):
-        above, below = _unlikelihood(seen, theta + step)[0], _unlikelihood(seen, theta - step)[0]
+        above, below = unlikelihood(seen, theta + step)[0], unlikelihood(seen, theta - step)[0]
         assert slope[i] == pytest.approx((above - below) / 2e-5, rel=1e-6, abs=1e-6)
 
 
@@ -398,7 +396,7 @@ def test_no_grid_of_parameters_holds_a_likelier_wave(seed: int) -> None:
     residual = at_sea(seed, 200.0, dt, 0.9, 0.1, 0.8)
     seen = seen_of(residual, dt)
     found, _ = _likeliest(seen, np.full(6, np.nan))
-    least = _unlikelihood(seen, found)[0] / seen.weight
+    least = unlikelihood(seen, found)[0] / seen.weight
     tau = dt * np.arange(len(residual))
     red = np.exp(found[1] - np.exp(found[2]) * tau)
     for frequency in np.concatenate((np.geomspace(0.26, 5.6, 40), np.exp(found[4]) * SPREAD)):
@@ -420,7 +418,7 @@ def test_no_grid_of_parameters_holds_a_likelier_wave(seed: int) -> None:
 SPREAD = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
 
 
-def fast_means(seen: _Spectrum, covariances: list[FloatArray]) -> list[FloatArray]:
+def fast_means(seen: Spectrum, covariances: list[FloatArray]) -> list[FloatArray]:
     """As `brute_means` of what has no gaps, lag by lag."""
     n = len(seen.overlap)
     overlap = seen.overlap.copy()

@@ -1,0 +1,195 @@
+"""The spectrum of a residual, and how likely a sum of white noise, a red part and a wave makes it.
+
+Whittle's likelihood, of the mean that the periodogram has whatever is missing: the transform of the
+autocovariance times the taper's own. Sources: as in `wave_fit`.
+"""
+
+from dataclasses import dataclass
+from math import ceil, exp, log, nan, pi, sqrt
+
+import numpy as np
+from scipy.fft import dct, irfft, next_fast_len, rfft
+from scipy.signal.windows import tukey
+
+from shiplog.compiled import compiled
+from shiplog.types import FloatArray
+
+HIGHEST_SHARE = 0.9  # of half the sensor's rate
+BEGIN = 0.7  # of the lowest frequency: where the spectrum is fitted from
+CYCLES = 6.0  # of the lowest frequency in a segment: the taper blurs two ordinates to either side
+SEGMENT = 16_384  # instants: in most logs more than is needed to resolve a wave
+TAPERED = 0.2  # the share of a segment that a cosine fades out; it costs a ninth of what is known
+FEWEST = 100  # measurements
+FEWEST_ORDINATES = 32
+ROUNDING = 1e-12  # of the largest value: a residual that changes by less is constant
+
+# the logarithms that are fitted; powers in units of the mean ordinate of the band
+WHITE, RED, RATE, POWER, FREQUENCY, DAMPING = range(6)
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """The periodogram, averaged over segments, up to half the sensor's rate; and how it was made.
+
+    In units of its mean over the band in which it is fitted, which begins at ordinate `first`.
+    """
+
+    omega: FloatArray  # (k,) rad/s
+    power: FloatArray  # (k,)
+    unit: float  # rad^2/s^2: white noise of this variance has that mean
+    first: int
+    searched: tuple[float, float]  # rad/s, from where to where a wave may be
+    overlap: FloatArray  # (length,) of the tapers with themselves, by lag; the middle one twice
+    half: int  # of the transform's length
+    dt_secs: float
+    weight: float  # how many independent ordinates one counts for
+
+    @property
+    def fitted(self) -> FloatArray:
+        """The ordinates of the band."""
+        return self.power[self.first :]
+
+    @property
+    def begin(self) -> float:
+        """Of the band, rad/s."""
+        return float(self.omega[self.first])
+
+    @property
+    def end(self) -> float:
+        """Of the band, rad/s."""
+        return float(self.omega[-1])
+
+    @property
+    def resolution(self) -> float:
+        """From ordinate to ordinate, rad/s."""
+        return float(self.omega[1])
+
+
+def spectrum_of(
+    residual: FloatArray, dt_secs: float, half_rate: float, lowest: float, frequency: float | None
+) -> Spectrum | None:
+    """None where it would tell nothing."""
+    at = np.flatnonzero(np.isfinite(residual))
+    if len(at) < FEWEST:
+        return None
+    values, taper = _segments(residual[at[0] : at[-1] + 1])
+    length = taper.shape[1]
+    slowest = CYCLES * 2 * pi / (length * dt_secs)
+    lowest, highest = max(lowest, slowest), HIGHEST_SHARE * half_rate
+    searched = (lowest, highest) if frequency is None else (frequency, frequency)
+    half = next_fast_len(length // 2 + 1, real=True)
+    omega = pi / (half * dt_secs) * np.arange(half)
+    omega = omega[: np.searchsorted(omega, half_rate)]
+    first = int(np.searchsorted(omega, BEGIN * min(lowest, searched[0])))
+    if searched[0] < slowest or searched[1] < searched[0] or len(omega) - first < FEWEST_ORDINATES:
+        return None
+    energy = float(np.sum(taper**2))
+    power = _squared(values * taper, 2 * half)[: len(omega)] / energy
+    unit = float(np.mean(power[first:]))
+    if unit <= ROUNDING**2 * float(np.max(residual[at] ** 2)):
+        return None
+    double = next_fast_len(2 * length, real=True)
+    overlap = irfft(_squared(taper, double), double)[:length] / energy
+    overlap[half] *= 2.0  # where the transform's symmetric halves meet
+    alike = _squared(taper**2, 2 * half)[: len(omega)] / energy**2  # ordinates, by their distance
+    return Spectrum(
+        omega, power / unit, unit, first, searched, overlap, half, dt_secs,
+        1 / float(alike[0] + 2 * np.sum(alike[1:])),
+    )  # fmt: skip
+
+
+def _segments(residual: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of equal length (s, length), zero where nothing was measured, and their tapers."""
+    count = ceil(len(residual) / SEGMENT)
+    length = ceil(len(residual) / count)
+    values = np.full((count, length), nan)
+    values.flat[: len(residual)] = residual - np.mean(residual[np.isfinite(residual)])
+    known = np.isfinite(values)
+    return np.where(known, values, 0.0), tukey(length, TAPERED) * known
+
+
+def _squared(rows: FloatArray, size: int) -> FloatArray:
+    """The squares of the rows' transforms of that size, summed."""
+    return np.asarray(np.sum(np.abs(rfft(rows, size)) ** 2, axis=0))
+
+
+def unlikelihood(seen: Spectrum, theta: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """Minus Whittle's log likelihood, its slope (6,) and Fisher's information (6, 6)."""
+    slope, information = np.zeros(6), np.zeros((6, 6))
+    value = _whittle(seen.fitted, np.exp(theta), _shapes(seen, theta), slope, information)
+    return seen.weight * value, seen.weight * slope, seen.weight * information
+
+
+def mean_periodogram(seen: Spectrum, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The mean periodogram (k,) of white noise and red part, and that of the wave."""
+    shapes = _shapes(seen, theta)
+    white, red, power = np.exp(theta[[WHITE, RED, POWER]])
+    return white + red * shapes[0], power * shapes[2]
+
+
+def _shapes(seen: Spectrum, theta: FloatArray) -> FloatArray:
+    """The mean periodogram (5, k) of a red part of unit variance and its slope in its rate.
+
+    And that of a wave of unit variance, and its slopes in frequency and damping.
+    """
+    folded = np.zeros((5, seen.half + 1))
+    rate, frequency, damping = np.exp(theta[[RATE, FREQUENCY, DAMPING]])
+    _folded(seen.overlap, seen.dt_secs, rate, frequency, damping, folded)
+    return np.asarray(dct(folded, type=1, axis=1)[:, seen.first : len(seen.omega)])
+
+
+@compiled
+def _folded(
+    overlap: FloatArray, dt: float, rate: float, frequency: float, damping: float,
+    folded: FloatArray,
+) -> None:  # fmt: skip
+    """The autocovariances e^-ρτ and e^-aτ (cos ωτ - (a/ω) sin ωτ), a = ζ ω0, ω^2 = ω0^2 - a^2.
+
+    With their slopes in ln ρ, ln ω0 and ln ζ; times the tapers' overlap, and folded as a transform
+    of twice the length of `folded` folds them.
+    """
+    half = folded.shape[1] - 1
+    a, one = damping * frequency, sqrt(1 - damping**2)
+    omega, tilt = frequency * one, damping / one
+    red, fading, c, s = 1.0, 1.0, 1.0, 0.0
+    red_step, fading_step = exp(-rate * dt), exp(-a * dt)
+    c_step, s_step = np.cos(omega * dt), np.sin(omega * dt)
+    for t in range(len(overlap)):
+        tau, at = t * dt, min(t, 2 * half - t)
+        wave, turned = fading * (c - tilt * s), -fading * (s + tilt * c) * omega * tau
+        folded[0, at] += overlap[t] * red
+        folded[1, at] -= overlap[t] * red * rate * tau
+        folded[2, at] += overlap[t] * wave
+        folded[3, at] += overlap[t] * (turned - a * tau * wave)
+        folded[4, at] -= overlap[t] * (
+            a * tau * wave + tilt**2 * turned + tilt / one**2 * fading * s
+        )
+        red *= red_step
+        fading *= fading_step
+        c, s = c * c_step - s * s_step, s * c_step + c * s_step
+
+
+@compiled
+def _whittle(
+    power: FloatArray, parameters: FloatArray, shapes: FloatArray, slope: FloatArray,
+    information: FloatArray,
+) -> float:  # fmt: skip
+    """The sum of I/S + ln S over the ordinates, its slope and information in the logarithms."""
+    white, red, wave = parameters[WHITE], parameters[RED], parameters[POWER]
+    total, parts = 0.0, np.empty(6)
+    for k in range(len(power)):
+        per_mean = 1 / (white + red * shapes[0, k] + wave * shapes[2, k])
+        ratio = power[k] * per_mean
+        total += ratio - log(per_mean)
+        parts[WHITE] = white * per_mean
+        parts[RED], parts[RATE] = red * per_mean * shapes[0, k], red * per_mean * shapes[1, k]
+        for i in range(POWER, 6):
+            parts[i] = wave * per_mean * shapes[i - 1, k]
+        for i in range(6):
+            slope[i] += (1 - ratio) * parts[i]
+            for j in range(i + 1):
+                information[i, j] += parts[i] * parts[j]
+    for i in range(6):
+        for j in range(i):
+            information[j, i] = information[i, j]
+    return total
