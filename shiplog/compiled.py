@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TypeVar, cast
 
 import numba
+from numba.extending import overload
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -26,7 +27,7 @@ def _kept() -> Path:
     for package in ("shiplog", "recorders", "analysis"):
         for path in sorted((ours / package).rglob("*.py")):
             source = path.read_bytes()
-            if b"@compiled" in source:
+            if b"@compiled" in source or b"@case_of" in source:
                 digest.update(source)
     where = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _usual_place()
     return where / f"shiplog-{digest.hexdigest()[:16]}"
@@ -62,3 +63,29 @@ def compiled(function: F) -> F:
 def is_compiled(package: str) -> bool:
     """Whether machine code of a package of ours is kept from an earlier run."""
     return next(KEPT.rglob(f"{package}*/*.nbi"), None) is not None
+
+
+def compiled_within(function: F) -> F:
+    """Compile `function` as a part of the compiled function that calls it, and keep it there.
+
+    For what many modules share and each compiles in its own way: kept by itself, its machine code
+    would outlive a change of the module that it was compiled for.
+    """
+    return cast("F", numba.njit(error_model="numpy")(function))
+
+
+def case_of(generic: Callable[..., object], kind: type) -> Callable[[F], F]:
+    """Make a function what compiled code calls as `generic` when its first argument is a `kind`.
+
+    `kind` is a NamedTuple. Numba would have to compile anew in each process what takes a function
+    as an argument; a type it knows again.
+    """
+
+    def registered(function: F) -> F:
+        def choose(first: object, *_: object) -> F | None:
+            return function if getattr(first, "instance_class", None) is kind else None
+
+        overload(generic, strict=False)(choose)
+        return function
+
+    return registered

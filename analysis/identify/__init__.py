@@ -1,0 +1,1 @@
+"""Identification that can be believed: ship models fitted to trials, with their uncertainty."""

@@ -1,0 +1,127 @@
+"""Levenberg and Marquardt's least squares over several trials, with limits, priors and outliers.
+
+Each residual is weighed by its own standard deviation; beyond three of what is usual it counts by
+its size and no longer by its square (the pseudo-Huber loss). Marquardt, "An algorithm for
+least-squares estimation of nonlinear parameters", 1963.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from shiplog.types import FloatArray
+
+from .problem import Problem
+
+OUTLYING = 3.0  # standard deviations
+MOST_ROUNDS = 60
+SMALL = 1e-6  # a step of so many squared standard deviations of its own is the last
+STEEPEST = 1e12  # of damping: no step is short enough
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """How far a trial's residuals may be off, (n, c)."""
+
+    effective: FloatArray  # the std that each counts with, for neighbours that are off together
+    usual: FloatArray  # the std it has by itself, by which an outlier is told
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Where the sum of squares is least."""
+
+    unknowns: FloatArray  # (m,)
+    information: FloatArray  # (m, m) the data's, without the priors
+    cost: float
+    rounds: int
+    settled: bool
+
+
+def minimise(problem: Problem, start: FloatArray, spreads: Sequence[Spread]) -> Minimum:
+    """The unknowns that fit best, from `start` on."""
+    lowest, highest = problem.bounds
+    _, precision = problem.prior
+    z, damping, settled = np.clip(start, lowest, highest), 1e-3, False
+    cost, rounds = total_cost(problem, z, spreads), 0
+    gradient, information = linearised(problem, z, spreads)
+    while rounds < MOST_ROUNDS and np.isfinite(cost) and damping < STEEPEST:
+        rounds += 1
+        hessian = information + np.diag(precision)
+        inside = ~(((z <= lowest) & (gradient > 0)) | ((z >= highest) & (gradient < 0)))
+        step, decrease = _step(hessian, gradient, inside, damping)
+        if decrease < SMALL:
+            settled = damping <= 1.0
+            if settled:
+                break
+        moved = np.clip(z + step, lowest, highest)
+        new_cost = total_cost(problem, moved, spreads)
+        if new_cost < cost:
+            z, cost, damping = moved, new_cost, max(damping / 10, 1e-9)
+            gradient, information = linearised(problem, z, spreads)
+        else:
+            damping *= 10 if damping > 1e-6 else 1e3
+    return Minimum(z, information, cost, rounds, settled)
+
+
+def _step(
+    hessian: FloatArray, gradient: FloatArray, inside: FloatArray, damping: float
+) -> tuple[FloatArray, float]:
+    """The damped step over the unknowns not at a limit, and by how much it should help."""
+    at = np.flatnonzero(inside)
+    scale = np.sqrt(np.maximum(np.diag(hessian)[at], 1e-300))
+    scaled = hessian[np.ix_(at, at)] / np.outer(scale, scale)
+    scaled[np.diag_indices(len(at))] += damping + 1e-14
+    downhill = -gradient[at] / scale
+    try:
+        along = cho_solve(cho_factor(scaled), downhill)
+    except np.linalg.LinAlgError:
+        along = downhill / (1 + damping)
+    step = np.zeros(len(gradient))
+    step[at] = along / scale
+    return step, float(downhill @ along)
+
+
+def total_cost(problem: Problem, z: FloatArray, spreads: Sequence[Spread]) -> float:
+    """Half the sum of squares, outliers for less, and of the priors; inf where a ship runs away."""
+    centre, precision = problem.prior
+    total = float(np.sum(precision * (z - centre) ** 2)) / 2
+    for i, spread in enumerate(spreads):
+        predicted, measured = problem.predicted(z, i), problem.measured(i)
+        known = np.isfinite(measured)
+        off = (measured - predicted)[known]
+        if not np.isfinite(off).all():
+            return inf
+        edge = OUTLYING * spread.usual[known]
+        loss = edge**2 * (np.sqrt(1 + (off / edge) ** 2) - 1)
+        total += float(np.sum(loss / spread.effective[known] ** 2))
+    return total
+
+
+def linearised(
+    problem: Problem, z: FloatArray, spreads: Sequence[Spread]
+) -> tuple[FloatArray, FloatArray]:
+    """The gradient of the cost, (m,), and the data's information matrix, (m, m)."""
+    centre, precision = problem.prior
+    gradient, information = precision * (z - centre), np.zeros((problem.size, problem.size))
+    for i, spread in enumerate(spreads):
+        at, jacobian = problem.places(i), problem.jacobian(z, i)
+        off, weight = weighed(problem, z, i, spread)
+        flat, weights = jacobian.reshape(-1, len(at)), weight.reshape(-1, 1)
+        gradient[at] -= flat.T @ (weights[:, 0] * off.reshape(-1))
+        information[np.ix_(at, at)] += flat.T @ (weights * flat)
+    return gradient, information
+
+
+def weighed(
+    problem: Problem, z: FloatArray, i: int, spread: Spread
+) -> tuple[FloatArray, FloatArray]:
+    """Trial i's residuals, zero where nothing was measured, and their weights: (n, c) each."""
+    off = problem.measured(i) - problem.predicted(z, i)
+    known = np.isfinite(off)
+    off = np.where(known, off, 0.0)
+    share = 1 / np.sqrt(1 + (off / (OUTLYING * spread.usual)) ** 2)
+    return off, np.where(known, share / spread.effective**2, 0.0)

@@ -1,0 +1,133 @@
+"""Output error: the parameters whose simulated runs come nearest to the runs recorded.
+
+All trials at once, each with its own initial state, sensor biases and rudder offset. The noise is
+found from what the fit leaves, and the fit repeated with it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+
+from shiplog.errors import UsageError
+from shiplog.ships import Model, Scale
+from shiplog.ships.motion import OUTPUTS
+from shiplog.types import FloatArray
+
+from .least_squares import Minimum, Spread, minimise
+from .noise import Noise, noise_of, spreads_of
+from .problem import Nuisance, Problem
+from .trial import Trial, usual
+
+USUAL_LENGTH = 150.0  # m, of a ship whose length nobody gave: its scale only
+ROUNDS = 3  # of noise and fit
+LEAST_STD = {  # of what any instrument is off
+    "yaw_rate": radians(1e-5), "speed": 1e-4, "sway": 1e-4, "heading": radians(0.02)
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class OutputError:
+    """A fit."""
+
+    problem: Problem
+    minimum: Minimum
+    noises: tuple[Noise, ...]  # of each output
+    spreads: tuple[Spread, ...]  # of each trial
+
+    @property
+    def parameters(self) -> FloatArray:
+        """(p,) all the model's parameters."""
+        return self.problem.parameters(self.minimum.unknowns)
+
+
+def output_error(
+    trials: Sequence[Trial],
+    model: Model,
+    *,
+    start: Mapping[str, float] | None = None,
+    known: Mapping[str, float] | None = None,
+    free: Sequence[str] = (),
+    length: float | None = None,
+    nuisance: Nuisance | None = None,
+    outputs: Sequence[str] | None = None,
+) -> OutputError:
+    """Fit a model to trials.
+
+    `known` parameters keep the value given, those of `free` are sought though the model takes them
+    for known; `start` is where the others begin.
+    """
+    problem = pose(
+        trials, model, start=start, known=known, free=free, length=length,
+        nuisance=nuisance, outputs=outputs,
+    )  # fmt: skip
+    return fit(problem, problem.start())
+
+
+def pose(
+    trials: Sequence[Trial], model: Model, *,
+    start: Mapping[str, float] | None = None,
+    known: Mapping[str, float] | None = None,
+    free: Sequence[str] = (),
+    length: float | None = None,
+    nuisance: Nuisance | None = None,
+    outputs: Sequence[str] | None = None,
+) -> Problem:  # fmt: skip
+    """The problem of fitting a model to trials, as `output_error` has it."""
+    if not trials:
+        raise UsageError("no trial to identify from; give at least one log")
+    values = model.starts()
+    for name, value in {**(start or {}), **(known or {})}.items():
+        values[model.names.index(model.parameter(name).name)] = value
+    sought = {model.parameter(name).name for name in free}
+    sought |= {p.name for p in model.parameters if not p.known}
+    sought -= set(known or {})
+    scale = model.scale(length or USUAL_LENGTH, usual(trials, "speed"), usual(trials, "rpm"))
+    used = [o for o in (outputs or model.outputs) if any(trial.has(o) for trial in trials)]
+    return Problem(
+        model, tuple(trials), scale, tuple(used), values,
+        tuple(i for i, name in enumerate(model.names) if name in sought),
+        Nuisance() if nuisance is None else nuisance,
+    )  # fmt: skip
+
+
+def fit(problem: Problem, start: FloatArray) -> OutputError:
+    """The fit, its noise found from what it leaves."""
+    spreads = first_spreads(problem)
+    minimum = minimise(problem, start, spreads)
+    noises: list[Noise] = []
+    for _ in range(ROUNDS):
+        noises, spreads = noise_left(problem, minimum.unknowns)
+        minimum = minimise(problem, minimum.unknowns, spreads)
+    return OutputError(problem, minimum, tuple(noises), tuple(spreads))
+
+
+def first_spreads(problem: Problem) -> list[Spread]:
+    """Before anything is fitted: a tenth of what an output does is off."""
+    stds = []
+    for column, output in enumerate(problem.outputs):
+        every = np.concatenate([problem.measured(i)[:, column] for i in range(len(problem.trials))])
+        stds.append(max(float(np.nanstd(every)) / 10, LEAST_STD[output]))
+    every_std = np.array(stds)
+    return [
+        Spread(np.tile(every_std, (len(trial), 1)), np.tile(every_std, (len(trial), 1)))
+        for trial in problem.trials
+    ]
+
+
+def noise_left(problem: Problem, z: FloatArray) -> tuple[list[Noise], list[Spread]]:
+    """The noise of each output, and the spread of each trial's residuals."""
+    count = range(len(problem.trials))
+    levels = [problem.predicted(z, i) for i in count]
+    left = [problem.measured(i) - levels[i] for i in count]
+    noises = [
+        noise_of(
+            [r[:, c] for r in left], [y[:, c] for y in levels],
+            proportional=output != "heading", least=LEAST_STD[output],
+        )
+        for c, output in enumerate(problem.outputs)
+    ]  # fmt: skip
+    return noises, spreads_of(noises, levels)
+
+

@@ -1,0 +1,188 @@
+"""What is sought: a model's parameters, and of each trial what it has of its own."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import inf, radians
+from types import MappingProxyType
+
+import numpy as np
+
+from shiplog.ships import Model, Scale
+from shiplog.ships.motion import OUTPUTS
+from shiplog.types import FloatArray
+
+from .trial import Trial
+
+FIRST_SECS = 3.0  # of a trial, whose median is a first guess at how it began
+NO_BIAS: Mapping[str, float] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """What each trial has of its own beside the state it began in: how far it may be from zero.
+
+    A rudder that is always off stands for the rudder's own zero and for every constant yaw moment;
+    0 where there is to be none.
+    """
+
+    rudder_std: float = radians(0.5)
+    bias_stds: Mapping[str, float] = field(default_factory=lambda: {"yaw_rate": radians(0.005)})
+
+    @classmethod
+    def none(cls) -> "Nuisance":
+        """Nothing but the state each began in."""
+        return cls(0.0, NO_BIAS)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Trials and the model to be fitted to them: the layout of the vector of unknowns.
+
+    The unknowns are the free parameters, then of each trial its initial state in the units of the
+    equations, the rudder's offset and the sensors' biases, as far as they are sought.
+    """
+
+    model: Model
+    trials: tuple[Trial, ...]
+    scale: Scale
+    outputs: tuple[str, ...]
+    values: FloatArray  # (p,) of all parameters: where the search begins, or what is known
+    free: tuple[int, ...]  # which of them are sought
+    nuisance: Nuisance
+
+    @cached_property
+    def columns(self) -> list[int]:
+        """Which columns of what was measured are fitted."""
+        return [OUTPUTS.index(output) for output in self.outputs]
+
+    @cached_property
+    def free_names(self) -> tuple[str, ...]:
+        """The names of the parameters sought."""
+        return tuple(self.model.names[i] for i in self.free)
+
+    @cached_property
+    def biases(self) -> tuple[tuple[int, float], ...]:
+        """Of each bias sought: which of the outputs fitted it is on, and its prior."""
+        stds = self.nuisance.bias_stds
+        return tuple((i, stds[o]) for i, o in enumerate(self.outputs) if stds.get(o, 0) > 0)
+
+    @property
+    def _offsets(self) -> int:
+        return int(self.nuisance.rudder_std > 0)
+
+    @property
+    def own(self) -> int:
+        """How many unknowns each trial has of its own."""
+        return len(self.model.state) + self._offsets + len(self.biases)
+
+    @property
+    def size(self) -> int:
+        """How many unknowns there are."""
+        return len(self.free) + self.own * len(self.trials)
+
+    def own_slice(self, i: int) -> slice:
+        """Where those of trial i stand."""
+        start = len(self.free) + self.own * i
+        return slice(start, start + self.own)
+
+    def start(self) -> FloatArray:
+        """(size,) where the search begins."""
+        own = [self._first_state(trial) for trial in self.trials]
+        none = np.zeros(self._offsets + len(self.biases))
+        parts = [part for state in own for part in (state, none)]
+        return np.concatenate([self.values[list(self.free)], *parts])
+
+    def _first_state(self, trial: Trial) -> FloatArray:
+        first = max(2, round(FIRST_SECS / trial.dt_secs))
+        state = np.zeros(len(self.model.state))
+        for i, value in enumerate(self.model.state):
+            if value.channel is not None and trial.has(value.channel):
+                known = trial.measured[:, OUTPUTS.index(value.channel)]
+                known = known[np.isfinite(known)][:first]
+                state[i] = np.median(known) / self.scale.of_channel(value.channel)
+        return state
+
+    @cached_property
+    def prior(self) -> tuple[FloatArray, FloatArray]:
+        """(size,) what the unknowns are believed to be before any data, and how surely: 1/std^2."""
+        parameters = [self.model.parameters[i] for i in self.free]
+        centres, stds = [p.start for p in parameters], [p.prior_std for p in parameters]
+        for trial in self.trials:
+            for value in self.model.state:
+                measured = value.channel in self.outputs and trial.has(value.channel or "")
+                stds.append(inf if measured else value.prior_std)
+            stds += [self.nuisance.rudder_std] * self._offsets + [std for _, std in self.biases]
+        centre = np.zeros(self.size)
+        centre[: len(centres)] = centres
+        heading = [i for i, value in enumerate(self.model.state) if value.channel == "heading"]
+        precision = np.array(stds) ** -2.0
+        for number, trial in enumerate(self.trials):
+            if "heading" not in self.outputs or not trial.has("heading"):
+                at = self.own_slice(number).start + heading[0]
+                # nothing depends on it: any belief keeps it in its place
+                centre[at], precision[at] = self._first_state(trial)[heading[0]], 1.0
+        return centre, precision
+
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """(size,) the least and the greatest each unknown may be."""
+        lowest, highest = np.full(self.size, -inf), np.full(self.size, inf)
+        for at, i in enumerate(self.free):
+            lowest[at], highest[at] = (
+                self.model.parameters[i].lowest,
+                self.model.parameters[i].highest,
+            )
+        return lowest, highest
+
+    def parameters(self, z: FloatArray) -> FloatArray:
+        """(p,) all the model's parameters, of the unknowns."""
+        values = self.values.copy()
+        values[list(self.free)] = z[: len(self.free)]
+        return values
+
+    def predicted(self, z: FloatArray, i: int) -> FloatArray:
+        """(n, c) the outputs fitted, of trial i."""
+        state, offset, biases = self._own(z, i)
+        trial = self.trials[i]
+        out = self.model.simulate(
+            self.parameters(z), state, trial.path, len(trial), offset=offset, scale=self.scale
+        )[:, self.columns]
+        for (column, _), bias in zip(self.biases, biases, strict=True):
+            out[:, column] += bias
+        return out
+
+    def jacobian(self, z: FloatArray, i: int) -> FloatArray:
+        """(n, c, k) how they change with the k free parameters and trial i's own unknowns."""
+        state, offset, _ = self._own(z, i)
+        trial, p, s = self.trials[i], len(self.values), len(self.model.state)
+        moved = [*self.free, *range(p, p + s + self._offsets)]
+        directions = np.eye(p + s + 1)[moved]
+        found = self.model.sensitivities(
+            self.parameters(z), state, trial.path, len(trial), directions,
+            offset=offset, scale=self.scale,
+        )[:, :, self.columns]  # fmt: skip
+        jacobian = np.zeros((*found.shape[1:], len(moved) + len(self.biases)))
+        jacobian[:, :, : len(moved)] = np.moveaxis(found, 0, 2)
+        for at, (column, _) in enumerate(self.biases):
+            jacobian[:, column, len(moved) + at] = 1.0
+        return jacobian
+
+    def measured(self, i: int) -> FloatArray:
+        """(n, c) what was measured of them, NaN where nothing was."""
+        return self.trials[i].measured[:, self.columns]
+
+    def places(self, i: int) -> list[int]:
+        """Where the unknowns of `jacobian` stand among all."""
+        own = self.own_slice(i)
+        return [*range(len(self.free)), *range(own.start, own.stop)]
+
+    def _own(self, z: FloatArray, i: int) -> tuple[FloatArray, float, FloatArray]:
+        own, s = z[self.own_slice(i)], len(self.model.state)
+        offset = float(own[s]) if self._offsets else 0.0
+        return own[:s], offset, own[s + self._offsets :]
+
+
+def residuals(problem: Problem, z: FloatArray) -> Sequence[FloatArray]:
+    """Measured less predicted, (n, c) for each trial."""
+    return [problem.measured(i) - problem.predicted(z, i) for i in range(len(problem.trials))]

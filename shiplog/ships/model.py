@@ -1,0 +1,153 @@
+"""What a model of a ship is: parameters with their limits, a state, equations, and its scale."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from shiplog.errors import UsageError
+from shiplog.types import FloatArray
+from shiplog.units import did_you_mean
+
+from .motion import OUTPUTS, ComplexArray, Path
+
+STEP = 1e-30  # along the imaginary axis: nothing is lost to rounding, however small
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a model, in its own unit."""
+
+    name: str
+    unit: str
+    start: float  # where a search begins that knows nothing,
+    lowest: float = -inf  # and between which it stays
+    highest: float = inf
+    prior_std: float = inf  # how far from `start` it is believed to be, before any data
+    known: bool = False  # kept at `start` unless it is asked for
+
+
+@dataclass(frozen=True)
+class StateValue:
+    """One number of a model's state, and what is known of it as a run begins."""
+
+    name: str
+    channel: str | None = None  # that measures it
+    prior_std: float = inf  # of what it is when nothing measures it, from zero
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The units in which a model's equations are written: one each of time, speed, revolutions."""
+
+    secs: float = 1.0
+    speed: float = 1.0  # m/s
+    rpm: float = 1.0
+
+    @property
+    def outputs(self) -> FloatArray:
+        """(4,) what one of each of `OUTPUTS` is in SI."""
+        return np.array([1 / self.secs, self.speed, self.speed, 1.0])
+
+    def of_channel(self, channel: str | None) -> float:
+        """What one of a channel's is in SI; 1 for what no channel measures."""
+        return float(self.outputs[OUTPUTS.index(channel)]) if channel in OUTPUTS else 1.0
+
+    def scaled(self, path: Path) -> Path:
+        """A path in these units."""
+        return path._replace(
+            secs=path.secs / self.secs,
+            delta_dot=path.delta_dot * self.secs,
+            rpm=path.rpm / self.rpm,
+        )
+
+
+SI = Scale()
+
+
+def _as_they_are(values: ComplexArray) -> Sequence[complex]:
+    return tuple(values)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A ship's equations, for simulation and for estimation.
+
+    `expand` makes of the parameters the equations' coefficients, which are a `kind`: where some
+    are tied to others there are fewer parameters than coefficients.
+    """
+
+    name: str
+    title: str
+    kind: Callable[..., Any]  # a NamedTuple, whose type the compiled equations are chosen by
+    parameters: tuple[Parameter, ...]
+    state: tuple[StateValue, ...]
+    compiled: Callable[..., ComplexArray]  # `sail` for this kind, kept in the model's own file
+    outputs: tuple[str, ...] = ("yaw_rate", "speed", "heading")  # of OUTPUTS: what it predicts
+    dimensionless: bool = True  # else its equations are in SI
+    expand: Callable[[ComplexArray], Sequence[complex]] = field(default=_as_they_are)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the parameters."""
+        return tuple(p.name for p in self.parameters)
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of that name; `UsageError` where there is none."""
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise UsageError(
+            f"the model {self.name} has no parameter {name!r}{did_you_mean(name, self.names)}; "
+            f"it has {', '.join(self.names)}"
+        )
+
+    def starts(self) -> FloatArray:
+        """(p,) where a search begins that knows nothing."""
+        return np.array([p.start for p in self.parameters])
+
+    def scale(self, length: float, speed: float, rpm: float) -> Scale:
+        """The units of its equations for a ship of that length, in m, at that speed and rpm."""
+        return Scale(length / speed, speed, rpm) if self.dimensionless else SI
+
+    def simulate(
+        self, parameters: FloatArray, initial: FloatArray, path: Path, count: int,
+        *, offset: float = 0.0, scale: Scale = SI,
+    ) -> FloatArray:  # fmt: skip
+        """What would be measured, (count, 4), SI, in the order of `OUTPUTS`.
+
+        `parameters` are (p,), `initial` is the state at the first sample in the units of the
+        equations, `offset` a rudder added to that of the path, in rad. NaN from where the
+        ship runs away.
+        """
+        out = self._sail(parameters + 0j, initial + 0j, complex(offset), scale.scaled(path), count)
+        return np.asarray(out.real * scale.outputs)
+
+    def sensitivities(
+        self, parameters: FloatArray, initial: FloatArray, path: Path, count: int,
+        directions: FloatArray, *, offset: float = 0.0, scale: Scale = SI,
+    ) -> FloatArray:  # fmt: skip
+        """How the outputs change along each direction, (k, count, 4).
+
+        A direction is a row of `directions`: of the parameters, the initial state and the offset
+        of the rudder, in this order, (k, p + s + 1). All else as `simulate`.
+        """
+        scaled, p = scale.scaled(path), len(parameters)
+        found = np.empty((len(directions), count, len(OUTPUTS)))
+        for row, along in zip(found, directions * (1j * STEP), strict=True):
+            moved = along[:p], along[p:-1], along[-1]
+            out = self._sail(
+                parameters + moved[0], initial + moved[1], offset + moved[2], scaled, count
+            )
+            row[:] = out.imag / STEP * scale.outputs
+        return found
+
+    def _sail(
+        self, parameters: ComplexArray, initial: ComplexArray, offset: complex, path: Path,
+        count: int,
+    ) -> ComplexArray:  # fmt: skip
+        coefficients = self.kind(*(complex(value) for value in self.expand(parameters)))
+        return self.compiled(coefficients, initial, complex(offset), path, count)

@@ -1,0 +1,90 @@
+"""The paper's model with what a real tanker taught: speed scaling, slipstream and drift.
+
+    rho'' = a nu rho' + b1 nu^2 rho + b2 nu rho|rho| + ks (nu delta + T3 delta')
+    ks    = k ((1 - m) nu^2 + m eta^2)
+    nu'   = f rho^2 + g nu^2 + h eta
+    sigma = c1 rho + c2 rho|rho| / nu
+
+rho is the yaw rate times L/U0, nu the speed over U0 and sigma the sway over U0, eta the
+revolutions over theirs, time is in L/U0. A slower ship turns more slowly over the ground she
+covers, not in it; the rudder works by the propeller's stream where the ship has lost her speed;
+and the ship goes where she drifts, not where she points. b3 is left out: it and b2 are collinear.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shiplog.compiled import compiled
+
+from .model import Model, Parameter, StateValue
+from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, sail
+
+
+class Slipstream(NamedTuple):
+    """The coefficients."""
+
+    a: complex
+    b1: complex
+    b2: complex
+    k: complex
+    m: complex
+    T3: complex
+    f: complex
+    g: complex
+    h: complex
+    c1: complex
+    c2: complex
+
+
+@equations(Slipstream)
+def _motion(c: Slipstream, x: ComplexArray, u: Forcing) -> tuple[complex, ...]:
+    rho, rho_dot, nu = x[0], x[1], x[2]
+    ks = c.k * ((1 - c.m) * nu * nu + c.m * u.n * u.n)
+    hull = c.a * nu * rho_dot + c.b1 * nu * nu * rho + c.b2 * nu * rho * magnitude(rho)
+    return (
+        rho_dot,
+        hull + ks * (nu * u.delta + c.T3 * u.delta_dot),
+        c.f * rho * rho + c.g * nu * nu + c.h * u.n,
+        rho,
+    )
+
+
+@observations(Slipstream)
+def _observed(c: Slipstream, x: ComplexArray) -> tuple[complex, complex, complex, complex]:
+    rho, nu = x[0], x[2]
+    sway = c.c1 * rho + c.c2 * rho * magnitude(rho) / nu
+    return rho, np.sqrt(nu * nu - sway * sway), sway, x[3]
+
+
+@compiled
+def _sail(
+    c: Slipstream, x: ComplexArray, offset: complex, path: Path, count: int
+) -> ComplexArray:
+    return sail(c, x, offset, path, count)
+
+
+YAW = (
+    Parameter("a", "1", -2.0),
+    Parameter("b1", "1", 0.5),
+    Parameter("b2", "1", -3.0),
+    Parameter("k", "1", 0.9),
+    Parameter("m", "1", 0.3, prior_std=0.5),
+    Parameter("T3", "1", 1.0),
+)
+SURGE = (
+    Parameter("f", "1", -0.3),
+    Parameter("g", "1", -0.05, highest=0.0),
+    Parameter("h", "1", 0.05),
+)
+SLIPSTREAM = Model(
+    "slipstream", "the paper's model with speed scaling, slipstream and drift", Slipstream,
+    (*YAW, *SURGE, Parameter("c1", "1", -0.4), Parameter("c2", "1", 0.0)),
+    (
+        StateValue("rho", "yaw_rate"),
+        StateValue("rho_dot", prior_std=0.5),
+        StateValue("nu", "speed"),
+        StateValue("psi", "heading"),
+    ),
+    _sail, outputs=("yaw_rate", "speed", "sway", "heading"),
+)  # fmt: skip
