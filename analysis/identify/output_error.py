@@ -21,7 +21,7 @@ from .problem import Nuisance, Problem
 from .trial import Trial, usual
 
 USUAL_LENGTH = 150.0  # m, of a ship whose length nobody gave: its scale only
-ROUNDS = 3  # of noise and fit
+ROUNDS = 3
 LEAST_STD = {  # of what any instrument is off
     "yaw_rate": radians(1e-5), "speed": 1e-4, "sway": 1e-4, "heading": radians(0.02)
 }  # fmt: skip

@@ -1,0 +1,109 @@
+"""Surge, sway and yaw with cross-flow drag, small, its parameters believed within wide limits.
+
+    sigma' = yv nu sigma + yr nu rho - cy Y(sigma, rho) + yd F
+    rho'   = nv nu sigma + nr nu rho - cn N(sigma, rho) + nd F
+    nu'    = xvr sigma rho + g nu^2 + h eta (eta + p (eta - nu)) + xd F delta
+    Y, N   = int |sigma + x rho| (sigma + x rho) (1, x) dx over the length, x from -1/2 to 1/2
+    F      = ((1 - m) nu^2 + m eta^2) delta
+
+nu is the speed ahead over U0, sigma the sway over U0, rho the yaw rate times L/U0, eta the
+revolutions over theirs, time is in L/U0; the forces are divided by the inertias. The priors are
+what the slender-body regressions of Clarke, Gedling and Hine ("The application of manoeuvring
+criteria in hull design using linear theory", 1983) give for merchant ships from full to fine, and
+a drag coefficient near 0.6 (Hooft, "The cross-flow drag on a manoeuvring ship", 1994).
+"""
+
+from typing import NamedTuple
+
+from shiplog.compiled import compiled, compiled_within
+
+from .model import Model, Parameter, StateValue
+from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, sail
+
+
+class ThreeDof(NamedTuple):
+    """The coefficients."""
+
+    yv: complex
+    yr: complex
+    cy: complex
+    yd: complex
+    nv: complex
+    nr: complex
+    cn: complex
+    nd: complex
+    m: complex
+    xvr: complex
+    g: complex
+    h: complex
+    p: complex
+    xd: complex
+
+
+@compiled_within
+def _cross_flow(sigma: complex, rho: complex) -> tuple[complex, complex]:
+    """Y and N by Gauss's five points."""
+    middle, inner, outer = 128 / 450, 0.4786286704993665 / 2, 0.2369268850561891 / 2
+    near, far = 0.5384693101056831 / 2, 0.9061798459386640 / 2
+    y = middle * sigma * magnitude(sigma)
+    n = 0 * sigma
+    for weight, x in ((inner, near), (inner, -near), (outer, far), (outer, -far)):
+        flow = sigma + x * rho
+        force = weight * flow * magnitude(flow)
+        y += force
+        n += x * force
+    return y, n
+
+
+@equations(ThreeDof)
+def _motion(c: ThreeDof, x: ComplexArray, u: Forcing) -> tuple[complex, ...]:
+    rho, sigma, nu = x[0], x[1], x[2]
+    y, n = _cross_flow(sigma, rho)
+    force = ((1 - c.m) * nu * nu + c.m * u.n * u.n) * u.delta
+    thrust = c.h * u.n * (u.n + c.p * (u.n - nu))
+    return (
+        c.nv * nu * sigma + c.nr * nu * rho - c.cn * n + c.nd * force,
+        c.yv * nu * sigma + c.yr * nu * rho - c.cy * y + c.yd * force,
+        c.xvr * sigma * rho + c.g * nu * nu + thrust + c.xd * force * u.delta,
+        rho,
+    )
+
+
+@observations(ThreeDof)
+def _observed(c: ThreeDof, x: ComplexArray) -> tuple[complex, complex, complex, complex]:  # noqa: ARG001
+    return x[0], x[2], x[1], x[3]
+
+
+@compiled
+def _sail(
+    c: ThreeDof, x: ComplexArray, offset: complex, path: Path, count: int
+) -> ComplexArray:
+    return sail(c, x, offset, path, count)
+
+
+THREE_DOF = Model(
+    "three-dof", "surge, sway and yaw with cross-flow", ThreeDof,
+    (
+        Parameter("yv", "1", -0.75, -5.0, 0.0, prior_std=0.4),
+        Parameter("yr", "1", -0.45, -2.0, 1.0, prior_std=0.2),
+        Parameter("cy", "1", 1.0, 0.0, 10.0, prior_std=0.7),
+        Parameter("yd", "1", -0.15, -2.0, 0.0, prior_std=0.1),
+        Parameter("nv", "1", -4.0, -20.0, 5.0, prior_std=2.5),
+        Parameter("nr", "1", -1.8, -10.0, 0.0, prior_std=0.8),
+        Parameter("cn", "1", 15.0, 0.0, 100.0, prior_std=15.0),
+        Parameter("nd", "1", 1.0, 0.0, 10.0, prior_std=0.5),
+        Parameter("m", "1", 0.4, 0.0, 1.5, prior_std=0.3),
+        Parameter("xvr", "1", 1.2, 0.0, 5.0, prior_std=0.6),
+        Parameter("g", "1", -0.05, -1.0, 0.0, prior_std=0.05),
+        Parameter("h", "1", 0.05, 0.0, 1.0, prior_std=0.05),
+        Parameter("p", "1", 0.7, 0.0, 2.0, prior_std=0.2),
+        Parameter("xd", "1", -0.04, -1.0, 0.0, prior_std=0.04),
+    ),
+    (
+        StateValue("rho", "yaw_rate"),
+        StateValue("sigma", "sway", prior_std=0.1),
+        StateValue("nu", "speed"),
+        StateValue("psi", "heading"),
+    ),
+    _sail, ("yaw_rate", "speed", "sway", "heading"),
+)  # fmt: skip
