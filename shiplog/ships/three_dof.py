@@ -2,23 +2,33 @@
 
     sigma' = yv nu sigma + yr nu rho - cy Y(sigma, rho) + yd F
     rho'   = nv nu sigma + nr nu rho - cn N(sigma, rho) + nd F
-    nu'    = xvr sigma rho + g nu^2 + h eta (eta + p (eta - nu)) + xd F delta
+    nu'    = h (eta (eta + p (eta - nu)) - (1 + g) nu^2) + xvr sigma rho + xd F delta
     Y, N   = int |sigma + x rho| (sigma + x rho) (1, x) dx over the length, x from -1/2 to 1/2
-    F      = ((1 - m) nu^2 + m eta^2) delta
+    F      = s delta + w sqrt(s) (sigma - 0.8 rho),  s = (1 - m) nu^2 + m eta^2
 
 nu is the speed ahead over U0, sigma the sway over U0, rho the yaw rate times L/U0, eta the
-revolutions over theirs, time is in L/U0; the forces are divided by the inertias. The priors are
-what the slender-body regressions of Clarke, Gedling and Hine ("The application of manoeuvring
-criteria in hull design using linear theory", 1983) give for merchant ships from full to fine, and
-a drag coefficient near 0.6 (Hooft, "The cross-flow drag on a manoeuvring ship", 1994).
+revolutions over theirs, time is in L/U0; the forces are divided by the inertias. Thrust and
+resistance balance on the straight run, but for g; a slower ship's propeller thrusts more, by p.
+The rudder is in a stream s of which m is the propeller's, and the stern's own way to the side
+turns that stream by w: it eases the rudder in a turn, and damps what the hull does not.
+
+The priors are wide, and of ships in general: slender-body regressions (Clarke, Gedling and Hine,
+"The application of manoeuvring criteria in hull design using linear theory", 1983), a drag
+coefficient near 0.6 (Hooft, "The cross-flow drag on a manoeuvring ship", 1994), and the usual
+sizes of thrust, flow straightening and rudder drag in the model of the MMG (Yasukawa and
+Yoshimura, "Introduction of MMG standard method for ship maneuvering predictions", 2015).
 """
 
 from typing import NamedTuple
+
+import numpy as np
 
 from shiplog.compiled import compiled, compiled_within
 
 from .model import Model, Parameter, StateValue
 from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, sail
+
+AFT = 0.8  # where the rudder feels the ship turn, in lengths: further aft than it is
 
 
 class ThreeDof(NamedTuple):
@@ -33,6 +43,7 @@ class ThreeDof(NamedTuple):
     cn: complex
     nd: complex
     m: complex
+    w: complex
     xvr: complex
     g: complex
     h: complex
@@ -59,12 +70,13 @@ def _cross_flow(sigma: complex, rho: complex) -> tuple[complex, complex]:
 def _motion(c: ThreeDof, x: ComplexArray, u: Forcing) -> tuple[complex, ...]:
     rho, sigma, nu = x[0], x[1], x[2]
     y, n = _cross_flow(sigma, rho)
-    force = ((1 - c.m) * nu * nu + c.m * u.n * u.n) * u.delta
+    stream = (1 - c.m) * nu * nu + c.m * u.n * u.n
+    force = stream * u.delta + c.w * np.sqrt(stream) * (sigma - AFT * rho)
     thrust = c.h * u.n * (u.n + c.p * (u.n - nu))
     return (
         c.nv * nu * sigma + c.nr * nu * rho - c.cn * n + c.nd * force,
         c.yv * nu * sigma + c.yr * nu * rho - c.cy * y + c.yd * force,
-        c.xvr * sigma * rho + c.g * nu * nu + thrust + c.xd * force * u.delta,
+        c.xvr * sigma * rho + thrust - c.h * (1 + c.g) * nu * nu + c.xd * force * u.delta,
         rho,
     )
 
@@ -93,11 +105,12 @@ THREE_DOF = Model(
         Parameter("cn", "1", 15.0, 0.0, 100.0, prior_std=15.0),
         Parameter("nd", "1", 1.0, 0.0, 10.0, prior_std=0.5),
         Parameter("m", "1", 0.4, 0.0, 1.5, prior_std=0.3),
+        Parameter("w", "1", 0.4, 0.0, 1.0, prior_std=0.15),
         Parameter("xvr", "1", 1.2, 0.0, 5.0, prior_std=0.6),
-        Parameter("g", "1", -0.05, -1.0, 0.0, prior_std=0.05),
+        Parameter("g", "1", 0.0, -0.5, 0.5, prior_std=0.03),
         Parameter("h", "1", 0.05, 0.0, 1.0, prior_std=0.05),
         Parameter("p", "1", 0.7, 0.0, 2.0, prior_std=0.2),
-        Parameter("xd", "1", -0.04, -1.0, 0.0, prior_std=0.04),
+        Parameter("xd", "1", -0.1, -1.0, 0.0, prior_std=0.05),
     ),
     (
         StateValue("rho", "yaw_rate"),
