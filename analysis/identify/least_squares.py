@@ -18,7 +18,7 @@ from .problem import Problem
 
 OUTLYING = 3.0  # standard deviations
 MOST_ROUNDS = 60
-SMALL = 1e-6  # a step of so many squared standard deviations of its own is the last
+SMALL = 1e-4  # a step of so many squared standard deviations of its own is the last
 STEEPEST = 1e12  # of damping: no step is short enough
 
 

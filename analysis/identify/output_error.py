@@ -10,14 +10,14 @@ from math import radians
 
 import numpy as np
 
-from shiplog.errors import UsageError
-from shiplog.ships import Model, Scale
-from shiplog.ships.motion import OUTPUTS
+from shiplog.errors import LogError, UsageError
+from shiplog.ships import Model
 from shiplog.types import FloatArray
 
 from .least_squares import Minimum, Spread, minimise
 from .noise import Noise, noise_of, spreads_of
 from .problem import Nuisance, Problem
+from .start import starts
 from .trial import Trial, usual
 
 USUAL_LENGTH = 150.0  # m, of a ship whose length nobody gave: its scale only
@@ -62,7 +62,7 @@ def output_error(
         trials, model, start=start, known=known, free=free, length=length,
         nuisance=nuisance, outputs=outputs,
     )  # fmt: skip
-    return fit(problem, problem.start())
+    return fit(problem)
 
 
 def pose(
@@ -92,10 +92,20 @@ def pose(
     )  # fmt: skip
 
 
-def fit(problem: Problem, start: FloatArray) -> OutputError:
+def fit(problem: Problem) -> OutputError:
     """The fit, its noise found from what it leaves."""
     spreads = first_spreads(problem)
-    minimum = minimise(problem, start, spreads)
+    tried = []
+    for start in starts(problem, spreads):
+        tried.append(minimise(problem, start, spreads))
+        if tried[-1].settled:
+            break
+    minimum = min(tried, key=lambda each: each.cost)
+    if not np.isfinite(minimum.cost):
+        raise LogError(
+            f"the model {problem.model.name} runs away on these trials from every start tried; "
+            f"give --start or another model: {', '.join(t.name for t in problem.trials)}"
+        )
     noises: list[Noise] = []
     for _ in range(ROUNDS):
         noises, spreads = noise_left(problem, minimum.unknowns)
