@@ -5,7 +5,7 @@ found from what the fit leaves, and the fit repeated with it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians
 
 import numpy as np
@@ -16,11 +16,13 @@ from shiplog.types import FloatArray
 
 from .least_squares import Minimum, Spread, minimise
 from .noise import Noise, noise_of, spreads_of
-from .problem import Nuisance, Problem
+from .problem import Nuisance, Problem, residuals
 from .start import starts
 from .trial import Trial, usual
+from .waves import frequency_of
 
 USUAL_LENGTH = 150.0  # m, of a ship whose length nobody gave: its scale only
+UNEXPLAINED = 0.2  # of what stays off: if a wave leaves more, it was none
 ROUNDS = 3
 LEAST_STD = {  # of what any instrument is off
     "yaw_rate": radians(1e-5), "speed": 1e-4, "sway": 1e-4, "heading": radians(0.02)
@@ -92,7 +94,7 @@ def pose(
     )  # fmt: skip
 
 
-def fit(problem: Problem) -> OutputError:
+def fit(problem: Problem, *, waves: bool = True) -> OutputError:
     """The fit, its noise found from what it leaves."""
     spreads = first_spreads(problem)
     tried = []
@@ -106,11 +108,41 @@ def fit(problem: Problem) -> OutputError:
             f"the model {problem.model.name} runs away on these trials from every start tried; "
             f"give --start or another model: {', '.join(t.name for t in problem.trials)}"
         )
-    noises: list[Noise] = []
+    calm = _settled(problem, minimum.unknowns)
+    return _with_waves(calm) if waves else calm
+
+
+def _settled(problem: Problem, z: FloatArray) -> OutputError:
+    """The fit and its noise, found in turn."""
     for _ in range(ROUNDS):
-        noises, spreads = noise_left(problem, minimum.unknowns)
-        minimum = minimise(problem, minimum.unknowns, spreads)
+        noises, spreads = noise_left(problem, z)
+        minimum = minimise(problem, z, spreads)
+        z = minimum.unknowns
     return OutputError(problem, minimum, tuple(noises), tuple(spreads))
+
+
+def _with_waves(calm: OutputError) -> OutputError:
+    """The fit with a wave in each trial, where that explains all that stays off."""
+    problem = calm.problem
+    left = [np.asarray(r) for r in residuals(problem, calm.minimum.unknowns)]
+    found = [
+        frequency_of(r, spread.usual, problem.trials[i].dt_secs)
+        for i, (r, spread) in enumerate(zip(left, calm.spreads, strict=True))
+    ]
+    if not all(found):
+        return calm
+    with_waves = replace(problem, waves=tuple((omega,) for omega in found))
+    start = with_waves.start()
+    start[: len(problem.free)] = calm.minimum.unknowns[: len(problem.free)]
+    for i in range(len(problem.trials)):
+        own, old = with_waves.own_slice(i), calm.minimum.unknowns[problem.own_slice(i)]
+        start[own.start : own.start + len(old)] = old
+    wavy = _settled(with_waves, start)
+    explained = all(
+        new.slow**2 * new.slow_count <= UNEXPLAINED * old.slow**2 * old.slow_count
+        for new, old in zip(wavy.noises, calm.noises, strict=True)
+    )
+    return wavy if explained else calm
 
 
 def first_spreads(problem: Problem) -> list[Spread]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf, radians
+from math import inf, pi, radians
 from types import MappingProxyType
 
 import numpy as np
@@ -15,6 +15,8 @@ from shiplog.types import FloatArray
 from .trial import Trial
 
 FIRST_SECS = 3.0  # of a trial, whose median is a first guess at how it began
+WAVE_CYCLES = 0.25  # over a trial: how sure of its frequency one is who has seen it
+LARGEST_WAVE = 1.0  # in rad/s, m/s or rad: none is
 NO_BIAS: Mapping[str, float] = MappingProxyType({})
 
 
@@ -40,7 +42,8 @@ class Problem:
     """Trials and the model to be fitted to them: the layout of the vector of unknowns.
 
     The unknowns are the free parameters, then of each trial its initial state in the units of the
-    equations, the rudder's offset and the sensors' biases, as far as they are sought.
+    equations, the rudder's offset, the sensors' biases and its waves, as far as they are sought: of
+    a wave its frequency, in rad/s, and of each output a cosine and a sine.
     """
 
     model: Model
@@ -50,6 +53,7 @@ class Problem:
     values: FloatArray  # (p,) of all parameters: where the search begins, or what is known
     free: tuple[int, ...]  # which of them are sought
     nuisance: Nuisance
+    waves: tuple[tuple[float, ...], ...] = ()  # of each trial: where their frequencies begin
 
     @cached_property
     def columns(self) -> list[int]:
@@ -71,27 +75,36 @@ class Problem:
     def _offsets(self) -> int:
         return int(self.nuisance.rudder_std > 0)
 
+    @cached_property
+    def _edges(self) -> list[int]:
+        """Where each trial's own unknowns begin, and where the last ones end."""
+        calm = len(self.model.state) + self._offsets + len(self.biases)
+        sizes = [calm + len(self._waves(i)) * self._per_wave for i in range(len(self.trials))]
+        return [int(edge) for edge in np.cumsum([len(self.free), *sizes])]
+
     @property
-    def own(self) -> int:
-        """How many unknowns each trial has of its own."""
-        return len(self.model.state) + self._offsets + len(self.biases)
+    def _per_wave(self) -> int:
+        return 1 + 2 * len(self.outputs)
+
+    def _waves(self, i: int) -> tuple[float, ...]:
+        return self.waves[i] if self.waves else ()
 
     @property
     def size(self) -> int:
         """How many unknowns there are."""
-        return len(self.free) + self.own * len(self.trials)
+        return self._edges[-1]
 
     def own_slice(self, i: int) -> slice:
         """Where those of trial i stand."""
-        start = len(self.free) + self.own * i
-        return slice(start, start + self.own)
+        return slice(self._edges[i], self._edges[i + 1])
 
     def start(self) -> FloatArray:
         """(size,) where the search begins."""
-        own = [self._first_state(trial) for trial in self.trials]
-        none = np.zeros(self._offsets + len(self.biases))
-        parts = [part for state in own for part in (state, none)]
-        return np.concatenate([self.values[list(self.free)], *parts])
+        parts = [self.values[list(self.free)]]
+        for i, trial in enumerate(self.trials):
+            parts += [self._first_state(trial), np.zeros(self._offsets + len(self.biases))]
+            parts += [np.append(wave, np.zeros(self._per_wave - 1)) for wave in self._waves(i)]
+        return np.concatenate(parts)
 
     def _first_state(self, trial: Trial) -> FloatArray:
         first = max(2, round(FIRST_SECS / trial.dt_secs))
@@ -108,12 +121,19 @@ class Problem:
         """(size,) what the unknowns are believed to be before any data, and how surely: 1/std^2."""
         parameters = [self.model.parameters[i] for i in self.free]
         centres, stds = [p.start for p in parameters], [p.prior_std for p in parameters]
-        for trial in self.trials:
+        for i, trial in enumerate(self.trials):
             for value in self.model.state:
                 measured = value.channel in self.outputs and trial.has(value.channel or "")
                 stds.append(inf if measured else value.prior_std)
             stds += [self.nuisance.rudder_std] * self._offsets + [std for _, std in self.biases]
-        centre = np.zeros(self.size)
+            for _ in self._waves(i):
+                stds += [WAVE_CYCLES * 2 * pi / (len(trial) * trial.dt_secs)]
+                stds += [LARGEST_WAVE] * (self._per_wave - 1)
+        centre = self.start()
+        for number in range(len(self.trials)):
+            own = self.own_slice(number)
+            waves = own.stop - self._per_wave * len(self._waves(number))
+            centre[own.start : waves] = 0.0
         centre[: len(centres)] = centres
         heading = [i for i, value in enumerate(self.model.state) if value.channel == "heading"]
         precision = np.array(stds) ** -2.0
@@ -143,18 +163,22 @@ class Problem:
 
     def predicted(self, z: FloatArray, i: int) -> FloatArray:
         """(n, c) the outputs fitted, of trial i."""
-        state, offset, biases = self._own(z, i)
+        state, offset, biases, waves = self._own(z, i)
         trial = self.trials[i]
         out = self.model.simulate(
             self.parameters(z), state, trial.path, len(trial), offset=offset, scale=self.scale
         )[:, self.columns]
         for (column, _), bias in zip(self.biases, biases, strict=True):
             out[:, column] += bias
+        for omega, *sizes in waves:
+            phase = omega * trial.signals.time_secs
+            amplitudes = np.array(sizes).reshape(2, -1)
+            out += np.outer(np.cos(phase), amplitudes[0]) + np.outer(np.sin(phase), amplitudes[1])
         return out
 
     def jacobian(self, z: FloatArray, i: int) -> FloatArray:
         """(n, c, k) how they change with the k free parameters and trial i's own unknowns."""
-        state, offset, _ = self._own(z, i)
+        state, offset, _, waves = self._own(z, i)
         trial, p, s = self.trials[i], len(self.values), len(self.model.state)
         moved = [*self.free, *range(p, p + s + self._offsets)]
         directions = np.eye(p + s + 1)[moved]
@@ -162,10 +186,14 @@ class Problem:
             self.parameters(z), state, trial.path, len(trial), directions,
             offset=offset, scale=self.scale,
         )[:, :, self.columns]  # fmt: skip
-        jacobian = np.zeros((*found.shape[1:], len(moved) + len(self.biases)))
+        known = len(moved) + len(self.biases)
+        jacobian = np.zeros((*found.shape[1:], known + waves.size))
         jacobian[:, :, : len(moved)] = np.moveaxis(found, 0, 2)
         for at, (column, _) in enumerate(self.biases):
             jacobian[:, column, len(moved) + at] = 1.0
+        for number, (omega, *sizes) in enumerate(waves):
+            at = known + number * self._per_wave
+            _by_wave(jacobian[:, :, at : at + self._per_wave], omega, np.array(sizes), trial)
         return jacobian
 
     def measured(self, i: int) -> FloatArray:
@@ -177,10 +205,25 @@ class Problem:
         own = self.own_slice(i)
         return [*range(len(self.free)), *range(own.start, own.stop)]
 
-    def _own(self, z: FloatArray, i: int) -> tuple[FloatArray, float, FloatArray]:
+    def _own(
+        self, z: FloatArray, i: int
+    ) -> tuple[FloatArray, float, FloatArray, FloatArray]:
+        """Trial i's initial state, rudder offset, biases, and waves by rows."""
         own, s = z[self.own_slice(i)], len(self.model.state)
+        biases = s + self._offsets
+        waves = biases + len(self.biases)
         offset = float(own[s]) if self._offsets else 0.0
-        return own[:s], offset, own[s + self._offsets :]
+        return own[:s], offset, own[biases:waves], own[waves:].reshape(-1, self._per_wave)
+
+
+def _by_wave(jacobian: FloatArray, omega: float, sizes: FloatArray, trial: Trial) -> None:
+    """Fill in how the outputs, (n, c, 1 + 2c), change with a wave's frequency and amplitudes."""
+    time, outputs = trial.signals.time_secs, jacobian.shape[1]
+    cosine, sine = np.cos(omega * time), np.sin(omega * time)
+    for c in range(outputs):
+        jacobian[:, c, 0] = time * (sizes[outputs + c] * cosine - sizes[c] * sine)
+        jacobian[:, c, 1 + c] = cosine
+        jacobian[:, c, 1 + outputs + c] = sine
 
 
 def residuals(problem: Problem, z: FloatArray) -> Sequence[FloatArray]:

@@ -8,7 +8,6 @@ too few runs for that, it shows how much more their estimates differ than they s
 were true: all errors are enlarged by so much (Birge, 1932).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +18,7 @@ from shiplog.types import FloatArray
 from .least_squares import Spread, linearised, minimise, weighed
 from .output_error import OutputError
 from .problem import Problem
-from .trial import LEAST_SECS
+from .trial import LEAST_SECS, Trial
 
 LEAST_RUNS = 4  # for a jackknife
 DOUBTFUL = 0.01  # by chance so rarely, and runs contradict each other
@@ -79,11 +78,13 @@ def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
     coloured = _stds(covariance)
     jackknife, enlarged = np.full(p, np.nan), 1.0
     if between_runs:
-        others, share_left = _left_out(fit)
+        others, variances = _left_out(fit)
         if len(others) >= LEAST_RUNS:
             jackknife = _jackknife(others)
         elif len(others) > 1:
-            enlarged = _birge(others - z[:p], share_left, covariance)
+            enlarged = _birge(
+                others - z[:p], variances - np.diag(inverse)[:p], coloured, inverse
+            )
     std = np.fmax(coloured * enlarged, jackknife)
     grown = std / np.where(coloured > 0, coloured, 1.0)
     information = fit.minimum.information + np.diag(problem.prior[1])
@@ -149,39 +150,39 @@ def few(b: float) -> float:
 
 
 def _left_out(fit: OutputError) -> tuple[FloatArray, FloatArray]:
-    """The parameters without each run in turn, (r, p), and the share of the data left out, (r,)."""
+    """The parameters without each run in turn, and their variances by information: (r, p) each."""
     problem, p = fit.problem, len(fit.problem.free)
-    pieces, spreads, owners = _pieces(fit)
-    total = sum(len(piece) for piece in pieces)
-    found, shares = [], []
+    pieces, spreads, sources = _pieces(fit)
+    found, variances = [], []
     for i in range(len(pieces)):
         kept = [j for j in range(len(pieces)) if j != i]
-        rest = replace(problem, trials=tuple(pieces[j] for j in kept))
+        waves = tuple(problem.waves[sources[j]] for j in kept) if problem.waves else ()
+        rest = replace(problem, trials=tuple(pieces[j] for j in kept), waves=waves)
         start = rest.start()
         start[:p] = fit.minimum.unknowns[:p]
-        if owners is None:  # whole runs: their own unknowns are known already
+        if len(problem.trials) > 1:  # whole runs: their own unknowns are known already
             for at, j in enumerate(kept):
                 start[rest.own_slice(at)] = fit.minimum.unknowns[problem.own_slice(j)]
         minimum = minimise(rest, start, [spreads[j] for j in kept])
         found.append(minimum.unknowns[:p])
-        shares.append(len(pieces[i]) / total)
-    return np.array(found).reshape(-1, p), np.array(shares)
+        variances.append(np.diag(_inverse(rest, minimum.information))[:p])
+    return np.array(found).reshape(-1, p), np.array(variances).reshape(-1, p)
 
 
-def _pieces(fit: OutputError) -> tuple[list, list[Spread], int | None]:
-    """The runs; of a single one its halves."""
+def _pieces(fit: OutputError) -> tuple[list[Trial], list[Spread], list[int]]:
+    """The runs, of a single one its halves; their spreads; of which run each is."""
     problem = fit.problem
     if len(problem.trials) > 1:
-        return list(problem.trials), list(fit.spreads), None
+        return list(problem.trials), list(fit.spreads), list(range(len(problem.trials)))
     trial, spread = problem.trials[0], fit.spreads[0]
     half = len(trial) // 2
     if half * trial.dt_secs < LEAST_SECS:
-        return [], [], None
+        return [], [], []
     cuts = ((0, half), (half, len(trial)))
     return (
         [trial.part(*cut) for cut in cuts],
         [Spread(spread.effective[slice(*cut)], spread.usual[slice(*cut)]) for cut in cuts],
-        0,
+        [0, 0],
     )
 
 
@@ -192,15 +193,13 @@ def _jackknife(others: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(spread) * t.ppf(0.975, count - 1) / 1.96)
 
 
-def _birge(off: FloatArray, shares: FloatArray, covariance: FloatArray) -> float:
-    """How much more the runs differ than they should, at least 1; 1 where it may be chance."""
-    expected = np.diag(covariance)[None, :] * (shares / (1 - shares))[:, None]
+def _birge(off: FloatArray, grown: FloatArray, coloured: FloatArray, inverse: FloatArray) -> float:
+    """How much more the runs differ than they should, at least 1; 1 where it may be chance.
+
+    `off` is what the fit changes by without each run, `grown` by how much its variance should grow
+    then if noise were white; both (r, p).
+    """
+    expected = grown * (coloured**2 / np.diag(inverse)[: off.shape[1]])
     ratios = off**2 / np.maximum(expected, 1e-300)
-    # left out of two, both say the same thing twice
     told, count = float(np.median(ratios) / chi2.ppf(0.5, 1)), off.shape[1]
     return float(np.sqrt(told)) if told > chi2.ppf(1 - DOUBTFUL, count) / count else 1.0
-
-
-def runs_named(problem: Problem) -> Sequence[str]:
-    """The names of the runs, for a report."""
-    return [trial.name for trial in problem.trials]

@@ -1,0 +1,45 @@
+"""A wave in what a fit leaves: a ship rolls and pitches in a swell, and her sensors with her."""
+
+from math import pi
+
+import numpy as np
+
+from shiplog.types import FloatArray
+
+LEAST_CYCLES = 4.0  # in a trial: of a slower one it cannot be told what it is
+SHORTEST_SECS = 2.0  # of a period; a faster one harms no fit
+OVERSAMPLED = 4  # frequencies to each that the trial's length resolves
+SURE = 40.0  # of a peak in a periodogram of chi-squared numbers: one in a hundred million
+
+
+def frequency_of(residuals: FloatArray, usual: FloatArray, dt: float) -> float | None:
+    """The frequency, in rad/s, of the wave that stands out most in a trial's residuals, if any.
+
+    Both are (n, c), the residuals with NaN; each output's are weighed by their usual std. The
+    periodogram is Lomb's, "Least-squares frequency analysis of unequally spaced data", 1976.
+    """
+    n = len(residuals)
+    span = n * dt
+    lowest, highest = LEAST_CYCLES / span, min(1 / SHORTEST_SECS, 0.4 / dt)
+    grid = np.arange(lowest, highest, 1 / (OVERSAMPLED * span))
+    if not len(grid):
+        return None
+    power = np.zeros(len(grid))
+    for c in range(residuals.shape[1]):
+        power = np.maximum(power, _periodogram(residuals[:, c], usual[:, c], grid * dt))
+    best = int(np.argmax(power))
+    return float(2 * pi * grid[best]) if power[best] > SURE else None
+
+
+def _periodogram(residual: FloatArray, std: FloatArray, cycles: FloatArray) -> FloatArray:
+    """By how much a wave of so many cycles a sample lessens the weighted sum of squares.
+
+    By a Fourier transform, padded so that its frequencies lie close together.
+    """
+    known = np.isfinite(residual)
+    weight = np.where(known, std**-2.0, 0.0)
+    off = np.where(known, residual, 0.0)
+    off = off - np.average(off, weights=weight) * known
+    length = OVERSAMPLED * len(off)
+    spectrum = np.abs(np.fft.rfft(weight * off, length)) ** 2
+    return np.interp(cycles, np.fft.rfftfreq(length), 2 * spectrum / np.sum(weight))
