@@ -19,6 +19,7 @@ from .problem import Problem
 OUTLYING = 3.0  # standard deviations
 MOST_ROUNDS = 60
 SMALL = 1e-4  # a step of so many squared standard deviations of its own is the last
+STALE = 1.0  # after a step of so many, the derivatives are taken anew
 STEEPEST = 1e12  # of damping: no step is short enough
 
 
@@ -36,19 +37,28 @@ class Minimum:
 
     unknowns: FloatArray  # (m,)
     information: FloatArray  # (m, m) the data's, without the priors
+    jacobians: tuple[FloatArray, ...]  # of each trial, (n, c, k), there or very near
     cost: float
     rounds: int
     settled: bool
 
 
-def minimise(problem: Problem, start: FloatArray, spreads: Sequence[Spread]) -> Minimum:
-    """The unknowns that fit best, from `start` on."""
+def minimise(
+    problem: Problem,
+    start: FloatArray,
+    spreads: Sequence[Spread],
+    jacobians: Sequence[FloatArray] | None = None,
+) -> Minimum:
+    """The unknowns that fit best, from `start` on, where the `jacobians` are known if they are."""
     lowest, highest = problem.bounds
     _, precision = problem.prior
     z, damping, settled = np.clip(start, lowest, highest), 1e-3, False
     cost, rounds = total_cost(problem, z, spreads), 0
-    gradient, information = linearised(problem, z, spreads)
-    while rounds < MOST_ROUNDS and np.isfinite(cost) and damping < STEEPEST:
+    if not np.isfinite(cost):
+        return Minimum(z, np.zeros((len(z), len(z))), (), cost, 0, settled=False)
+    jacobians = _jacobians(problem, z) if jacobians is None else jacobians
+    gradient, information = linearised(problem, z, spreads, jacobians)
+    while rounds < MOST_ROUNDS and damping < STEEPEST:
         rounds += 1
         hessian = information + np.diag(precision)
         inside = ~(((z <= lowest) & (gradient > 0)) | ((z >= highest) & (gradient < 0)))
@@ -61,10 +71,16 @@ def minimise(problem: Problem, start: FloatArray, spreads: Sequence[Spread]) -> 
         new_cost = total_cost(problem, moved, spreads)
         if new_cost < cost:
             z, cost, damping = moved, new_cost, max(damping / 10, 1e-9)
-            gradient, information = linearised(problem, z, spreads)
+            if decrease > STALE:
+                jacobians = _jacobians(problem, z)
+            gradient, information = linearised(problem, z, spreads, jacobians)
         else:
             damping *= 10 if damping > 1e-6 else 1e3
-    return Minimum(z, information, cost, rounds, settled)
+    return Minimum(z, information, tuple(jacobians), cost, rounds, settled)
+
+
+def _jacobians(problem: Problem, z: FloatArray) -> list[FloatArray]:
+    return [problem.jacobian(z, i) for i in range(len(problem.trials))]
 
 
 def _step(
@@ -102,13 +118,13 @@ def total_cost(problem: Problem, z: FloatArray, spreads: Sequence[Spread]) -> fl
 
 
 def linearised(
-    problem: Problem, z: FloatArray, spreads: Sequence[Spread]
+    problem: Problem, z: FloatArray, spreads: Sequence[Spread], jacobians: Sequence[FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """The gradient of the cost, (m,), and the data's information matrix, (m, m)."""
     centre, precision = problem.prior
     gradient, information = precision * (z - centre), np.zeros((problem.size, problem.size))
     for i, spread in enumerate(spreads):
-        at, jacobian = problem.places(i), problem.jacobian(z, i)
+        at, jacobian = problem.places(i), jacobians[i]
         off, weight = weighed(problem, z, i, spread)
         flat, weights = jacobian.reshape(-1, len(at)), weight.reshape(-1, 1)
         gradient[at] -= flat.T @ (weights[:, 0] * off.reshape(-1))

@@ -108,16 +108,15 @@ def fit(problem: Problem, *, waves: bool = True) -> OutputError:
             f"the model {problem.model.name} runs away on these trials from every start tried; "
             f"give --start or another model: {', '.join(t.name for t in problem.trials)}"
         )
-    calm = _settled(problem, minimum.unknowns)
+    calm = _settled(problem, minimum)
     return _with_waves(calm) if waves else calm
 
 
-def _settled(problem: Problem, z: FloatArray) -> OutputError:
-    """The fit and its noise, found in turn."""
+def _settled(problem: Problem, minimum: Minimum) -> OutputError:
+    """The fit and its noise, found in turn from a first fit."""
     for _ in range(ROUNDS):
-        noises, spreads = noise_left(problem, z)
-        minimum = minimise(problem, z, spreads)
-        z = minimum.unknowns
+        noises, spreads = noise_left(problem, minimum.unknowns)
+        minimum = minimise(problem, minimum.unknowns, spreads, minimum.jacobians)
     return OutputError(problem, minimum, tuple(noises), tuple(spreads))
 
 
@@ -137,7 +136,7 @@ def _with_waves(calm: OutputError) -> OutputError:
     for i in range(len(problem.trials)):
         own, old = with_waves.own_slice(i), calm.minimum.unknowns[problem.own_slice(i)]
         start[own.start : own.start + len(old)] = old
-    wavy = _settled(with_waves, start)
+    wavy = _settled(with_waves, minimise(with_waves, start, calm.spreads))
     explained = all(
         new.slow**2 * new.slow_count <= UNEXPLAINED * old.slow**2 * old.slow_count
         for new, old in zip(wavy.noises, calm.noises, strict=True)

@@ -122,7 +122,7 @@ def _stds(covariance: FloatArray) -> FloatArray:
 def _white_information(fit: OutputError) -> FloatArray:
     """The information if each sample were off by itself."""
     white = [replace(spread, effective=spread.usual) for spread in fit.spreads]
-    return linearised(fit.problem, fit.minimum.unknowns, white)[1]
+    return linearised(fit.problem, fit.minimum.unknowns, white, fit.minimum.jacobians)[1]
 
 
 def _sandwich(fit: OutputError, inverse: FloatArray) -> FloatArray:
@@ -132,7 +132,7 @@ def _sandwich(fit: OutputError, inverse: FloatArray) -> FloatArray:
     longest = max(noise.slow_count for noise in fit.noises)
     for i, spread in enumerate(fit.spreads):
         off, weight = weighed(problem, z, i, spread)
-        scores = np.einsum("ncq,nc->nq", problem.jacobian(z, i), weight * off)
+        scores = np.einsum("ncq,nc->nq", fit.minimum.jacobians[i], weight * off)
         least = LEAST_WINDOW_SECS / problem.trials[i].dt_secs
         window = int(min(max(longest, least, 1), len(scores) / 2))
         sums = np.cumsum(scores, axis=0)
