@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from shiplog.types import FloatArray
@@ -84,7 +85,7 @@ def _jacobians(problem: Problem, z: FloatArray) -> list[FloatArray]:
 
 
 def _step(
-    hessian: FloatArray, gradient: FloatArray, inside: FloatArray, damping: float
+    hessian: FloatArray, gradient: FloatArray, inside: NDArray[np.bool_], damping: float
 ) -> tuple[FloatArray, float]:
     """The damped step over the unknowns not at a limit, and by how much it should help."""
     at = np.flatnonzero(inside)

@@ -34,9 +34,7 @@ class Noise:
         return np.sqrt(effective), np.sqrt(white + self.slow**2)
 
 
-def spreads_of(
-    noises: Sequence[Noise], levels: Sequence[FloatArray]
-) -> list[Spread]:
+def spreads_of(noises: Sequence[Noise], levels: Sequence[FloatArray]) -> list[Spread]:
     """Of each trial, whose predicted outputs are `levels`, (n, c) each."""
     found = []
     for level in levels:
@@ -48,7 +46,11 @@ def spreads_of(
 
 
 def noise_of(
-    residuals: Sequence[FloatArray], levels: Sequence[FloatArray], *, proportional: bool, least: float
+    residuals: Sequence[FloatArray],
+    levels: Sequence[FloatArray],
+    *,
+    proportional: bool,
+    least: float,
 ) -> Noise:
     """The noise of one output, of its residuals over each trial and its levels, (n,) each.
 
@@ -56,8 +58,12 @@ def noise_of(
     no instrument is believed.
     """
     white, relative = _white(residuals, levels, proportional=proportional)
-    everywhere = np.concatenate([level[np.isfinite(r)] for r, level in zip(residuals, levels, strict=True)])
-    floor = max(LEAST_SHARE * float(np.sqrt(np.mean(white**2 + (relative * everywhere) ** 2))), least)
+    everywhere = np.concatenate(
+        [level[np.isfinite(r)] for r, level in zip(residuals, levels, strict=True)]
+    )
+    floor = max(
+        LEAST_SHARE * float(np.sqrt(np.mean(white**2 + (relative * everywhere) ** 2))), least
+    )
     white = max(white, floor)
     stds = [np.sqrt(white**2 + (relative * level) ** 2) for level in levels]
     slow, count = _slow(residuals, stds)

@@ -10,6 +10,7 @@ from math import radians
 
 import numpy as np
 
+from analysis.weak_form import LEAST_RUDDER
 from shiplog.errors import LogError, UsageError
 from shiplog.ships import Model
 from shiplog.types import FloatArray
@@ -79,6 +80,7 @@ def pose(
     """The problem of fitting a model to trials, as `output_error` has it."""
     if not trials:
         raise UsageError("no trial to identify from; give at least one log")
+    _require_steering(trials)
     values = model.starts()
     for name, value in {**(start or {}), **(known or {})}.items():
         values[model.names.index(model.parameter(name).name)] = value
@@ -92,6 +94,16 @@ def pose(
         tuple(i for i, name in enumerate(model.names) if name in sought),
         Nuisance() if nuisance is None else nuisance,
     )  # fmt: skip
+
+
+def _require_steering(trials: Sequence[Trial]) -> None:
+    moved = max(float(np.ptp(trial.signals["rudder"])) for trial in trials)
+    if moved < LEAST_RUDDER:
+        names = ", ".join(trial.name for trial in trials)
+        raise LogError(
+            f"the rudder moves by {np.degrees(moved):.1f}° in all, and from that nothing can be "
+            f"identified; give a log of a zig-zag or of a turning circle: {names}"
+        )
 
 
 def fit(problem: Problem, *, waves: bool = True) -> OutputError:
@@ -128,9 +140,10 @@ def _with_waves(calm: OutputError) -> OutputError:
         frequency_of(r, spread.usual, problem.trials[i].dt_secs)
         for i, (r, spread) in enumerate(zip(left, calm.spreads, strict=True))
     ]
-    if not all(found):
+    waves = tuple((omega,) for omega in found if omega is not None)
+    if len(waves) < len(found):
         return calm
-    with_waves = replace(problem, waves=tuple((omega,) for omega in found))
+    with_waves = replace(problem, waves=waves)
     start = with_waves.start()
     start[: len(problem.free)] = calm.minimum.unknowns[: len(problem.free)]
     for i in range(len(problem.trials)):
@@ -170,5 +183,3 @@ def noise_left(problem: Problem, z: FloatArray) -> tuple[list[Noise], list[Sprea
         for c, output in enumerate(problem.outputs)
     ]  # fmt: skip
     return noises, spreads_of(noises, levels)
-
-

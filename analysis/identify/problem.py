@@ -205,9 +205,7 @@ class Problem:
         own = self.own_slice(i)
         return [*range(len(self.free)), *range(own.start, own.stop)]
 
-    def _own(
-        self, z: FloatArray, i: int
-    ) -> tuple[FloatArray, float, FloatArray, FloatArray]:
+    def _own(self, z: FloatArray, i: int) -> tuple[FloatArray, float, FloatArray, FloatArray]:
         """Trial i's initial state, rudder offset, biases, and waves by rows."""
         own, s = z[self.own_slice(i)], len(self.model.state)
         biases = s + self._offsets

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from analysis.sliding import Regression
+from analysis.weak_form import CHANNELS, Equation, Rows, weak_form
 from shiplog.ship import Coefficients
 from shiplog.ships.motion import OUTPUTS
 from shiplog.types import FloatArray
 
-from analysis.sliding import Regression
-from analysis.weak_form import CHANNELS, Equation, Rows, weak_form
 from .least_squares import Spread, total_cost
 from .problem import Problem
 
@@ -42,7 +42,8 @@ def _moved(problem: Problem, start: FloatArray, values: dict[str, float]) -> Flo
 
 def _by_weak_form(problem: Problem) -> dict[str, float]:
     """The paper's coefficients, as far as the rows of all trials tell them; 0 for b2, b3 if not."""
-    model = Coefficients(*np.real(problem.model.expand(problem.values + 0j)))
+    values = problem.model.expand(problem.values.astype(np.complex128))
+    model = Coefficients(*(complex(value).real for value in values))
     pairs = [
         weak_form(trial.signals, model)
         for trial in problem.trials

@@ -68,7 +68,7 @@ def trials_of(signals: Signals, name: str) -> tuple[Trial, ...]:
 
 def _trial(signals: Signals, name: str) -> Trial:
     missing = np.full(len(signals), np.nan)
-    columns = [signals[output] if output in signals else missing for output in OUTPUTS]
+    columns = [signals.values.get(output, missing) for output in OUTPUTS]
     return Trial(name, signals, path_of(signals), np.column_stack(columns))
 
 

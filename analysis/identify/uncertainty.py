@@ -1,11 +1,11 @@
 """How far the parameters of a fit may be off, by what the data themselves show.
 
-Four answers, for four reasons to be off. The Cramér-Rao bound is of white noise of the size found.
-What stays off for a while makes it too small; the covariance of White's sandwich with Newey and
-West's (1987) sums allows for that. What differs from run to run, as the ship's trim and her rudder's
-zero do, shows when each run is left out in turn (the jackknife; Tukey, 1958). And where there are
-too few runs for that, it shows how much more their estimates differ than they should if the model
-were true: all errors are enlarged by so much (Birge, 1932).
+Four answers, for four reasons to be off. The Cramér-Rao bound is of white noise of the size
+found. What stays off for a while makes it too small; White's sandwich with Newey and West's (1987)
+sums allows for that. What differs from run to run, as the ship's trim and her rudder's zero do,
+shows when each run is left out in turn (the jackknife; Tukey, 1958). And where there are too few
+runs for that, it shows how much more their estimates differ than they should if the model were
+true: all errors are enlarged by so much (Birge, 1932).
 """
 
 from dataclasses import dataclass, replace
@@ -22,6 +22,7 @@ from .trial import LEAST_SECS, Trial
 
 LEAST_RUNS = 4  # for a jackknife
 DOUBTFUL = 0.01  # by chance so rarely, and runs contradict each other
+INDEPENDENT = 2  # of the parameters, in effect: they are correlated
 LEAST_WINDOW_SECS = 5.0  # over which neighbours are taken together, at the least
 VAGUE = 0.25  # relative std of a parameter that these data cannot tell,
 ECHO = 0.5  # and how much of it may be what was believed before
@@ -56,7 +57,7 @@ class Uncertainty:
 
     @property
     def vague(self) -> tuple[str, ...]:
-        """The parameters that are not identifiable from these data: no number of theirs is known."""
+        """The parameters that are not identifiable from these data."""
         with np.errstate(divide="ignore", invalid="ignore"):
             relative = self.std / np.abs(self.values)
         told = (relative <= VAGUE) & (self.prior_share <= ECHO)
@@ -82,10 +83,8 @@ def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
         if len(others) >= LEAST_RUNS:
             jackknife = _jackknife(others)
         elif len(others) > 1:
-            enlarged = _birge(
-                others - z[:p], variances - np.diag(inverse)[:p], coloured, inverse
-            )
-    std = np.fmax(coloured * enlarged, jackknife)
+            enlarged = _birge(others - z[:p], variances - np.diag(inverse)[:p], coloured, inverse)
+    std = np.fmax(np.maximum(coloured, bound) * enlarged, jackknife)
     grown = std / np.where(coloured > 0, coloured, 1.0)
     information = fit.minimum.information + np.diag(problem.prior[1])
     return Uncertainty(
@@ -104,7 +103,7 @@ def _inverse(problem: Problem, information: FloatArray) -> FloatArray:
 
 
 def _condition(information: FloatArray, p: int) -> float:
-    """Of the parameters' scaled information, the nuisances eliminated; of its root, as of columns."""
+    """Of the root of the parameters' scaled information, the nuisances eliminated."""
     own = information[p:, p:]
     scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
     across = information[:p, p:] / scale
@@ -201,5 +200,6 @@ def _birge(off: FloatArray, grown: FloatArray, coloured: FloatArray, inverse: Fl
     """
     expected = grown * (coloured**2 / np.diag(inverse)[: off.shape[1]])
     ratios = off**2 / np.maximum(expected, 1e-300)
-    told, count = float(np.median(ratios) / chi2.ppf(0.5, 1)), off.shape[1]
-    return float(np.sqrt(told)) if told > chi2.ppf(1 - DOUBTFUL, count) / count else 1.0
+    told = float(np.median(ratios) / chi2.ppf(0.5, 1))
+    chance = chi2.ppf(1 - DOUBTFUL, INDEPENDENT) / INDEPENDENT
+    return float(np.sqrt(told)) if told > chance else 1.0

@@ -42,4 +42,5 @@ def _periodogram(residual: FloatArray, std: FloatArray, cycles: FloatArray) -> F
     off = off - np.average(off, weights=weight) * known
     length = OVERSAMPLED * len(off)
     spectrum = np.abs(np.fft.rfft(weight * off, length)) ** 2
-    return np.interp(cycles, np.fft.rfftfreq(length), 2 * spectrum / np.sum(weight))
+    power = 2 * spectrum / np.sum(weight)
+    return np.asarray(np.interp(cycles, np.fft.rfftfreq(length), power))

@@ -63,9 +63,7 @@ def _observed(c: DriftLag, x: ComplexArray) -> tuple[complex, complex, complex, 
 
 
 @compiled
-def _sail(
-    c: DriftLag, x: ComplexArray, offset: complex, path: Path, count: int
-) -> ComplexArray:
+def _sail(c: DriftLag, x: ComplexArray, offset: complex, path: Path, count: int) -> ComplexArray:
     return sail(c, x, offset, path, count)
 
 

@@ -123,7 +123,13 @@ class Model:
         equations, `offset` a rudder added to that of the path, in rad. NaN from where the
         ship runs away.
         """
-        out = self._sail(parameters + 0j, initial + 0j, complex(offset), scale.scaled(path), count)
+        out = self._sail(
+            parameters.astype(np.complex128),
+            initial.astype(np.complex128),
+            complex(offset),
+            scale.scaled(path),
+            count,
+        )
         return np.asarray(out.real * scale.outputs)
 
     def sensitivities(

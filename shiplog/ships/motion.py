@@ -4,7 +4,8 @@ A model states its equations for a type of its own (`equations`, `observations`)
 they hold for complex numbers too. A derivative is then had by moving a parameter along the
 imaginary axis by next to nothing (Squire and Trapp, "Using complex variables to estimate
 derivatives of real functions", 1998): exact to the last digit, with no step to choose and nothing
-to derive by hand.
+to derive by hand. So |x| is `magnitude(x)`, functions are numpy's, and powers are products: numba's
+power of a complex number goes by its logarithm, and loses what is next to nothing.
 """
 
 from collections.abc import Callable

@@ -46,9 +46,7 @@ def _observed(c: Norrbin, x: ComplexArray) -> tuple[complex, complex, complex, c
 
 
 @compiled
-def _sail(
-    c: Norrbin, x: ComplexArray, offset: complex, path: Path, count: int
-) -> ComplexArray:
+def _sail(c: Norrbin, x: ComplexArray, offset: complex, path: Path, count: int) -> ComplexArray:
     return sail(c, x, offset, path, count)
 
 

@@ -58,9 +58,7 @@ def _observed(c: Slipstream, x: ComplexArray) -> tuple[complex, complex, complex
 
 
 @compiled
-def _sail(
-    c: Slipstream, x: ComplexArray, offset: complex, path: Path, count: int
-) -> ComplexArray:
+def _sail(c: Slipstream, x: ComplexArray, offset: complex, path: Path, count: int) -> ComplexArray:
     return sail(c, x, offset, path, count)
 
 

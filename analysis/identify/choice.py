@@ -1,0 +1,74 @@
+"""Which model to believe: the one that says best what runs it never saw did.
+
+Each run is left out in turn, and predicted from a fit to the others (Stone, "Cross-validatory
+choice and assessment of statistical predictions", 1974). A run is a manoeuvre to one side, so that
+this is a validation across manoeuvres and across sides. How well a model fits says little: the
+richest always fits best.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from shiplog.errors import LogError, UsageError
+from shiplog.ships import Model
+from shiplog.ships.motion import OUTPUTS
+from shiplog.types import FloatArray
+
+from .least_squares import minimise
+from .output_error import OutputError, output_error
+from .prediction import misfit, problem_without
+from .trial import Trial
+
+JUDGED = [OUTPUTS.index(name) for name in ("yaw_rate", "speed", "heading")]  # by all models alike
+WORST = 10.0  # of a relative error: a ship that runs away is no worse than ten times off
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A model, fitted to all runs, and how far it is off runs it never saw."""
+
+    model: Model
+    fit: OutputError | None  # None where it runs away
+    misfits: FloatArray  # (r, 4) of each run left out: rms over the std of what was measured
+
+    @property
+    def score(self) -> float:
+        """The mean of the misfits that are judged; the smaller, the better."""
+        judged = np.minimum(self.misfits[:, JUDGED], WORST)
+        return float(np.nanmean(judged)) if np.isfinite(judged).any() else WORST
+
+
+def compare(
+    trials: Sequence[Trial],
+    models: Sequence[Model],
+    **settings: Any,  # noqa: ANN401
+) -> list[Candidate]:
+    """The models by how well they predict, the best first; `settings` are `output_error`'s.
+
+    Raises `UsageError` where there are fewer than two runs to tell them apart by.
+    """
+    if len(trials) < 2:
+        raise UsageError(
+            "a model is chosen by runs it has not seen: give two logs or more, or name the model"
+        )
+    return sorted((_candidate(trials, model, settings) for model in models), key=lambda c: c.score)
+
+
+def _candidate(trials: Sequence[Trial], model: Model, settings: Mapping[str, Any]) -> Candidate:
+    try:
+        fit = output_error(trials, model, **settings)
+    except LogError:
+        return Candidate(model, None, np.full((len(trials), len(OUTPUTS)), np.inf))
+    return Candidate(model, fit, np.array([_left_out(fit, i) for i in range(len(trials))]))
+
+
+def _left_out(fit: OutputError, i: int) -> FloatArray:
+    """How far off a run is a fit to the others."""
+    rest, start = problem_without(fit, i)
+    spreads = [spread for j, spread in enumerate(fit.spreads) if j != i]
+    minimum = minimise(rest, start, spreads)
+    others = replace(fit, problem=rest, minimum=minimum, spreads=tuple(spreads))
+    return misfit(others, fit.problem.trials[i])

@@ -1,0 +1,120 @@
+"""What a fit says of a run it never saw."""
+
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+
+from shiplog.ships.motion import OUTPUTS
+from shiplog.types import FloatArray
+
+from .least_squares import minimise
+from .output_error import OutputError, first_spreads
+from .problem import Problem
+from .trial import Trial
+
+HARD_OVER = 0.8  # of the greatest rudder of a run: there it is held over
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A turning circle: metres, seconds, rad/s and m/s; NaN for what was not reached."""
+
+    advance: float  # along the first course, at 90 degrees of heading
+    transfer: float  # across it, at 90 degrees
+    tactical_diameter: float  # across it, at 180 degrees
+    time_90_secs: float
+    time_180_secs: float
+    steady_yaw_rate: float  # its size, over the latter half of the rudder held over
+    steady_speed: float  # through the water, there
+
+
+def predict(fit: OutputError, trial: Trial) -> FloatArray:
+    """A fit's open-loop run under a trial's rudder and revolutions, (n, 4), SI.
+
+    It begins as the trial began; nothing else of what was measured is used.
+    """
+    problem = replace(fit.problem, trials=(trial,), waves=())
+    state = problem.start()[len(problem.free) :][: len(problem.model.state)]
+    return problem.model.simulate(
+        fit.parameters, state, trial.path, len(trial), scale=problem.scale
+    )
+
+
+def misfit(fit: OutputError, trial: Trial) -> FloatArray:
+    """How far a fit is off a trial it never saw, (4,): rms over the std of what was measured.
+
+    The trial's own unknowns are fitted to it, the parameters are not: no rudder's zero and no
+    sensor's bias of one run is known from another. NaN for what was not measured or the model
+    does not predict; inf where the ship runs away.
+    """
+    whole = fit.problem
+    problem = replace(whole, trials=(trial,), values=fit.parameters, free=(), waves=())
+    minimum = minimise(problem, problem.start(), first_spreads(problem))
+    found = np.full(len(OUTPUTS), np.nan)
+    off = problem.measured(0) - problem.predicted(minimum.unknowns, 0)
+    for at, column in enumerate(problem.columns):
+        known = np.isfinite(problem.measured(0)[:, at])
+        if known.sum() > 1:
+            size = float(np.std(problem.measured(0)[known, at]))
+            rms = float(np.sqrt(np.mean(off[known, at] ** 2)))
+            found[column] = rms / size if np.isfinite(rms) else np.inf
+    return found
+
+
+def made_good(outputs: FloatArray, dt: float) -> FloatArray:
+    """North and east, (n, 2) in m from the first sample, of outputs that are known throughout."""
+    _, ahead, sway, heading = outputs.T
+    sway = np.nan_to_num(sway)
+    north = ahead * np.cos(heading) - sway * np.sin(heading)
+    east = ahead * np.sin(heading) + sway * np.cos(heading)
+    rates = np.column_stack((north, east))
+    steps = (rates[1:] + rates[:-1]) / 2 * dt
+    return np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
+
+
+def turn(outputs: FloatArray, positions: FloatArray, rudder: FloatArray, dt: float) -> Turn:
+    """The figures of a turning circle that begins with the first sample.
+
+    `outputs` are (n, 4), `positions` (n, 2) in m, `rudder` (n,). Source: IMO MSC.137(76).
+    """
+    over = np.flatnonzero(np.abs(rudder) > HARD_OVER * np.max(np.abs(rudder)))
+    side = float(np.sign(np.median(rudder[over])))
+    held = over[len(over) // 2 :]
+    heading = outputs[:, 3]
+    turned = side * (heading - heading[0])
+    first = np.array([np.cos(heading[0]), np.sin(heading[0])])
+    across = side * np.array([-first[1], first[0]])
+    off = positions - positions[0]
+    at_90, at_180 = _reached(turned, pi / 2), _reached(turned, pi)
+    index = np.arange(len(turned))
+    along, aside = off @ first, off @ across
+    speed = np.hypot(outputs[:, 1], np.nan_to_num(outputs[:, 2]))
+    return Turn(
+        float(np.interp(at_90, index, along)) if np.isfinite(at_90) else np.nan,
+        float(np.interp(at_90, index, aside)) if np.isfinite(at_90) else np.nan,
+        float(np.interp(at_180, index, aside)) if np.isfinite(at_180) else np.nan,
+        at_90 * dt,
+        at_180 * dt,
+        float(np.abs(np.median(outputs[held, 0]))),
+        float(np.median(speed[held])),
+    )
+
+
+def _reached(turned: FloatArray, angle: float) -> float:
+    """The index, with its fraction, at which an angle is first reached; NaN if it never is."""
+    beyond = np.flatnonzero(turned >= angle)
+    if not len(beyond) or beyond[0] == 0:
+        return np.nan
+    k = int(beyond[0])
+    return k - 1 + float((angle - turned[k - 1]) / (turned[k] - turned[k - 1]))
+
+
+def problem_without(fit: OutputError, left_out: int) -> tuple[Problem, FloatArray]:
+    """A fit's problem without one of its runs, and where its search begins: where the fit is."""
+    problem, z = fit.problem, fit.minimum.unknowns
+    kept = [i for i in range(len(problem.trials)) if i != left_out]
+    waves = tuple(problem.waves[i] for i in kept) if problem.waves else ()
+    rest = replace(problem, trials=tuple(problem.trials[i] for i in kept), waves=waves)
+    own = [z[problem.own_slice(i)] for i in kept]
+    return rest, np.concatenate([z[: len(problem.free)], *own])
