@@ -26,6 +26,7 @@ INDEPENDENT = 2  # of the parameters, in effect: they are correlated
 LEAST_WINDOW_SECS = 5.0  # over which neighbours are taken together, at the least
 VAGUE = 0.25  # relative std of a parameter that these data cannot tell,
 ECHO = 0.5  # and how much of it may be what was believed before
+NOTHING = 1e-200  # of information: its inverse is still a number
 SINGULAR = 1e-13  # of the scaled information: less of it is none
 
 
@@ -96,7 +97,7 @@ def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
 def _inverse(problem: Problem, information: FloatArray) -> FloatArray:
     """The covariance of all unknowns; what nothing tells has a variance beyond all bounds."""
     whole = information + np.diag(problem.prior[1])
-    scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    scale = np.sqrt(np.maximum(np.diag(whole), NOTHING))
     values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
     scaled = (vectors / np.maximum(values, SINGULAR)) @ vectors.T
     return np.asarray(scaled / np.outer(scale, scale))
