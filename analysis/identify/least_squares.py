@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from shiplog.types import FloatArray
 
-from .problem import Problem
+from .problem import Problem, residuals
 
 OUTLYING = 3.0  # standard deviations
 MOST_ROUNDS = 60
@@ -54,11 +54,12 @@ def minimise(
     lowest, highest = problem.bounds
     _, precision = problem.prior
     z, damping, settled = np.clip(start, lowest, highest), 1e-3, False
-    cost, rounds = total_cost(problem, z, spreads), 0
+    left = residuals(problem, z)
+    cost, rounds = total_cost(problem, z, left, spreads), 0
     if not np.isfinite(cost):
         return Minimum(z, np.zeros((len(z), len(z))), (), cost, 0, settled=False)
     jacobians = _jacobians(problem, z) if jacobians is None else jacobians
-    gradient, information = linearised(problem, z, spreads, jacobians)
+    gradient, information = linearised(problem, z, left, spreads, jacobians)
     while rounds < MOST_ROUNDS and damping < STEEPEST:
         rounds += 1
         hessian = information + np.diag(precision)
@@ -69,12 +70,13 @@ def minimise(
             if settled:
                 break
         moved = np.clip(z + step, lowest, highest)
-        new_cost = total_cost(problem, moved, spreads)
+        new_left = residuals(problem, moved)
+        new_cost = total_cost(problem, moved, new_left, spreads)
         if new_cost < cost:
-            z, cost, damping = moved, new_cost, max(damping / 10, 1e-9)
+            z, left, cost, damping = moved, new_left, new_cost, max(damping / 10, 1e-9)
             if decrease > STALE:
                 jacobians = _jacobians(problem, z)
-            gradient, information = linearised(problem, z, spreads, jacobians)
+            gradient, information = linearised(problem, z, left, spreads, jacobians)
         else:
             damping *= 10 if damping > 1e-6 else 1e3
     return Minimum(z, information, tuple(jacobians), cost, rounds, settled)
@@ -102,43 +104,45 @@ def _step(
     return step, float(downhill @ along)
 
 
-def total_cost(problem: Problem, z: FloatArray, spreads: Sequence[Spread]) -> float:
-    """Half the sum of squares, outliers for less, and of the priors; inf where a ship runs away."""
+def total_cost(
+    problem: Problem, z: FloatArray, left: Sequence[FloatArray], spreads: Sequence[Spread]
+) -> float:
+    """Half the sum of squares, outliers for less, and of the priors; inf where a ship runs away.
+
+    `left` are the residuals at `z`.
+    """
     centre, precision = problem.prior
     total = float(np.sum(precision * (z - centre) ** 2)) / 2
-    for i, spread in enumerate(spreads):
-        predicted, measured = problem.predicted(z, i), problem.measured(i)
-        known = np.isfinite(measured)
-        off = (measured - predicted)[known]
-        if not np.isfinite(off).all():
-            return inf
+    for i, (off, spread) in enumerate(zip(left, spreads, strict=True)):
+        known = problem.known(i)
         edge = OUTLYING * spread.usual[known]
-        loss = edge**2 * (np.sqrt(1 + (off / edge) ** 2) - 1)
+        loss = edge**2 * (np.sqrt(1 + (off[known] / edge) ** 2) - 1)
         total += float(np.sum(loss / spread.effective[known] ** 2))
-    return total
+    return total if np.isfinite(total) else inf
 
 
 def linearised(
-    problem: Problem, z: FloatArray, spreads: Sequence[Spread], jacobians: Sequence[FloatArray]
+    problem: Problem,
+    z: FloatArray,
+    left: Sequence[FloatArray],
+    spreads: Sequence[Spread],
+    jacobians: Sequence[FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
     """The gradient of the cost, (m,), and the data's information matrix, (m, m)."""
     centre, precision = problem.prior
     gradient, information = precision * (z - centre), np.zeros((problem.size, problem.size))
-    for i, spread in enumerate(spreads):
-        at, jacobian = problem.places(i), jacobians[i]
-        off, weight = weighed(problem, z, i, spread)
-        flat, weights = jacobian.reshape(-1, len(at)), weight.reshape(-1, 1)
-        gradient[at] -= flat.T @ (weights[:, 0] * off.reshape(-1))
-        information[np.ix_(at, at)] += flat.T @ (weights * flat)
+    for i, (spread, jacobian) in enumerate(zip(spreads, jacobians, strict=True)):
+        at, (off, weight) = problem.places(i), weighed(left[i], spread)
+        flat = jacobian.reshape(-1, len(at))
+        weighted = flat * weight.reshape(-1, 1)
+        gradient[at] -= weighted.T @ off.reshape(-1)
+        information[np.ix_(at, at)] += weighted.T @ flat
     return gradient, information
 
 
-def weighed(
-    problem: Problem, z: FloatArray, i: int, spread: Spread
-) -> tuple[FloatArray, FloatArray]:
-    """Trial i's residuals, zero where nothing was measured, and their weights: (n, c) each."""
-    off = problem.measured(i) - problem.predicted(z, i)
-    known = np.isfinite(off)
-    off = np.where(known, off, 0.0)
+def weighed(left: FloatArray, spread: Spread) -> tuple[FloatArray, FloatArray]:
+    """A trial's residuals, zero where nothing was measured, and their weights: (n, c) each."""
+    known = np.isfinite(left)
+    off = np.where(known, left, 0.0)
     share = 1 / np.sqrt(1 + (off / (OUTLYING * spread.usual)) ** 2)
     return off, np.where(known, share / spread.effective**2, 0.0)

@@ -7,6 +7,7 @@ from math import inf, pi, radians
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shiplog.ships import Model, Scale
 from shiplog.ships.motion import OUTPUTS
@@ -199,6 +200,10 @@ class Problem:
     def measured(self, i: int) -> FloatArray:
         """(n, c) what was measured of them, NaN where nothing was."""
         return self.trials[i].measured[:, self.columns]
+
+    def known(self, i: int) -> NDArray[np.bool_]:
+        """(n, c) which of them were measured."""
+        return np.isfinite(self.measured(i))
 
     def places(self, i: int) -> list[int]:
         """Where the unknowns of `jacobian` stand among all."""

@@ -15,7 +15,7 @@ from shiplog.ships.motion import OUTPUTS
 from shiplog.types import FloatArray
 
 from .least_squares import Spread, total_cost
-from .problem import Problem
+from .problem import Problem, residuals
 
 YAW_FORMS = (("a", "b1", "b2", "b3", "d", "e"), ("a", "b1", "b2", "d", "e"), ("a", "b1", "d", "e"))
 SURGE_FORMS = (("f", "g", "h"), ("f", "h"))
@@ -27,7 +27,7 @@ def starts(problem: Problem, spreads: Sequence[Spread]) -> list[FloatArray]:
     found = [given]
     if problem.model.kind is Coefficients:
         found.append(_moved(problem, given, _by_weak_form(problem)))
-    costs = [total_cost(problem, z, spreads) for z in found]
+    costs = [total_cost(problem, z, residuals(problem, z), spreads) for z in found]
     return [found[i] for i in np.argsort(costs, kind="stable")]
 
 

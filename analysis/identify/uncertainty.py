@@ -17,7 +17,7 @@ from shiplog.types import FloatArray
 
 from .least_squares import Spread, linearised, minimise, weighed
 from .output_error import OutputError
-from .problem import Problem
+from .problem import Problem, residuals
 from .trial import LEAST_SECS, Trial
 
 LEAST_RUNS = 4  # for a jackknife
@@ -122,16 +122,17 @@ def _stds(covariance: FloatArray) -> FloatArray:
 def _white_information(fit: OutputError) -> FloatArray:
     """The information if each sample were off by itself."""
     white = [replace(spread, effective=spread.usual) for spread in fit.spreads]
-    return linearised(fit.problem, fit.minimum.unknowns, white, fit.minimum.jacobians)[1]
+    left = residuals(fit.problem, fit.minimum.unknowns)
+    return linearised(fit.problem, fit.minimum.unknowns, left, white, fit.minimum.jacobians)[1]
 
 
 def _sandwich(fit: OutputError, inverse: FloatArray) -> FloatArray:
     """White's covariance, neighbouring scores summed over windows as Newey and West have it."""
     problem, z = fit.problem, fit.minimum.unknowns
-    middle = np.diag(problem.prior[1])
+    middle, left = np.diag(problem.prior[1]), residuals(problem, z)
     longest = max(noise.slow_count for noise in fit.noises)
     for i, spread in enumerate(fit.spreads):
-        off, weight = weighed(problem, z, i, spread)
+        off, weight = weighed(left[i], spread)
         scores = np.einsum("ncq,nc->nq", fit.minimum.jacobians[i], weight * off)
         least = LEAST_WINDOW_SECS / problem.trials[i].dt_secs
         window = int(min(max(longest, least, 1), len(scores) / 2))

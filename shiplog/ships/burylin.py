@@ -11,19 +11,26 @@ derivation has it, b1 = -d and e = T3 d, which is singular for a ship at the mar
 from collections.abc import Sequence
 from math import inf
 
-import numpy as np
-
 from shiplog.compiled import compiled
 from shiplog.ship import COEFFICIENT_UNITS, Coefficients
 
 from .model import Model, Parameter, StateValue
-from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, sail
+from .motion import (
+    ComplexArray,
+    Forcing,
+    Path,
+    equations,
+    exponential,
+    magnitude,
+    observations,
+    sail,
+)
 
 
 @equations(Coefficients)
 def _motion(c: Coefficients, x: ComplexArray, u: Forcing) -> tuple[complex, ...]:
     w, w_dot, v = x[0], x[1], x[2]
-    ks = c.alpha1 * v + c.alpha2 * u.n * np.exp(-c.alpha3 * v)
+    ks = c.alpha1 * v + c.alpha2 * u.n * exponential(-c.alpha3 * v)
     hull = c.a * w_dot + c.b1 * w + c.b2 * w * magnitude(w) + c.b3 * w * w * w
     return (
         w_dot,

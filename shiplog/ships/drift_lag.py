@@ -12,12 +12,10 @@ all, for that is her own mass going sideways.
 
 from typing import NamedTuple
 
-import numpy as np
-
 from shiplog.compiled import compiled
 
 from .model import Model, Parameter, StateValue
-from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, sail
+from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, root, sail
 from .slipstream import SURGE, YAW
 
 
@@ -59,7 +57,7 @@ def _motion(c: DriftLag, x: ComplexArray, u: Forcing) -> tuple[complex, ...]:
 @observations(DriftLag)
 def _observed(c: DriftLag, x: ComplexArray) -> tuple[complex, complex, complex, complex]:  # noqa: ARG001
     rho, nu, sigma = x[0], x[2], x[3]
-    return rho, np.sqrt(nu * nu - sigma * sigma), sigma, x[4]
+    return rho, root(nu * nu - sigma * sigma), sigma, x[4]
 
 
 @compiled

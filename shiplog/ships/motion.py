@@ -4,11 +4,13 @@ A model states its equations for a type of its own (`equations`, `observations`)
 they hold for complex numbers too. A derivative is then had by moving a parameter along the
 imaginary axis by next to nothing (Squire and Trapp, "Using complex variables to estimate
 derivatives of real functions", 1998): exact to the last digit, with no step to choose and nothing
-to derive by hand. So |x| is `magnitude(x)`, functions are numpy's, and powers are products: numba's
-power of a complex number goes by its logarithm, and loses what is next to nothing.
+to derive by hand. So |x| is `magnitude(x)`, e^x `exponential(x)`, the square root `root(x)`, and
+powers are products: numba's power of a complex number goes by its logarithm, and loses what is
+next to nothing.
 """
 
 from collections.abc import Callable
+from math import exp, sqrt
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -65,6 +67,19 @@ def observations(kind: type) -> Callable[[F], F]:
 def magnitude(x: complex) -> complex:
     """|x| of what is real but for a derivative along the imaginary axis."""
     return x if x.real >= 0 else -x
+
+
+@compiled_within
+def exponential(x: complex) -> complex:
+    """The same of e^x, at a fraction of the cost of a complex one."""
+    return complex(exp(x.real), exp(x.real) * x.imag)
+
+
+@compiled_within
+def root(x: complex) -> complex:
+    """The same of the square root."""
+    size = sqrt(x.real)
+    return complex(size, x.imag / (2 * size))
 
 
 @compiled_within

@@ -13,12 +13,10 @@ and the ship goes where she drifts, not where she points. b3 is left out: it and
 
 from typing import NamedTuple
 
-import numpy as np
-
 from shiplog.compiled import compiled
 
 from .model import Model, Parameter, StateValue
-from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, sail
+from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, root, sail
 
 
 class Slipstream(NamedTuple):
@@ -54,7 +52,7 @@ def _motion(c: Slipstream, x: ComplexArray, u: Forcing) -> tuple[complex, ...]:
 def _observed(c: Slipstream, x: ComplexArray) -> tuple[complex, complex, complex, complex]:
     rho, nu = x[0], x[2]
     sway = c.c1 * rho + c.c2 * rho * magnitude(rho) / nu
-    return rho, np.sqrt(nu * nu - sway * sway), sway, x[3]
+    return rho, root(nu * nu - sway * sway), sway, x[3]
 
 
 @compiled

@@ -24,12 +24,10 @@ standard method for ship maneuvering predictions", 2015).
 
 from typing import NamedTuple
 
-import numpy as np
-
 from shiplog.compiled import compiled, compiled_within
 
 from .model import Model, Parameter, StateValue
-from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, sail
+from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, root, sail
 
 AFT = 0.8  # where the rudder feels the ship turn, in lengths: further aft than it is
 
@@ -75,7 +73,7 @@ def _motion(c: ThreeDof, x: ComplexArray, u: Forcing) -> tuple[complex, ...]:
     rho, sigma, nu = x[0], x[1], x[2]
     y, n = _cross_flow(sigma, rho)
     stream = (1 - c.m) * nu * nu + c.m * u.n * u.n
-    force = stream * u.delta + c.w * np.sqrt(stream) * (sigma - AFT * rho)
+    force = stream * u.delta + c.w * root(stream) * (sigma - AFT * rho)
     drift = sigma * sigma
     thrust = c.h * u.n * (u.n + c.p * (u.n - nu))
     return (
