@@ -1,6 +1,7 @@
 """What a ship was given, from samples: steps on which the rudder moves evenly."""
 
-from math import ceil
+from itertools import pairwise
+from math import ceil, floor
 
 import numpy as np
 
@@ -9,7 +10,10 @@ from shiplog.types import FloatArray, Signals
 from .motion import Path
 
 LONGEST_SECS = 2.0  # of a step: the fastest thing in a ship takes several
+JOINED_SECS = 0.5  # of a step over several samples: what lies between its ends is interpolated
 STRAIGHT = 1e-6  # of the greatest slope: two that differ by less are one line
+
+_Step = tuple[int, int, float, float, float]  # first interval, samples, length, rudder, its slope
 
 
 def path_of(signals: Signals) -> Path:
@@ -17,34 +21,52 @@ def path_of(signals: Signals) -> Path:
 
     Between samples the rudder moves evenly, the revolutions stay. Where the rudder goes in
     straight lines, as an ideal gear's does, its knots are put back to where the lines meet: left on
-    the samples they bias what is fitted to clean data by per cents.
+    the samples they bias what is fitted to clean data by per cents. Intervals of one line are
+    joined to one step, as long as it stays short.
     """
-    dt, delta = signals.dt_secs, signals["rudder"]
+    dt, delta, rpm = signals.dt_secs, signals["rudder"], signals["rpm"]
     knots = _knots(delta, dt)
-    parts = max(1, ceil(dt / LONGEST_SECS))
-    rows = [
-        row
-        for k in range(len(delta) - 1)
-        for row in _interval(k, float(delta[k]), float(delta[k + 1]), knots.get(k), dt, parts)
-    ]
-    at = np.array([row[0] for row in rows], np.int64)
-    secs, begins, slopes = (np.array([row[i] for row in rows]) for i in (1, 2, 3))
-    ends = np.append(at[1:] != at[:-1], True)
-    return Path(secs, begins, slopes, signals["rpm"][at], np.where(ends, at + 1, -1))
+    rows: list[_Step] = []
+    k = 0
+    for end in _joined(delta, rpm, dt, set(knots)):
+        rows += _interval(k, end - k, float(delta[k]), float(delta[end]), knots.get(k), dt)
+        k = end
+    first, count = (np.array([row[i] for row in rows], np.int64) for i in (0, 1))
+    secs, begins, slopes = (np.array([row[i] for row in rows]) for i in (2, 3, 4))
+    return Path(secs, begins, slopes, rpm[first], np.where(count > 0, first + count, -1), count)
+
+
+def _joined(delta: FloatArray, rpm: FloatArray, dt: float, knots: set[int]) -> list[int]:
+    """Where the steps end, by the number of the sample."""
+    slope = np.diff(delta) / dt
+    tolerance = STRAIGHT * np.abs(slope).max(initial=0.0)
+    bends = np.flatnonzero((np.abs(np.diff(slope)) > tolerance) | (np.diff(rpm[:-1]) != 0)) + 1
+    edges = {0, len(slope), *bends.tolist(), *knots, *(k + 1 for k in knots)}
+    corners = sorted(edges)
+    longest = max(1, floor(JOINED_SECS / dt + 1e-9))
+    ends = []
+    for start, stop in pairwise(corners):
+        ends += [*range(start + longest, stop, longest), stop]
+    return ends
 
 
 def _interval(
-    k: int, begin: float, end: float, knot: tuple[float, float] | None, dt: float, parts: int
-) -> list[tuple[int, float, float, float]]:
-    """The steps of an interval: its number, and each one's length, first rudder and slope."""
+    k: int, count: int, begin: float, end: float, knot: tuple[float, float] | None, dt: float
+) -> list[_Step]:
+    """The steps of some intervals of one line, or of one with a knot in it."""
     if knot is None:
-        slope = (end - begin) / dt
-        return [(k, dt / parts, begin + slope * dt * i / parts, slope) for i in range(parts)]
+        return _straight(k, count, begin, end, dt * count)
     after, there = knot
+    return [*_straight(k, 0, begin, there, after), *_straight(k, 1, there, end, dt - after)]
+
+
+def _straight(k: int, count: int, begin: float, end: float, secs: float) -> list[_Step]:
+    """The steps of a straight line, at whose end there are samples, or none."""
+    parts = max(1, ceil(secs / LONGEST_SECS))
+    slope, length = (end - begin) / secs, secs / parts
     return [
-        row
-        for length, first, last in ((after, begin, there), (dt - after, there, end))
-        for row in _interval(k, first, last, None, length, ceil(length / LONGEST_SECS))
+        (k, count if i == parts - 1 else 0, length, begin + slope * length * i, slope)
+        for i in range(parts)
     ]
 
 
