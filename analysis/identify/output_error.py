@@ -136,8 +136,9 @@ def _with_waves(calm: OutputError) -> OutputError:
     """The fit with a wave in each trial, where that explains all that stays off."""
     problem = calm.problem
     left = [np.asarray(r) for r in residuals(problem, calm.minimum.unknowns)]
+    slow = [noise.slow for noise in calm.noises]
     found = [
-        frequency_of(r, spread.usual, problem.trials[i].dt_secs)
+        frequency_of(r, spread.usual, problem.trials[i].dt_secs, slow)
         for i, (r, spread) in enumerate(zip(left, calm.spreads, strict=True))
     ]
     waves = tuple((omega,) for omega in found if omega is not None)

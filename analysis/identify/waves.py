@@ -1,5 +1,6 @@
 """A wave in what a fit leaves: a ship rolls and pitches in a swell, and her sensors with her."""
 
+from collections.abc import Sequence
 from math import pi
 
 import numpy as np
@@ -9,13 +10,17 @@ from shiplog.types import FloatArray
 LEAST_CYCLES = 4.0  # in a trial: of a slower one it cannot be told what it is
 SHORTEST_SECS = 2.0  # of a period; a faster one harms no fit
 OVERSAMPLED = 4  # frequencies to each that the trial's length resolves
+MOST = 0.5  # of what stays off: where a wave is less, it is not a wave alone
 SURE = 40.0  # of a peak in a periodogram of chi-squared numbers: one in a hundred million
 
 
-def frequency_of(residuals: FloatArray, usual: FloatArray, dt: float) -> float | None:
+def frequency_of(
+    residuals: FloatArray, usual: FloatArray, dt: float, slow: Sequence[float] = ()
+) -> float | None:
     """The frequency, in rad/s, of the wave that stands out most in a trial's residuals, if any.
 
-    Both are (n, c), the residuals with NaN; each output's are weighed by their usual std. The
+    Both are (n, c), the residuals with NaN; each output's are weighed by their usual std. Of an
+    output's `slow` part, a std, a wave must be able to explain the half. The
     periodogram is Lomb's, "Least-squares frequency analysis of unequally spaced data", 1976.
     """
     n = len(residuals)
@@ -24,11 +29,16 @@ def frequency_of(residuals: FloatArray, usual: FloatArray, dt: float) -> float |
     grid = np.arange(lowest, highest, 1 / (OVERSAMPLED * span))
     if not len(grid):
         return None
-    power = np.zeros(len(grid))
+    best, found = 1.0, None
     for c in range(residuals.shape[1]):
-        power = np.maximum(power, _periodogram(residuals[:, c], usual[:, c], grid * dt))
-    best = int(np.argmax(power))
-    return float(2 * pi * grid[best]) if power[best] > SURE else None
+        power = _periodogram(residuals[:, c], usual[:, c], grid * dt)
+        known = np.isfinite(residuals[:, c])
+        whole = slow[c] ** 2 * float(np.sum(usual[known, c] ** -2.0)) if slow else 0.0
+        peak = int(np.argmax(power))
+        share = power[peak] / max(SURE, MOST * whole)
+        if share > best:
+            best, found = float(share), float(2 * pi * grid[peak])
+    return found
 
 
 def _periodogram(residual: FloatArray, std: FloatArray, cycles: FloatArray) -> FloatArray:
