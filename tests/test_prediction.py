@@ -5,13 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import as_log
 
 from analysis.identify.choice import compare
 from analysis.identify.output_error import OutputError, output_error
-from analysis.identify.prediction import made_good, misfit, predict, turn
+from analysis.identify.prediction import made_good, misfit, predict, turn, zigzag_overshoots
 from analysis.identify.trial import Trial, trials_of
 from analysis.identify.uncertainty import uncertainty
-from shiplog import TrialLog, UsageError, resample
+from recorders.sensors import suite
+from recorders.simulate import simulate
+from shiplog import TrialLog, UsageError, load_vessel, resample
 from shiplog.foreign import read_table
 from shiplog.layout import load_layout
 from shiplog.ships import ship_model
@@ -103,6 +106,31 @@ def test_a_fit_is_not_off_its_own_runs_by_much() -> None:
     _, trial = marin("zz_20")
     fit = output_error([trial], ship_model("three-dof"), length=LENGTH)
     assert np.nanmax(misfit(fit, trial)) < 0.15
+
+
+def test_a_zigzag_of_the_papers_ship_overshoots_as_she_does() -> None:
+    vessel, _ = load_vessel("table1")
+    trial = simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=suite("none"))
+    fit = output_error(
+        trials_of(resample(as_log(trial), channels=CHANNELS), "z.mcap"), ship_model("burylin")
+    )
+    overshoots = zigzag_overshoots(
+        fit, np.radians(20), np.radians(20), rudder_rate=np.radians(2.5),
+        speed=10.3279556, rpm=80.0, duration_secs=520.0,
+    )  # fmt: skip
+    # heading extrema of 36.355, -34.744 and 33.923 degrees, from an independent simulation
+    np.testing.assert_allclose(np.degrees(overshoots)[:2], [16.355, 14.744], atol=0.01)
+
+
+def test_the_tankers_first_overshoots_are_predicted() -> None:
+    trials = [marin("zz_10")[1], marin("zz_20")[1]]
+    fit = output_error(trials, ship_model("three-dof"), length=LENGTH)
+    for angle, measured in ((10, 9.39), (20, 15.59)):
+        said = zigzag_overshoots(
+            fit, np.radians(-angle), np.radians(angle), rudder_rate=np.radians(2.32),
+            speed=7.97, rpm=91.7, duration_secs=600.0,
+        )  # fmt: skip
+        assert np.degrees(said[0]) == pytest.approx(measured, abs=2.5)
 
 
 # ---- circles that can be computed

@@ -1,18 +1,21 @@
 """What a fit says of a run it never saw."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
 
 from shiplog.ships.motion import OUTPUTS
-from shiplog.types import FloatArray
+from shiplog.ships.path import path_of
+from shiplog.types import FloatArray, Signals
 
 from .least_squares import minimise
 from .output_error import OutputError, first_spreads
 from .problem import Problem
 from .trial import Trial
 
+ZIGZAG_STEP_SECS = 0.5
 HARD_OVER = 0.8  # of the greatest rudder of a run: there it is held over
 
 
@@ -108,6 +111,55 @@ def _reached(turned: FloatArray, angle: float) -> float:
         return np.nan
     k = int(beyond[0])
     return k - 1 + float((angle - turned[k - 1]) / (turned[k] - turned[k - 1]))
+
+
+def zigzag_overshoots(
+    fit: OutputError, rudder: float, heading: float, *,
+    rudder_rate: float, speed: float, rpm: float, duration_secs: float,
+) -> FloatArray:  # fmt: skip
+    """The overshoots of a zig-zag that a fitted ship is steered through, (k,) rad.
+
+    The rudder goes to `rudder`, the first time to the side of its sign, and is reversed whenever
+    the heading is `heading` off, all in rad; an overshoot is how much further it goes. The ship
+    begins straight ahead at `speed`. Only those are told that she came back from.
+    """
+    problem = fit.problem
+    state = np.zeros(len(problem.model.state))
+    for i, value in enumerate(problem.model.state):
+        if value.channel == "speed":
+            state[i] = speed / problem.scale.speed
+    time = np.arange(0, duration_secs, ZIGZAG_STEP_SECS)
+    times, angles = [0.0, abs(rudder) / rudder_rate], [0.0, rudder]
+    executes: list[int] = []
+    while True:
+        # the ship does not know of orders yet to come: each is found by sailing without it
+        held = {"rudder": np.interp(time, times, angles), "rpm": np.full(len(time), rpm)}
+        path = path_of(Signals(0, ZIGZAG_STEP_SECS, held))
+        out = problem.model.simulate(fit.parameters, state, path, len(time), scale=problem.scale)
+        side = np.sign(angles[-1])
+        off = side * out[:, 3] - abs(heading)
+        since = executes[-1] if executes else 0
+        beyond = since + np.flatnonzero(off[since:] >= 0)
+        if not len(beyond) or not np.isfinite(off).all():
+            return _overshoots(out[:, 3], executes, abs(heading))
+        k = int(beyond[0])
+        executes.append(k)
+        at = time[k - 1] + ZIGZAG_STEP_SECS * float(off[k - 1] / (off[k - 1] - off[k]))
+        there, ordered = float(np.interp(at, times, angles)), float(-side) * abs(rudder)
+        past = [t for t in times if t < at]
+        angles = [*angles[: len(past)], there, ordered]
+        times = [*past, at, at + abs(ordered - there) / rudder_rate]
+
+
+def _overshoots(heading: FloatArray, executes: Sequence[int], switch: float) -> FloatArray:
+    """By how much the heading goes on after each execute, but for the last."""
+    ends = executes[1:]
+    return np.array(
+        [
+            float(np.max(np.abs(heading[start:end]))) - switch
+            for start, end in zip(executes, ends, strict=False)
+        ]
+    )
 
 
 def problem_without(fit: OutputError, left_out: int) -> tuple[Problem, FloatArray]:
