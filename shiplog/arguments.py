@@ -12,6 +12,11 @@ from . import __version__
 from .errors import UsageError
 from .settings import DISTURBANCES, FILTERS
 
+# of `shiplog.ships`, which brings numba, and --help waits for nobody
+SHIP_MODELS = (
+    "nomoto", "norrbin", "burylin", "burylin-tied", "slipstream", "drift-lag", "three-dof"
+)  # fmt: skip
+
 
 def parser() -> argparse.ArgumentParser:
     """The parser of the whole command; `verb` names what is to be run, if anything is."""
@@ -23,6 +28,7 @@ def parser() -> argparse.ArgumentParser:
     _add_record(verbs)
     _add_info(verbs)
     _add_replay(verbs)
+    _add_identify(verbs)
     _add_check(verbs)
     _add_convert(verbs)
     return parser
@@ -138,6 +144,45 @@ def _add_replay(verbs: Any) -> None:  # noqa: ANN401
     replay.set_defaults(verb="replay")
 
 
+def _add_identify(verbs: Any) -> None:  # noqa: ANN401
+    identify = verbs.add_parser(
+        "identify",
+        help="a ship's model from her logs, its uncertainty, and a proof on other logs",
+        description="Fit a ship model to logs, all at once, and try it on logs it has not seen.",
+    )
+    identify.add_argument("log", metavar="LOG", nargs="+", help="of one ship, loaded alike")
+    identify.add_argument(
+        "--model",
+        default="burylin",
+        metavar="NAME",
+        help=f"{', '.join(SHIP_MODELS)}, or auto: the one that predicts best (default: burylin)",
+    )
+    identify.add_argument(
+        "--validate",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="LOG",
+        help="logs to predict, not to fit",
+    )
+    identify.add_argument(
+        "--known",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a parameter that is not to be sought, such as T3=0.5",
+    )
+    identify.add_argument(
+        "--vessel",
+        help="a preset or a vessel.toml: length, α's and steering gear, instead of the logs' own",
+    )
+    identify.add_argument(
+        "-o", "--output", metavar="FILE", help="the vessel.toml (burylin and burylin-tied only)"
+    )
+    identify.add_argument("--json", metavar="FILE", help="the result as JSON, - for stdout")
+    identify.set_defaults(verb="identify")
+
+
 def _add_check(verbs: Any) -> None:  # noqa: ANN401
     check = verbs.add_parser(
         "check",
@@ -177,6 +222,18 @@ def settings(texts: Sequence[str]) -> dict[str, float]:
                 f"--sensor wants CHANNEL.SETTING=VALUE, such as yaw_rate.bias=1e-4, got {text!r}"
             ) from None
     return settings
+
+
+def known(texts: Sequence[str]) -> dict[str, float]:
+    """`T3=0.5` as a name and a number."""
+    found = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            raise UsageError(f"--known wants NAME=VALUE, such as T3=0.5, got {text!r}") from None
+    return found
 
 
 def sources(texts: Sequence[str]) -> dict[str, str]:

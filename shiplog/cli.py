@@ -1,4 +1,4 @@
-"""The verbs: record, info, replay, check, convert.
+"""The verbs: record, info, replay, identify, check, convert.
 
 Results go to stdout, everything else to stderr. Exit codes: 0 fine, 1 failure, 2 usage,
 3 finished, but data were lost. Whatever is heavy is imported by the verb that needs it.
@@ -14,14 +14,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .arguments import gust, parser, replay_settings, settings, sources, unrest, wave
+from .arguments import gust, known, parser, replay_settings, settings, sources, unrest, wave
 from .errors import ShiplogError, UsageError
 from .files import is_device, replacing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from analysis.pipeline import Findings
+    from analysis.tables import Section
 FINE, FAILURE, USAGE, DATA_LOST = 0, 1, 2, 3
 
 
@@ -119,7 +119,7 @@ def _run_replay(arguments: argparse.Namespace) -> int:
     _require_ours("analysis")
     from analysis.pipeline import Replay
     from analysis.summary import summarise
-    from analysis.tables import markdown
+    from analysis.tables import markdown, sections
 
     from .log_file import open_log
     from .vessel import load_vessel
@@ -149,7 +149,7 @@ def _run_replay(arguments: argparse.Namespace) -> int:
             review.finish(findings, markdown(findings))
     if arguments.json:
         _write_json(summarise(findings), arguments.json)
-    _print_tables(findings, to_stderr=arguments.json == "-")
+    _print_tables(sections(findings), to_stderr=arguments.json == "-")
     _warn(findings.warnings)
     print(f"review: {output} (open it with: rerun {output})", file=sys.stderr)
     if arguments.view:
@@ -157,6 +157,52 @@ def _run_replay(arguments: argparse.Namespace) -> int:
 
         view_review(output)
     return DATA_LOST if log.data_lost else FINE
+
+
+def _run_identify(arguments: argparse.Namespace) -> int:
+    _require_ours("analysis")
+    from analysis.identify.identified import WRITABLE, identify
+    from analysis.identify.report import as_json, sections
+    from analysis.identify.runs import require_distinct
+    from analysis.identify.written import require_writable, vessel_toml
+
+    from .log_file import open_log
+    from .ships import LADDER
+    from .vessel import load_vessel
+
+    fitted, held_out = (
+        [str(Path(path).resolve()) for path in paths]
+        for paths in (arguments.log, arguments.validate)
+    )
+    require_distinct(fitted, held_out)
+    _require_distinct([arguments.output, arguments.json], [*fitted, *held_out, arguments.vessel])
+    if arguments.output:
+        _require_suffix(".toml", arguments.output)
+        require_writable(arguments.model)
+    vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
+    with _progress("analysis") as tell:
+        logs, validation_logs = (
+            [open_log(path) for path in paths] for paths in (arguments.log, arguments.validate)
+        )
+        found = identify(
+            logs,
+            arguments.model,
+            validation_logs=validation_logs,
+            known=known(arguments.known),
+            vessel=vessel,
+            among=WRITABLE if arguments.output else LADDER,
+            on_step=tell,
+        )
+    if arguments.json:
+        _write_json(as_json(found), arguments.json)
+    _print_tables(sections(found), to_stderr=arguments.json == "-")
+    _warn(found.warnings)
+    if arguments.output:
+        text = vessel_toml(found)
+        with replacing(arguments.output) as part:
+            part.write_text(text, encoding="utf-8")
+        print(f"vessel file: {arguments.output}", file=sys.stderr)
+    return DATA_LOST if found.data_lost else FINE
 
 
 def _run_check(arguments: argparse.Namespace) -> int:
@@ -264,15 +310,13 @@ def _progress(package: str | None = None) -> Iterator["Callable[..., None]"]:
         yield tell
 
 
-def _print_tables(findings: "Findings", *, to_stderr: bool) -> None:
+def _print_tables(sections: Sequence["Section"], *, to_stderr: bool) -> None:
     from rich.box import SIMPLE
     from rich.console import Console
     from rich.table import Table
 
-    from analysis.tables import sections
-
     console = Console(stderr=to_stderr, highlight=False, markup=False)  # [deg] is a unit
-    for section in sections(findings):
+    for section in sections:
         table = Table(title=section.title, title_justify="left", title_style="bold", box=SIMPLE)
         for i, column in enumerate(section.columns):
             table.add_column(column, justify="left" if i == 0 else "right", overflow="fold")
@@ -302,6 +346,7 @@ _VERBS = {
     "simulate": _run_simulate,
     "info": _run_info,
     "replay": _run_replay,
+    "identify": _run_identify,
     "check": _run_check,
     "convert": _run_convert,
 }

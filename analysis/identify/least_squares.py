@@ -116,8 +116,9 @@ def total_cost(
     for i, (off, spread) in enumerate(zip(left, spreads, strict=True)):
         known = problem.known(i)
         edge = OUTLYING * spread.usual[known]
-        loss = edge**2 * (np.sqrt(1 + (off[known] / edge) ** 2) - 1)
-        total += float(np.sum(loss / spread.effective[known] ** 2))
+        with np.errstate(over="ignore"):  # a ship about to run away: the cost is inf
+            loss = edge**2 * (np.sqrt(1 + (off[known] / edge) ** 2) - 1)
+            total += float(np.sum(loss / spread.effective[known] ** 2))
     return total if np.isfinite(total) else inf
 
 

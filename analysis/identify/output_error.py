@@ -23,6 +23,7 @@ from .trial import Trial, usual
 from .waves import frequency_of
 
 USUAL_LENGTH = 150.0  # m, of a ship whose length nobody gave: its scale only
+LEAST_SPEED, LEAST_RPM = 0.1, 1.0  # m/s, rpm
 UNEXPLAINED = 0.2  # of what stays off: if a wave leaves more, it was none
 ROUNDS = 3
 LEAST_STD = {  # of what any instrument is off
@@ -87,7 +88,9 @@ def pose(
     sought = {model.parameter(name).name for name in free}
     sought |= {p.name for p in model.parameters if not p.known}
     sought -= set(known or {})
-    scale = model.scale(length or USUAL_LENGTH, usual(trials, "speed"), usual(trials, "rpm"))
+    speed, rpm = usual(trials, "speed"), usual(trials, "rpm")
+    _require_way(trials, speed, rpm)
+    scale = model.scale(length or USUAL_LENGTH, speed, rpm)
     used = [o for o in (outputs or model.outputs) if any(trial.has(o) for trial in trials)]
     return Problem(
         model, tuple(trials), scale, tuple(used), values,
@@ -103,6 +106,15 @@ def _require_steering(trials: Sequence[Trial]) -> None:
         raise LogError(
             f"the rudder moves by {np.degrees(moved):.1f}° in all, and from that nothing can be "
             f"identified; give a log of a zig-zag or of a turning circle: {names}"
+        )
+
+
+def _require_way(trials: Sequence[Trial], speed: float, rpm: float) -> None:
+    if not (speed > LEAST_SPEED and rpm > LEAST_RPM):
+        names = ", ".join(trial.name for trial in trials)
+        raise LogError(
+            f"the ship begins with {speed:.2g} m/s at {rpm:.2g} rpm, and a model is of a ship "
+            f"under way; give logs that begin on a steady run: {names}"
         )
 
 

@@ -1,0 +1,90 @@
+"""What would tell a parameter that these data cannot tell, and whether to tie the paper's."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.ships import ship_model
+
+from .output_error import OutputError, output_error
+from .uncertainty import uncertainty
+
+CONTRADICTED = 3.0  # standard deviations by which a tie is off
+_SMALL = "a 10/10 zig-zag or a pull-out: a slow turn that grows or dies by itself"
+_HARD = "a 20/20 zig-zag or a 35° turning circle: a fast turn"
+_QUICK = "a zig-zag or a pseudo-random run: the rudder often reversed"
+_CIRCLE = "a 35° turning circle, held until the speed is steady"
+_SPEEDS = "straight runs or turns at two rates of revolutions or more"
+_DRIFT = "a zig-zag and a circle with the sway measured too (layouts derive it from velocities)"
+TOLD_BY = {
+    **dict.fromkeys(("a", "d", "e", "T3", "k", "yd", "nd"), _QUICK),
+    **dict.fromkeys(("b1", "nr", "nv"), _SMALL),
+    **dict.fromkeys(("b2", "b3", "a3", "cy", "cn"), _HARD),
+    **dict.fromkeys(("f", "f1", "f2", "xvr", "x4", "xd"), _CIRCLE),
+    **dict.fromkeys(("g", "h", "p", "m", "w", "alpha1", "alpha2", "alpha3"), _SPEEDS),
+    **dict.fromkeys(("c1", "c2", "Td", "yv", "yr"), _DRIFT),
+    "e0": "the same manoeuvre to both sides",
+}
+
+
+def told_by(name: str) -> str:
+    """The manoeuvre that would tell a parameter of any model, in words."""
+    return TOLD_BY.get(name, "a manoeuvre that moves what it multiplies")
+
+
+@dataclass(frozen=True)
+class Ties:
+    """Whether b1 = -d holds, by a fit in the free form."""
+
+    sum_over_d: float  # (b1 + d) / d: zero where it holds
+    std: float  # of it
+    marginal: bool  # whether b1 may be zero or positive, where the tie is singular
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the data speak against it."""
+        return abs(self.sum_over_d) > CONTRADICTED * self.std
+
+    @property
+    def advice(self) -> str:
+        """In words: for the tie, or against it."""
+        off = f"(b1 + d)/d = {self.sum_over_d:.2g} ± {1.96 * self.std:.2g} in the free form"
+        if self.contradicted:
+            return f"Ties b1 = −d, e = T3·d: the data speak against them, {off}; leave it free."
+        if self.marginal:
+            return (
+                f"Ties b1 = −d, e = T3·d: not contradicted ({off}), but b1 may be zero, where they "
+                "are singular; leave it free, or add a manoeuvre that tells b1."
+            )
+        return (
+            f"Ties b1 = −d, e = T3·d: the data allow them, {off}; "
+            "--model burylin-tied tells b1 and e more surely, if the ship's gear is as the α's say."
+        )
+
+
+def ties_of(fit: OutputError) -> Ties | None:
+    """Whether the paper's ties hold for the ship of a fit to either of its forms; else None."""
+    if fit.problem.model.name not in ("burylin", "burylin-tied"):
+        return None
+    free = fit if fit.problem.model.name == "burylin" else _in_free_form(fit)
+    found = uncertainty(free)
+    if not {"b1", "d"} <= set(found.names):
+        return None
+    i, j = found.names.index("b1"), found.names.index("d")
+    b1, d = found.values[i], found.values[j]
+    covariance = found.covariance[np.ix_((i, j), (i, j))]
+    slope = np.array([1 / d, -b1 / d**2])
+    std = float(np.sqrt(slope @ covariance @ slope))
+    return Ties(float((b1 + d) / d), std, bool(b1 + 1.96 * found.std[i] >= 0))
+
+
+def _in_free_form(fit: OutputError) -> OutputError:
+    problem, free = fit.problem, ship_model("burylin")
+    values = np.real(problem.model.expand(fit.parameters.astype(np.complex128)))
+    start = dict(zip(free.names, values.tolist(), strict=True))
+    known = {name: start[name] for name in ("alpha1", "alpha2", "alpha3")}
+    start = {name: value for name, value in start.items() if name not in known}
+    return output_error(
+        problem.trials, free, start=start, known=known, nuisance=problem.nuisance,
+        outputs=problem.outputs,
+    )  # fmt: skip

@@ -1,0 +1,245 @@
+"""From logs to a ship's coefficients, what they are worth, and what they say of other logs."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shiplog.errors import LogError, UsageError
+from shiplog.ships import LADDER, Model, ship_model
+from shiplog.ships.motion import OUTPUTS
+from shiplog.types import FloatArray, Log
+from shiplog.vessel import Vessel
+
+from .advice import Ties, ties_of, told_by
+from .choice import Candidate, compare
+from .output_error import OutputError, output_error, pose
+from .problem import residuals
+from .runs import contradictions, run_of, ship_of
+from .trial import Trial
+from .uncertainty import Uncertainty, uncertainty
+from .validation import Validation, validate
+
+AUTO = "auto"
+WRITABLE = ("burylin", "burylin-tied")  # models that a vessel file can hold
+ALPHAS = ("alpha1", "alpha2", "alpha3")
+UNEXPLAINED = 0.5  # of what was measured, in the rms: a fit that leaves more says little
+CONTRADICTING = 3.0  # times what noise explains: runs that differ so much are not one ship's
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class RunFit:
+    """How a fit goes with a run it was made from."""
+
+    name: str
+    duration_secs: float
+    rms: Mapping[str, float]  # of the residuals of each output, SI
+    rudder_offset: float  # rad: the rudder's zero, and every constant yaw moment
+    biases: Mapping[str, float]  # of sensors, SI
+    wave_secs: tuple[float, ...]  # the periods of swells
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedShip:
+    """A model of a ship from logs of hers."""
+
+    model: Model
+    fit: OutputError
+    uncertainty: Uncertainty
+    runs: tuple[RunFit, ...]
+    validations: tuple[Validation, ...]
+    candidates: tuple[Candidate, ...]  # the best first; empty where the model was named
+    ties: Ties | None  # of the paper's model
+    vessel: Vessel | None  # whose length and steering gear were taken
+    length_given: bool
+    known: Mapping[str, float]  # parameters that were not sought
+    advice: Mapping[str, str] = field(default_factory=dict)  # by parameter: what would tell it
+    warnings: tuple[str, ...] = ()
+    data_lost: bool = False
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """All the model's parameters, sought or known, in their own units."""
+        return dict(zip(self.model.names, self.fit.parameters.tolist(), strict=True))
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(p, p) of the parameters sought, `uncertainty.names`."""
+        return self.uncertainty.covariance
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """The parameters that these logs do tell."""
+        return tuple(n for n in self.uncertainty.names if n not in self.uncertainty.vague)
+
+
+def identify(
+    logs: Sequence[Log],
+    model: str = "burylin",
+    *,
+    validation_logs: Sequence[Log] = (),
+    known: Mapping[str, float] | None = None,
+    vessel: Vessel | None = None,
+    among: Sequence[str] = LADDER,
+    on_step: Tell = lambda _: None,
+) -> IdentifiedShip:
+    """Fit a model of `shiplog.ships` to logs of one ship, all at once.
+
+    `model` is a name of `LADDER`, or "auto": all are compared, and of those `among` which to choose
+    the one is taken that predicts each run best from the others. `known` parameters are not sought. Length, the rudder's alphas and the
+    steering gear are those of `vessel`, or of the vessel file the logs carry.
+
+    Raises `LogError` where the logs cannot identify anything or are of different ships, and
+    `UsageError` for names nobody knows.
+    """
+    if not logs:
+        raise UsageError("no log to identify from; give at least one")
+    considered = [ship_model(name) for name in (LADDER if model == AUTO else (model,))]
+    stated = dict(known or {})
+    _require_known(considered, stated)
+    on_step("read")
+    runs, held_out = [run_of(log) for log in logs], [run_of(log) for log in validation_logs]
+    ship = ship_of([*runs, *held_out], vessel)
+    trials = [trial for run in runs for trial in run.trials]
+    length = ship.length if ship else None
+    candidates: list[Candidate] = []
+    if model == AUTO:
+        candidates = _compared(trials, considered, stated, ship, length, on_step)
+        fit = _best(candidates, among)
+    else:
+        on_step(f"fit {model}")
+        settled = _settled(considered[0], stated, ship)
+        fit = output_error(trials, considered[0], known=settled, length=length)
+    on_step("uncertainty")
+    found = uncertainty(fit)
+    on_step("validation")
+    validations = [each for run in held_out for each in validate(fit, run)]
+    every = [*runs, *held_out]
+    warnings = [w for run in every for w in run.warnings]
+    warnings += [*contradictions(every), *_doubts(fit, found, validations)]
+    warnings += _passed_over(fit.problem.model, candidates)
+    if fit.problem.scale.secs != 1.0 and length is None:
+        warnings.append(
+            f"no length is known, {fit.problem.scale.secs * fit.problem.scale.speed:.0f} m is "
+            "taken for the scale of a model without dimensions, whose priors depend on it a "
+            "little; state it in a vessel file"
+        )
+    return IdentifiedShip(
+        fit.problem.model, fit, found, tuple(_run_fits(fit)), tuple(validations),
+        tuple(candidates), ties_of(fit), ship, length is not None,
+        {n: v for n, v in zip(fit.problem.model.names, fit.parameters.tolist(), strict=True)
+         if n not in found.names},
+        {name: told_by(name) for name in found.vague},
+        tuple(warnings), any(run.data_lost for run in every),
+    )  # fmt: skip
+
+
+def _require_known(models: Sequence[Model], known: Mapping[str, float]) -> None:
+    for name, value in known.items():
+        if not any(name in model.names for model in models):
+            models[0].parameter(name)
+        if not np.isfinite(value):
+            raise UsageError(f"--known {name} must be a finite number, got {value}")
+
+
+def _settled(model: Model, known: Mapping[str, float], ship: Vessel | None) -> dict[str, float]:
+    """What is known of a model's parameters: what was said, and the alphas of the vessel file."""
+    settled = {name: known[name] for name in model.names if name in known}
+    if ship is not None:
+        alphas = {n: getattr(ship.coefficients, n) for n in ALPHAS if n in model.names}
+        settled = alphas | settled
+    return settled
+
+
+def _compared(
+    trials: Sequence[Trial],
+    models: Sequence[Model],
+    known: Mapping[str, float],
+    ship: Vessel | None,
+    length: float | None,
+    on_step: Tell,
+) -> list[Candidate]:
+    pose(trials, models[0], length=length)  # what nothing can be identified from is said at once
+    found: list[Candidate] = []
+    for model in models:
+        on_step(f"cross-validate {model.name}")
+        found += compare(trials, [model], known=_settled(model, known, ship), length=length)
+    return sorted(found, key=lambda candidate: (candidate.fit is None, candidate.score))
+
+
+def _best(candidates: Sequence[Candidate], among: Sequence[str]) -> OutputError:
+    for candidate in candidates:
+        if candidate.fit is not None and candidate.model.name in among:
+            return candidate.fit
+    raise LogError(
+        f"{', '.join(among)}: each runs away on these logs; look at their signs and units, "
+        "or fit another model"
+    )
+
+
+def _passed_over(chosen: Model, candidates: Sequence[Candidate]) -> Iterator[str]:
+    """What predicts better than the model chosen, and was no choice."""
+    scores = {candidate.model.name: candidate.score for candidate in candidates}
+    if candidates and candidates[0].model.name != chosen.name:
+        best = candidates[0].model.name
+        yield (
+            f"{best} predicts these logs better, off by {100 * scores[best]:.0f} % where "
+            f"{chosen.name} is by {100 * scores[chosen.name]:.0f} %, but no vessel file holds it"
+        )
+
+
+def _run_fits(fit: OutputError) -> Iterator[RunFit]:
+    problem, z = fit.problem, fit.minimum.unknowns
+    left = residuals(problem, z)
+    for i, trial in enumerate(problem.trials):
+        own = z[problem.own_slice(i)]
+        at = len(problem.model.state)
+        has_offset = problem.nuisance.rudder_std > 0
+        biases = at + has_offset
+        waves = biases + len(problem.biases)
+        omegas = own[waves :: 1 + 2 * len(problem.outputs)]
+        yield RunFit(
+            trial.name, (len(trial) - 1) * trial.dt_secs,
+            {output: _rms(left[i][:, c]) for c, output in enumerate(problem.outputs)},
+            float(own[at]) if has_offset else 0.0,
+            {problem.outputs[c]: float(own[biases + k])
+             for k, (c, _) in enumerate(problem.biases)},
+            tuple(float(2 * np.pi / abs(omega)) for omega in omegas),
+        )  # fmt: skip
+
+
+def _rms(off: FloatArray) -> float:
+    known = off[np.isfinite(off)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+
+
+def _doubts(
+    fit: OutputError, found: Uncertainty, validations: Sequence[Validation]
+) -> Iterator[str]:
+    """What makes a fit hard to believe."""
+    if not fit.minimum.settled:
+        yield "the search has not come to an end: the values are where it stopped"
+    left = residuals(fit.problem, fit.minimum.unknowns)
+    for i, trial in enumerate(fit.problem.trials):
+        rate = trial.measured[:, OUTPUTS.index("yaw_rate")]
+        share = _rms(left[i][:, fit.problem.outputs.index("yaw_rate")]) / float(np.nanstd(rate))
+        if share > UNEXPLAINED:
+            yield (
+                f"{trial.name}: the fit leaves {100 * share:.0f} % of the yaw rate unexplained: "
+                "a contrary rudder, wrong units, another ship, or a model that is not hers"
+            )
+    told = np.isfinite(found.between_runs) & (found.coloured > 0)
+    apart = float(np.median(found.between_runs[told] / found.coloured[told])) if told.any() else 1.0
+    if max(found.enlarged, apart) > CONTRADICTING:
+        yield (
+            f"the logs contradict each other, {max(found.enlarged, apart):.0f} times what their "
+            "noise explains: another ship, loading or depth, or a model that is not hers; "
+            "the intervals allow for it"
+        )
+    if set(found.vague) == set(found.names):
+        yield "nothing is identifiable from these logs: no value of the model is to be believed"
+    for validation in validations:
+        if validation.ran_away:
+            yield f"{validation.trial.name}: the simulated ship runs away: no prediction of it"
