@@ -153,9 +153,9 @@ def _add_identify(verbs: Any) -> None:  # noqa: ANN401
     identify.add_argument("log", metavar="LOG", nargs="+", help="of one ship, loaded alike")
     identify.add_argument(
         "--model",
-        default="burylin",
         metavar="NAME",
-        help=f"{', '.join(SHIP_MODELS)}, or auto: the one that predicts best (default: burylin)",
+        help=f"{', '.join(SHIP_MODELS)}, or auto: the one that predicts best "
+        "(default: burylin; burylin-tied where T3 is known)",
     )
     identify.add_argument(
         "--validate",

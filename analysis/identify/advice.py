@@ -10,6 +10,7 @@ from .output_error import OutputError, output_error
 from .uncertainty import uncertainty
 
 CONTRADICTED = 3.0  # standard deviations by which a tie is off
+UNDECIDED = 1.0  # half an interval of (b1 + d)/d: between a tie and a ship at the margin
 _SMALL = "a 10/10 zig-zag or a pull-out: a slow turn that grows or dies by itself"
 _HARD = "a 20/20 zig-zag or a 35° turning circle: a fast turn"
 _QUICK = "a zig-zag or a pseudo-random run: the rudder often reversed"
@@ -49,6 +50,8 @@ class Ties:
     def advice(self) -> str:
         """In words: for the tie, or against it."""
         off = f"(b1 + d)/d = {self.sum_over_d:.2g} ± {1.96 * self.std:.2g} in the free form"
+        if 1.96 * self.std > UNDECIDED:
+            return f"Ties b1 = −d, e = T3·d: the data cannot tell, {off}; tied, they are believed."
         if self.contradicted:
             return f"Ties b1 = −d, e = T3·d: the data speak against them, {off}; leave it free."
         if self.marginal:
@@ -67,7 +70,7 @@ def ties_of(fit: OutputError) -> Ties | None:
     if fit.problem.model.name not in ("burylin", "burylin-tied"):
         return None
     free = fit if fit.problem.model.name == "burylin" else _in_free_form(fit)
-    found = uncertainty(free)
+    found = uncertainty(free, between_runs=False)
     if not {"b1", "d"} <= set(found.names):
         return None
     i, j = found.names.index("b1"), found.names.index("d")

@@ -19,10 +19,10 @@ from shiplog.types import FloatArray
 
 from .least_squares import minimise
 from .output_error import OutputError, output_error
-from .prediction import misfit, problem_without
+from .prediction import JUDGED, misfit, problem_without
 from .trial import Trial
 
-JUDGED = [OUTPUTS.index(name) for name in ("yaw_rate", "speed", "heading")]  # by all models alike
+JUDGED_COLUMNS = [OUTPUTS.index(name) for name in JUDGED]  # all models alike
 WORST = 10.0  # of a relative error: a ship that runs away is no worse than ten times off
 
 
@@ -37,7 +37,7 @@ class Candidate:
     @property
     def score(self) -> float:
         """The mean of the misfits that are judged; the smaller, the better."""
-        judged = np.minimum(self.misfits[:, JUDGED], WORST)
+        judged = np.minimum(self.misfits[:, JUDGED_COLUMNS], WORST)
         return float(np.nanmean(judged)) if np.isfinite(judged).any() else WORST
 
 

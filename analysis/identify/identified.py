@@ -23,7 +23,7 @@ from .validation import Validation, validate
 AUTO = "auto"
 WRITABLE = ("burylin", "burylin-tied")  # models that a vessel file can hold
 ALPHAS = ("alpha1", "alpha2", "alpha3")
-UNEXPLAINED = 0.5  # of what was measured, in the rms: a fit that leaves more says little
+UNEXPLAINED = 0.2  # of what was measured, in the rms: a fit that leaves more says little
 CONTRADICTING = 3.0  # times what noise explains: runs that differ so much are not one ship's
 
 Tell = Callable[[str], None]
@@ -77,7 +77,7 @@ class IdentifiedShip:
 
 def identify(
     logs: Sequence[Log],
-    model: str = "burylin",
+    model: str | None = None,
     *,
     validation_logs: Sequence[Log] = (),
     known: Mapping[str, float] | None = None,
@@ -88,16 +88,18 @@ def identify(
     """Fit a model of `shiplog.ships` to logs of one ship, all at once.
 
     `model` is a name of `LADDER`, or "auto": all are compared, and of those `among` which to choose
-    the one is taken that predicts each run best from the others. `known` parameters are not sought. Length, the rudder's alphas and the
-    steering gear are those of `vessel`, or of the vessel file the logs carry.
+    the one is taken that predicts each run best from the others. Without a name it is the paper's
+    model, tied where T3 is known. `known` parameters are not sought. Length, the rudder's alphas
+    and the steering gear are those of `vessel`, or of the vessel file the logs carry.
 
     Raises `LogError` where the logs cannot identify anything or are of different ships, and
     `UsageError` for names nobody knows.
     """
     if not logs:
         raise UsageError("no log to identify from; give at least one")
-    considered = [ship_model(name) for name in (LADDER if model == AUTO else (model,))]
     stated = dict(known or {})
+    model = model or ("burylin-tied" if "T3" in stated else "burylin")
+    considered = [ship_model(name) for name in (LADDER if model == AUTO else (model,))]
     _require_known(considered, stated)
     on_step("read")
     runs, held_out = [run_of(log) for log in logs], [run_of(log) for log in validation_logs]

@@ -15,6 +15,7 @@ from .output_error import OutputError, first_spreads
 from .problem import Problem
 from .trial import Trial
 
+JUDGED = ("yaw_rate", "speed", "heading")  # every model predicts them
 ZIGZAG_STEP_SECS = 0.5
 HARD_OVER = 0.8  # of the greatest rudder of a run: there it is held over
 
@@ -48,11 +49,15 @@ def misfit(fit: OutputError, trial: Trial) -> FloatArray:
     """How far a fit is off a trial it never saw, (4,): rms over the std of what was measured.
 
     The trial's own unknowns are fitted to it, the parameters are not: no rudder's zero and no
-    sensor's bias of one run is known from another. NaN for what was not measured or the model
-    does not predict; inf where the ship runs away.
+    sensor's bias of one run is known from another. Those of `JUDGED` are told of every model,
+    fitted to them or not. NaN for what was not measured or the model does not predict; inf
+    where the ship runs away.
     """
     whole = fit.problem
-    problem = replace(whole, trials=(trial,), values=fit.parameters, free=(), waves=())
+    judged = tuple(o for o in OUTPUTS if o in (*whole.outputs, *JUDGED) and trial.has(o))
+    problem = replace(
+        whole, trials=(trial,), outputs=judged, values=fit.parameters, free=(), waves=()
+    )
     minimum = minimise(problem, problem.start(), first_spreads(problem))
     found = np.full(len(OUTPUTS), np.nan)
     off = problem.measured(0) - problem.predicted(minimum.unknowns, 0)

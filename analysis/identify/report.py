@@ -11,7 +11,7 @@ from shiplog import __version__
 from shiplog.ships.motion import OUTPUTS
 from shiplog.units import CATALOGUE, factor
 
-from .choice import JUDGED, Candidate
+from .choice import JUDGED_COLUMNS, Candidate
 from .identified import IdentifiedShip
 from .validation import Figure, Validation
 
@@ -42,7 +42,7 @@ def _comparison(found: IdentifiedShip) -> Section:
                 *(f"{100 * value:.3g}" if told and isfinite(value) else "" for value in off),
             )
         )
-    columns = ("model", "sought", "score [%]", *(f"{OUTPUTS[i]} [%]" for i in JUDGED))
+    columns = ("model", "sought", "score [%]", *(f"{OUTPUTS[i]} [%]" for i in JUDGED_COLUMNS))
     remark = (
         "Each run in turn is predicted by a fit to the others: the rms of what is off over the "
         "standard deviation of what was measured. The least is taken."
@@ -52,7 +52,7 @@ def _comparison(found: IdentifiedShip) -> Section:
 
 
 def _mean_misfits(candidate: Candidate) -> list[float]:
-    columns = [column[np.isfinite(column)] for column in candidate.misfits[:, JUDGED].T]
+    columns = [column[np.isfinite(column)] for column in candidate.misfits[:, JUDGED_COLUMNS].T]
     return [float(np.mean(column)) if len(column) else np.nan for column in columns]
 
 
@@ -208,7 +208,7 @@ def as_json(found: IdentifiedShip) -> dict[str, Any]:
             {
                 "name": c.model.name, "score": c.score if c.fit is not None else None,
                 "misfits": dict(zip(
-                    (OUTPUTS[i] for i in JUDGED), _mean_misfits(c), strict=True
+                    (OUTPUTS[i] for i in JUDGED_COLUMNS), _mean_misfits(c), strict=True
                 )),
             }
             for c in found.candidates

@@ -7,7 +7,6 @@ import numpy as np
 
 from shiplog.clock import resample
 from shiplog.errors import LogError, UsageError
-from shiplog.gyro_bias import gyro_bias_warning
 from shiplog.quality import faults
 from shiplog.rudder_sign import rudder_sign_warning
 from shiplog.settings import DisturbanceSettings, FilterSettings
@@ -63,9 +62,9 @@ def run_of(log: Log) -> Run:
 def _doubts(log: Log, found: Survey) -> Iterator[str]:
     also = tuple(name for name in ("heading", "position") if name in found)
     yield from faults(found, (*NEEDED, *also))
-    for warning in (rudder_sign_warning(log), gyro_bias_warning(log)):
-        if warning:
-            yield warning
+    contrary = rudder_sign_warning(log)
+    if contrary:
+        yield contrary
 
 
 def _positions(log: Log, trial: Trial) -> FloatArray | None:

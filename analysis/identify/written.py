@@ -14,9 +14,9 @@ from .trial import usual
 SECTIONS = {"yaw": YAW_COEFFICIENTS, "surge": ("f", "g", "h")}
 
 
-def require_writable(model: str) -> None:
+def require_writable(model: str | None) -> None:
     """Refuse a model that a vessel file cannot hold, before any work."""
-    if model not in (*WRITABLE, AUTO):
+    if model not in (*WRITABLE, AUTO, None):
         raise UsageError(
             f"a vessel file holds the paper's model, which simulation and filters are built on, "
             f"and not {model}; identify {' or '.join(WRITABLE)} for it, or leave out -o"
