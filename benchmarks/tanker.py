@@ -17,6 +17,7 @@ from analysis.identify.validation import Validation
 from shiplog import TrialLog, Vessel, load_vessel
 from shiplog.foreign import read_table
 from shiplog.layout import load_layout
+from shiplog.types import FloatArray
 
 PROJECT = Path(__file__).resolve().parents[1]
 KVLCC2 = PROJECT.parent / "shared" / "data" / "kvlcc2"
@@ -33,15 +34,16 @@ GOALS = {  # per cent, from MARIN's zig-zags and from HSVA's
     "steady speed": (10, 10),
 }  # fmt: skip
 OVERSHOOTS = {10: (9.39, 15.11), 20: (15.59, 12.81)}  # MARIN's, degrees
+FIRST_OVERSHOOT = 2.0  # degrees it may be off
 APPROACH = {"rudder_rate": radians(2.32), "speed": 7.97, "rpm": 91.7, "duration_secs": 700.0}
 INTRODUCTION = """
 ## A tanker's circle from her zig-zags
 
 The model tests of the KVLCC2 (SIMMAN 2008: MARIN, full-scale values; HSVA, scaled by Froude's law),
-length 320 m stated, nothing else. The model is the one that `--model auto` takes by cross-validation
-over the zig-zags; the circle is MARIN's at 35°, and no fit has seen it. It is simulated open loop
-under its recorded rudder and revolutions from how it began, and counted from where the rudder
-leaves its rest by 0.5°."""
+length 320 m stated, nothing else. The model is the one that `--model auto` takes by
+cross-validation over the zig-zags; the circle is MARIN's at 35°, and no fit has seen it. It is
+simulated open loop under its recorded rudder and revolutions from how it began, and counted from
+where the rudder leaves its rest by 0.5°. What misses its goal is set bold."""
 CAUTION = """
 **These figures are not blind.** The model with three degrees of freedom got its flow straightening
 at the rudder, its drift's drag and its thrust that grows as she slows while its errors on this very
@@ -73,8 +75,8 @@ def tanker(figures: Path) -> None:
     for row in _overshoot_rows(found):
         print(f"| {' | '.join(row)} |")
     print(
-        "\nThe zig-zags are among the runs that MARIN's fit was made from; the one from HSVA has"
-        "\nseen neither. Goal of the first overshoots: 2°."
+        "\nMARIN's fit and the one from both were made from these zig-zags among others; HSVA's has"
+        "\nseen neither. Goal of the first overshoots: 2°. Her rudder's zero is taken to be right."
     )
     print(CAUTION)
     _draw(found, figures / "kvlcc2.png")
@@ -85,7 +87,7 @@ def tanker(figures: Path) -> None:
 
 
 def _log(path: str) -> TrialLog:
-    layout = PROJECT / "sample_data" / "layouts" / f"simman_{path.split('/')[0]}.toml"
+    layout = PROJECT / "sample_data" / "layouts" / f"simman_{path.split('/', maxsplit=1)[0]}.toml"
     return read_table(KVLCC2 / path, load_layout(layout))
 
 
@@ -127,8 +129,16 @@ def _overshoot_rows(found: dict[str, IdentifiedShip]) -> Iterator[tuple[str, ...
             for name, each in found.items()
         }
         for k, name in enumerate(("first", "second")):
-            cells = [f"{each[k]:.1f}°" if len(each) > k else "none" for each in said.values()]
+            cells = [_overshoot(each, k, measured[k]) for each in said.values()]
             yield (f"{angle}/{angle}, {name} overshoot", f"{measured[k]}°", *cells)
+
+
+def _overshoot(said: FloatArray, k: int, measured: float) -> str:
+    """Only the first is held to a goal."""
+    if len(said) <= k:
+        return "none"
+    missed = k == 0 and abs(said[k] - measured) > FIRST_OVERSHOOT
+    return f"**{said[k]:.1f}°**" if missed else f"{said[k]:.1f}°"
 
 
 def _draw(found: dict[str, IdentifiedShip], path: Path) -> None:

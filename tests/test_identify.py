@@ -13,13 +13,12 @@ from conftest import as_log
 from analysis.identify.identified import IdentifiedShip, identify
 from analysis.identify.prediction import predict
 from analysis.identify.report import as_json, sections
-from analysis.identify.runs import Run, run_of
-from analysis.identify.trial import Trial
+from analysis.identify.runs import run_of
 from analysis.identify.validation import Validation, first_order, validate
 from analysis.identify.written import require_writable, vessel_toml
 from recorders.sensors import suite
 from recorders.simulate import simulate
-from shiplog import Channel, LogError, TrialLog, UsageError, Vessel, load_vessel
+from shiplog import LogError, TrialLog, UsageError, load_vessel
 from shiplog.vessel import parse_vessel
 
 VESSEL, TOML = load_vessel("table1")
@@ -173,7 +172,7 @@ def test_what_is_not_identifiable_is_no_number_anywhere() -> None:
 
 
 def test_only_the_papers_model_can_be_written() -> None:
-    with pytest.raises(UsageError, match="the paper's model.*and not slipstream"):
+    with pytest.raises(UsageError, match=r"the paper's model.*and not slipstream"):
         require_writable("slipstream")
     found = identify([a_log()], "nomoto")
     with pytest.raises(LogError, match="and not nomoto"):
@@ -216,7 +215,7 @@ def test_no_logs_no_models_and_no_numbers_are_refused() -> None:
 
 def test_logs_that_carry_different_ships_are_refused() -> None:
     other = TOML.replace("T1 = 150.0", "T1 = 90.0").replace("Table 1", "Table 2")
-    with pytest.raises(LogError, match="different ships.*Table 1.*Table 2"):
+    with pytest.raises(LogError, match=r"different ships.*Table 1.*Table 2"):
         identify([a_log(), a_log(toml=other)])
     with pytest.raises(LogError, match="different ships"):
         identify([a_log()], validation_logs=[a_log(toml=LONG)])
