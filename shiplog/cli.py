@@ -193,14 +193,15 @@ def _run_identify(arguments: argparse.Namespace) -> int:
             among=WRITABLE if arguments.output else LADDER,
             on_step=tell,
         )
+    if arguments.output:
+        text = vessel_toml(found)
+        with replacing(arguments.output) as part:
+            part.write_text(text, encoding="utf-8")
     if arguments.json:
         _write_json(as_json(found), arguments.json)
     _print_tables(sections(found), to_stderr=arguments.json == "-")
     _warn(found.warnings)
     if arguments.output:
-        text = vessel_toml(found)
-        with replacing(arguments.output) as part:
-            part.write_text(text, encoding="utf-8")
         print(f"vessel file: {arguments.output}", file=sys.stderr)
     return DATA_LOST if found.data_lost else FINE
 

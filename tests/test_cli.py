@@ -452,7 +452,12 @@ def test_heavy_libraries_wait_for_the_verb_that_needs_them(recorded: Path) -> No
         "except SystemExit: pass\n"
         "print({'rerun', 'control', 'pandas', 'numba', 'scipy'} & set(sys.modules))"
     )
-    for arguments in (["--help"], ["info", str(recorded)], ["replay", "--help"]):
+    for arguments in (
+        ["--help"],
+        ["info", str(recorded)],
+        ["replay", "--help"],
+        ["identify", "--help"],
+    ):
         done = subprocess.run(
             [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True
         )
@@ -490,3 +495,92 @@ def test_an_output_is_called_what_it_is(
 ) -> None:
     said = refusal(capsys, USAGE, *arguments.split())
     assert f"what is written is a {suffix} file; call it so" in said
+
+
+# ---- identify
+
+
+@pytest.fixture(scope="module")
+def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
+    folder = tmp_path_factory.mktemp("two_runs")
+    paths = []
+    for seed, manoeuvre in enumerate(("zigzag-20-20", "turning-circle-35")):
+        path = str(folder / f"{manoeuvre}.mcap")
+        simulate = f"record simulate {manoeuvre} --seed {seed} --duration 400 -o {path}"
+        assert main(simulate.split()) == FINE
+        paths.append(path)
+    return paths[0], paths[1]
+
+
+def test_a_ship_is_identified_validated_written_sailed_and_replayed(
+    two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    zigzag, circle = two_runs
+    capsys.readouterr()
+    arguments = ["--known", "T3=0.5", "--validate", circle, "-o", "found.toml", "--json", "f.json"]
+    assert main(["identify", zigzag, *arguments]) == FINE
+    said = capsys.readouterr()
+    assert "the paper's model, b1 = -d and e = T3 d" in said.out
+    assert "tactical diameter [m]" in said.out
+    assert "vessel file: found.toml" in said.err
+    found = json.loads(Path("f.json").read_text())
+    assert found["coefficients"]["d"]["value"] == pytest.approx(1 / 7500, rel=3e-3)
+    assert found["known"]["T3"] == 0.5
+    (validation,) = found["validation"]
+    assert validation["rms"]["yaw_rate"] < np.radians(0.02)
+    simulate = "record simulate zigzag-20-20 --vessel found.toml --duration 200 -o again.mcap"
+    assert main(simulate.split()) == FINE
+    assert main(["replay", zigzag, "--vessel", "found.toml", "-o", "r.rrd"]) == FINE
+    assert "identified (given)" in capsys.readouterr().out
+
+
+def test_the_best_model_is_chosen_on_the_command_line(
+    two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    assert main(["identify", *two_runs, "--model", "auto", "--json", "-"]) == FINE
+    said = capsys.readouterr()
+    found = json.loads(said.out)
+    assert found["model"]["name"] in ("burylin", "burylin-tied")
+    assert [each["score"] for each in found["models"]] == sorted(
+        each["score"] for each in found["models"]
+    )
+    assert "Models by cross-validation" in said.err
+
+
+@pytest.mark.parametrize(
+    ("code", "arguments", "said"),
+    [
+        (USAGE, "Z Z", "named twice"),
+        (USAGE, "Z --validate Z", "not validated on a log it has seen"),
+        (USAGE, "Z --known T3", "--known wants NAME=VALUE, such as T3=0.5"),
+        (USAGE, "Z --known T4=1", "no parameter 'T4'; it has a, b1"),
+        (USAGE, "Z --model burylon", "did you mean 'burylin'?"),
+        (USAGE, "Z --model auto", "give two logs or more, or name the model"),
+        (USAGE, "Z --model slipstream -o x.toml", "identify burylin or burylin-tied for it"),
+        (USAGE, "Z -o x.txt", "is a .toml file"),
+        (USAGE, "Z --json Z", "the same file is named twice"),
+        (FAILURE, "Z none.mcap", "no such file: none.mcap"),
+        (FAILURE, "Z --vessel none.toml", "no vessel file and no preset"),
+        (FAILURE, "Z -o none/x.toml", "there is no folder"),
+    ],
+)
+def test_a_wrong_request_to_identify_is_refused_in_one_line(
+    two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str],
+    code: int, arguments: str, said: str,
+) -> None:  # fmt: skip
+    capsys.readouterr()
+    words = [two_runs[0] if word == "Z" else word for word in arguments.split()]
+    assert said in refusal(capsys, code, "identify", *words)
+
+
+def test_a_short_run_and_a_straight_one_identify_nothing(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    main(["record", "simulate", "zigzag-20-20", "--duration", "10", "-o", "short.mcap"])
+    main(["record", "simulate", "turning-circle-1", "--duration", "200", "-o", "straight.mcap"])
+    capsys.readouterr()
+    assert "too short to identify a ship" in refusal(capsys, FAILURE, "identify", "short.mcap")
+    said = refusal(capsys, FAILURE, "identify", "straight.mcap", "-o", "v.toml")
+    assert "the rudder moves by 1.0° in all" in said
+    assert not Path("v.toml").exists()

@@ -19,6 +19,8 @@ from analysis.identify.written import require_writable, vessel_toml
 from recorders.sensors import suite
 from recorders.simulate import simulate
 from shiplog import LogError, TrialLog, UsageError, load_vessel
+from shiplog.arguments import SHIP_MODELS
+from shiplog.ships import LADDER
 from shiplog.vessel import parse_vessel
 
 VESSEL, TOML = load_vessel("table1")
@@ -198,6 +200,10 @@ def test_logs_that_cannot_identify_anything_are_refused(number: int) -> None:
     for model in ("burylin", "three-dof"):
         with pytest.raises(LogError, match=said):
             identify([log], model)
+
+
+def test_the_command_line_names_every_model() -> None:
+    assert SHIP_MODELS == LADDER
 
 
 def test_no_logs_no_models_and_no_numbers_are_refused() -> None:
