@@ -46,13 +46,13 @@ simulated open loop under its recorded rudder and revolutions from how it began,
 where the rudder leaves its rest by 0.5°. What misses its goal is set bold."""
 CAUTION = """
 **These figures are not blind.** The model with three degrees of freedom got its flow straightening
-at the rudder, its drift's drag and its thrust that grows as she slows while its errors on this very
-circle were in sight, and a reader should take them for what a model can be brought to, not for what
-it does on a ship nobody has looked at. Its parameters, the choice among the models and the recipe
-have seen the zig-zags alone. The data's own floor is about 1.5 % in advance and 3 % in tactical
-diameter; the best figures published on them are 2 % and 3 to 6 %. At the constant revolutions of
-these tests the balance of thrust and drag in the circle is near-singular, and that is what is
-missed: the speed there, and the yaw rate with it."""
+at the rudder, its drift's drag and its thrust that grows as she slows, and the priors that go with
+them, while its errors on this very circle were in sight. Take them for what a model can be brought
+to, not for what it does on a ship nobody has looked at. Its parameters and the choice among the
+models come from the zig-zags alone. The data's own floor is about 1.5 % in advance and 3 % in
+tactical diameter; the best figures published on them are 2 % and 3 to 6 %. At the constant
+revolutions of these tests the balance of thrust and drag in the circle is near-singular, and that
+is what is missed: the speed there, and the yaw rate with it."""
 
 
 def tanker(figures: Path) -> None:

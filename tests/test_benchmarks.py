@@ -13,13 +13,14 @@ from rerun.chunk import RrdReader
 from analysis.filters.kinds import filter_states
 from analysis.pipeline import analyse
 from analysis.rerun_view import write_review
-from benchmarks import filters, logs, measure, replays
+from benchmarks import filters, identification, identification_speed, logs, measure, replays
 from benchmarks.bench import NOISE, VESSEL, head
 from benchmarks.logs import NAMES, day_of_trial, write_repeated
 from benchmarks.textbook import Filtered, filter_in_numpy
 from benchmarks.windows import regression
 from benchmarks.windows import require_same as require_same_windows
 from shiplog import Signals, TrialLog, read, resample
+from shiplog.ships import ship_model
 
 PROJECT = Path(__file__).parents[1]
 SMALL = ["--short", "--hours", "0.1", "--growth", "0.02,0.05", "--info-hours", "0.15"]
@@ -221,3 +222,24 @@ def test_a_ratio_is_the_median_of_the_rounds_and_is_held_to_what_is_asked() -> N
     result = measure.compare(most, 3)
     assert result.ratio == 3
     assert result.met is False
+
+
+# ---- how far identification can be believed
+
+
+def test_a_study_prints_its_table_and_tells_its_numbers(capsys: pytest.CaptureFixture[str]) -> None:
+    tied = ship_model("burylin-tied")
+    found = identification.study("tied", "zigzag-20-20", tied, {"T3": 0.5}, 2, off=0.5)
+    assert found.names == ("a", "b2", "b3", "d", "f", "g", "h")
+    assert found.median["d"] < 0.2
+    assert np.all(found.over_bound < 4)
+    assert "| rms error over bound (1) |" in capsys.readouterr().out
+
+
+def test_the_straightforward_fit_finds_what_ours_does() -> None:
+    trial = identification.known_trial("zigzag-20-20", 1, 100.0, "white")
+    ours = identification_speed._ours(trial)
+    z = ours.minimum.unknowns.copy()
+    z[:12] = identification_speed.peer(trial, ours)
+    apart = ours.problem.predicted(z, 0) - ours.problem.predicted(ours.minimum.unknowns, 0)
+    assert np.max(np.abs(apart / ours.spreads[0].usual)) < 0.2  # of the noise of one sample

@@ -16,6 +16,7 @@ from .identified import IdentifiedShip
 from .validation import Figure, Validation
 
 PEOPLES = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}
+ALIKE, MOST_PAIRS = 0.97, 3  # of correlations that are told
 UNIT = {name: CATALOGUE[name].unit for name in OUTPUTS} | {"track": "m"}
 
 
@@ -81,6 +82,9 @@ def _remarks(found: IdentifiedShip) -> Iterator[str]:
         "Echo: how much of the value was believed before any data. "
         f"Condition {found.uncertainty.condition:.0f}."
     )
+    alike = _alike(found)
+    if alike:
+        yield f"Hardly to be told apart (correlation): {alike}."
     scale = found.fit.problem.scale
     if found.model.dimensionless:
         yield (
@@ -94,6 +98,14 @@ def _remarks(found: IdentifiedShip) -> Iterator[str]:
         )
     if found.ties is not None:
         yield found.ties.advice
+
+
+def _alike(found: IdentifiedShip) -> str:
+    """The coefficients that the data know a sum of rather than each, the worst pairs first."""
+    told, names = found.uncertainty.correlation, found.uncertainty.names
+    pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(told[i, j]) > ALIKE]
+    pairs.sort(key=lambda pair: -abs(told[pair]))
+    return ", ".join(f"{names[j]} and {names[i]} {told[i, j]:+.3f}" for i, j in pairs[:MOST_PAIRS])
 
 
 def _by_advice(found: IdentifiedShip) -> dict[str, list[str]]:
