@@ -202,7 +202,11 @@ def _run_identify(arguments: argparse.Namespace) -> int:
     _print_tables(sections(found), to_stderr=arguments.json == "-")
     _warn(found.warnings)
     if arguments.output:
-        print(f"vessel file: {arguments.output}", file=sys.stderr)
+        vague = ", ".join(found.uncertainty.vague)
+        said = (
+            f"; not identifiable, and no more than what fits these logs: {vague}" if vague else ""
+        )
+        print(f"vessel file: {arguments.output}{said}", file=sys.stderr)
     return DATA_LOST if found.data_lost else FINE
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import as_log
 
-from analysis.identify.identified import IdentifiedShip, identify
+from analysis.identify.identified import IdentifiedShip, _best, _passed_over, identify
 from analysis.identify.prediction import predict
 from analysis.identify.report import as_json, sections
 from analysis.identify.runs import run_of
@@ -20,7 +20,7 @@ from recorders.sensors import suite
 from recorders.simulate import simulate
 from shiplog import LogError, TrialLog, UsageError, load_vessel
 from shiplog.arguments import SHIP_MODELS
-from shiplog.ships import LADDER
+from shiplog.ships import LADDER, ship_model
 from shiplog.vessel import parse_vessel
 
 VESSEL, TOML = load_vessel("table1")
@@ -106,9 +106,13 @@ def test_a_run_without_heading_and_position_is_validated_all_the_same() -> None:
     assert abs(figures["tactical diameter"].error) < 0.02 * figures["tactical diameter"].measured
 
 
+@cache
+def chosen() -> IdentifiedShip:
+    return identify([a_log(seconds=300.0), a_log("zigzag-10-10-port", 2, seconds=300.0)], "auto")
+
+
 def test_the_model_is_chosen_by_what_it_never_saw() -> None:
-    logs = [a_log(), a_log("zigzag-10-10-port", 2)]
-    found = identify(logs, "auto")
+    found = chosen()
     assert found.candidates[0].model is found.model
     assert found.model.name in ("burylin", "burylin-tied")
     assert len(found.candidates) == 7
@@ -116,10 +120,13 @@ def test_the_model_is_chosen_by_what_it_never_saw() -> None:
 
 
 def test_a_choice_among_what_can_be_written_says_what_would_do_better() -> None:
-    logs = [a_log(), a_log("zigzag-10-10-port", 2)]
-    found = identify(logs, "auto", among=("nomoto",))
-    assert found.model.name == "nomoto"
-    assert any("predicts these logs better" in warning for warning in found.warnings)
+    candidates = chosen().candidates
+    assert _best(candidates, ("nomoto", "norrbin")).problem.model.name in ("nomoto", "norrbin")
+    (said,) = _passed_over(ship_model("nomoto"), candidates)
+    assert "predicts these logs better" in said
+    assert list(_passed_over(candidates[0].model, candidates)) == []
+    with pytest.raises(LogError, match="each runs away"):
+        _best([replace(c, fit=None) for c in candidates], LADDER)
 
 
 def test_t3_known_means_the_tied_form() -> None:
