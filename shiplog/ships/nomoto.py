@@ -59,7 +59,7 @@ _STATE = (
     StateValue("nu", "speed"),
     StateValue("psi", "heading"),
 )
-_A, _K = Parameter("a", "1", -1.0), Parameter("k", "1", 1.0)
+_A, _K = Parameter("a", "1", -0.4), Parameter("k", "1", 0.3)
 _SURGE = (
     Parameter("f", "1", -0.3),
     Parameter("g", "1", -0.05, highest=0.0),
@@ -71,5 +71,5 @@ NOMOTO = Model(
 )  # fmt: skip
 NORRBIN = Model(
     "norrbin", "Norrbin's cubic with surge", Norrbin,
-    (_A, Parameter("a3", "1", -0.5), _K, *_SURGE), _STATE, _sail,
+    (_A, Parameter("a3", "1", -0.5, highest=0.0), _K, *_SURGE), _STATE, _sail,
 )  # fmt: skip
