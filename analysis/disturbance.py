@@ -111,8 +111,10 @@ class ForceObserver:
         self._stds: dict[str, float] = {}
         self._courses: dict[str, _CourseWatch] = {}
         names = ("yaw", "rudder", "surge", "yaw_wave", "surge_wave")
-        for name in names if "wave" in settings.models else names[:3]:
+        for name in names:
             output, design = (1, surge) if name.startswith("surge") else (0, yaw)
+            if name.endswith("wave") and wanted[name.removesuffix("_wave")][0].wave is None:
+                continue
             std = design.stds[int(name.endswith("wave"))]
             self._stds[name] = float(std * noise.measurement_std[output])
             watch = _CourseWatch(design.settling_secs, usual.count, usual.dt_secs)
@@ -132,9 +134,13 @@ class ForceObserver:
         works = np.abs(steering) > self._least_steering
         with np.errstate(divide="ignore", invalid="ignore"):
             rudder = np.where(works, yaw / steering, np.nan)
-        found = Disturbance(yaw, surge, rudder)
-        if "yaw_wave" in self._courses:
-            found = Disturbance(yaw, surge, rudder, yaw_wave, surge_wave)
+        found = Disturbance(
+            yaw,
+            surge,
+            rudder,
+            yaw_wave if "yaw_wave" in self._courses else None,
+            surge_wave if "surge_wave" in self._courses else None,
+        )
         for name, watch in self._courses.items():
             watch.add(getattr(found, name))
         return found
@@ -208,15 +214,34 @@ def wanted_forces(
         raise UsageError("; ".join(faults))
     degree = 1 if "ramp" in settings.models else 0 if "constant" in settings.models else None
     wave = _wave(wave_frequency) if "wave" in settings.models else None
+    blind = _blind(wave, usual) if wave is not None else ()
     wanted = {}
     frequencies = {"yaw": settings.yaw_frequency, "surge": settings.surge_frequency}
     for output, (name, frequency) in enumerate(frequencies.items()):
         interval = float(usual.interval_secs[output])
         longest = float(usual.longest_steps[output]) * usual.dt_secs
         model = ForceModel(degree, wave, settings.spectrum, frequency)
+        if name in blind and len(blind) < len(frequencies):
+            model = ForceModel(degree or 0, None, settings.spectrum, frequency)
         _require_told(name, model, interval)
         wanted[name] = model, Sampling(interval, longest, usual.dt_secs)
     return wanted
+
+
+def blindness(wave_frequency: float, usual: Gauge) -> list[str]:
+    """Where a wave is not observed because the sensor is too slow for it, in words."""
+    return [
+        f"no wave is observed in {name}: samples every {secs:.3g} s show none of "
+        f"{wave_frequency:.3g} rad/s"
+        for name, secs in zip(("yaw", "surge"), usual.interval_secs, strict=True)
+        if name in _blind(wave_frequency, usual)
+    ]
+
+
+def _blind(wave: float, usual: Gauge) -> tuple[str, ...]:
+    """Of yaw and surge, whose samples do not show a wave."""
+    names = zip(("yaw", "surge"), usual.interval_secs, strict=True)
+    return tuple(name for name, interval in names if wave * interval >= QUICKEST_WAVE)
 
 
 def _wave(frequency: float | None) -> float:

@@ -7,7 +7,7 @@ cut changes nothing.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -130,7 +130,7 @@ class Replay:
             for i, test in enumerate(tests):
                 e, stds, gated = estimates.innovations, estimates.innovation_stds, estimates.gated
                 test.add(e[:, i], stds[:, i], gated[:, i])
-            disturbance = observing.step(held, following)
+            disturbance = observing.step(_without_gated(held, estimates), following)
             yaw_rows, surge_rows = weak_form.step(signals, fastest)
             yaw, surge = self._yaw.step(yaw_rows), self._surge.step(surge_rows)
             track = tracking.step(signals, *(estimates.states[:, i] for i in OUTPUT_STATES))
@@ -173,12 +173,7 @@ class Replay:
                 observing = ForceObserver(model, noise, usual, observed, observed.wave_frequency)
                 return filtering, observing
         except (UsageError, np.linalg.LinAlgError) as error:
-            if self.plan.as_usual:
-                raise self._runs_away() from error
-            raise LogError(
-                f"{error}; it is the settings or the model ({self.plan.model_origin}) that do not "
-                f"do: {self._log.name}"
-            ) from error
+            raise self._runs_away(f" ({error})") from error
 
     def _residual_test(self, output: int) -> ResidualTest:
         name, plan = OUTPUTS[output], self.plan
@@ -186,11 +181,21 @@ class Replay:
         unit, noise_measured = plan.survey[name].unit, plan.noise.measured[output]
         return ResidualTest(name, unit, interval, noise_measured=noise_measured)
 
-    def _runs_away(self) -> LogError:
+    def _runs_away(self, why: str = "") -> LogError:
         return LogError(
-            f"the filter runs away: the model does not fit this log ({self.plan.model_origin}); "
-            f"give the ship's own with --vessel: {self._log.name}"
+            f"the filter or the observer runs away{why}: the model ({self.plan.model_origin}) or "
+            f"the settings do not fit this log; give the ship's own with --vessel: {self._log.name}"
         )
+
+
+def _without_gated(held: Signals, estimates: Estimates) -> Signals:
+    """The signals without what the filter did not believe."""
+    if not estimates.gated.any():
+        return held
+    believed = {
+        name: np.where(estimates.gated[:, i], np.nan, held[name]) for i, name in enumerate(OUTPUTS)
+    }
+    return replace(held, values=dict(held.values) | believed)
 
 
 def _estimated(

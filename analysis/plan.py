@@ -19,8 +19,9 @@ from shiplog.settings import DisturbanceSettings, FilterSettings
 from shiplog.ship import INPUTS, OUTPUTS, Coefficients
 from shiplog.survey import Survey, survey_log
 from shiplog.types import FloatArray, Log
-from shiplog.vessel import parse_vessel, with_settings
+from shiplog.vessel import idle, parse_vessel, with_settings
 
+from .disturbance import blindness
 from .doubts import doubtful, silent_ends
 from .filters.noise import Noise
 from .filters.tuning import noise_of, wave_in
@@ -56,12 +57,6 @@ class Plan:
         """The log's."""
         return self.survey.name
 
-    @property
-    def as_usual(self) -> bool:
-        """Whether filter and observer are those of a vessel file that says nothing of them."""
-        usual = FilterSettings().chosen, DisturbanceSettings().models
-        return (self.vessel.filter.chosen, self.observed.models) == usual
-
 
 class Planner:
     """Goes through a log twice; `yaw` and `surge` then know the whole trial's equations."""
@@ -76,6 +71,7 @@ class Planner:
         usual, self.yaw, self.surge = self._gauged(survey, clock, stated[0] if stated else None)
         tell("model", 0.0)
         vessel, origin = stated or (with_settings(self._first_model(usual), settings), FITTED)
+        self._warnings += idle(vessel)
         noise = self._noise(vessel, survey, clock, usual)
         observed = self._observed(vessel, usual, noise)
         self.plan = Plan(
@@ -140,23 +136,32 @@ class Planner:
         if settings.wave and noise.wave is None:
             self._warnings.append(
                 "no wave stands out of the yaw rate's residual: none is told from the ship's "
-                "turning; state filter.wave_frequency and filter.wave_std if there is one"
+                "turning; if there is one state filter.wave_frequency, filter.wave_damping and "
+                "filter.wave_std"
+            )
+        if noise.wave is not None and noise.wave.evidence < 0:
+            self._warnings.append(
+                "the wave stated is less likely than none: the yaw rate's residual has no such peak"
             )
         return noise
 
     def _observed(self, vessel: Vessel, usual: Gauge, noise: Noise) -> DisturbanceSettings:
         """What shall be observed, with the frequency of a wave if the file does not state it."""
         wanted = vessel.disturbance
-        if "wave" not in wanted.models or wanted.wave_frequency is not None:
+        if "wave" not in wanted.models:
             return wanted
-        wave = wave_in(usual, vessel.coefficients, noise, vessel.filter)
-        if wave is not None and wave.stands_out:
-            return replace(wanted, wave_frequency=wave.frequency)
-        self._warnings.append(
-            f"no wave stands out of the yaw rate's residual: one of {USUAL_SEA:g} rad/s is"
-            " observed, where the sea often is; state disturbance.wave_frequency"
-        )
-        return replace(wanted, wave_frequency=USUAL_SEA)
+        frequency = wanted.wave_frequency or vessel.filter.wave_frequency
+        if frequency is None:
+            wave = noise.wave or wave_in(usual, vessel.coefficients, noise, vessel.filter)
+            frequency = wave.frequency if wave is not None and wave.stands_out else None
+        if frequency is None:
+            frequency = USUAL_SEA
+            self._warnings.append(
+                f"no wave stands out of the yaw rate's residual: one of {USUAL_SEA:g} rad/s is"
+                " observed, where the sea often is; state disturbance.wave_frequency"
+            )
+        self._warnings += blindness(frequency, usual)
+        return replace(wanted, wave_frequency=frequency)
 
 
 def signals_of(

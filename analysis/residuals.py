@@ -50,7 +50,8 @@ class OutputResiduals:
             return ""
         return (
             f"{self.name}: {share:.1%} of the samples were gated, too many for spikes: the model "
-            "or the noise stated does not fit; look at the residuals, or widen filter.gate"
+            "or the noise stated does not fit; leave the noise to the log "
+            "(filter.process_ratio=auto), tell waves (filter.wave), or widen filter.gate"
         )
 
     @property

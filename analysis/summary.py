@@ -101,6 +101,8 @@ def _wave(wave: Wave | None) -> Summary | None:
         "damping": wave.damping,
         "std_rad_per_s": wave.std,
         "evidence": wave.evidence,
+        "evidence_needed": wave.needed,
+        "contrast": wave.contrast,
     }
 
 

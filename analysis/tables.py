@@ -125,8 +125,9 @@ def _verdict(residuals: OutputResiduals) -> str:
 
 def _disturbance_section(findings: Findings) -> Section:
     rows = []
+    slow = {"constant", "ramp"} & set(findings.observed.models)
     for name, label in DISTURBANCES.items():
-        if name not in findings.courses:
+        if name not in findings.courses or not (slow or name.endswith("wave")):
             continue
         course, (_, unit, scale) = findings.courses[name], DISTURBANCE_UNITS[name]
         values = (course.mean, course.rms, course.last, course.std)
@@ -147,10 +148,10 @@ def _disturbance_section(findings: Findings) -> Section:
 def _observed(findings: Findings) -> str:
     """Which disturbances were looked for, in words."""
     settings = findings.observed
-    said = ", ".join(settings.models)
-    if settings.wave_frequency is None or "wave" not in settings.models:
-        return said
-    return f"{said} of {settings.wave_frequency:.3g} rad/s"
+    said = [model for model in dict.fromkeys(settings.models) if model != "wave"]
+    if "wave" in settings.models and settings.wave_frequency is not None:
+        said.append(f"a wave of {settings.wave_frequency:.3g} rad/s")
+    return ", ".join(said)
 
 
 def _coefficient_section(findings: Findings) -> Section:
@@ -171,6 +172,8 @@ def _coefficient_section(findings: Findings) -> Section:
         "A gyro's bias goes into b1, b2, b3 and e."
     )
     remarks = [remark]
+    if any(residuals.gated for residuals in findings.residuals):
+        remarks.append("Gated samples are in this fit all the same: spikes spoil b1, b2, b3 and e.")
     if findings.model_origin == FITTED:
         remarks.append(
             "With no model the rudder is taken to work in proportion to the speed (α = 1, 0, 0): "

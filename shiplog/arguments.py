@@ -119,7 +119,9 @@ def _add_replay(verbs: Any) -> None:  # noqa: ANN401
     )
     replay.add_argument("--smooth", action="store_true", help="the states, from the end back too")
     replay.add_argument(
-        "--wave", action="store_true", help="tell waves in the yaw rate from the ship's own turning"
+        "--wave",
+        action="store_true",
+        help="tell waves in the yaw rate from the ship's own turning (filter: extended by default)",
     )
     replay.add_argument(
         "--disturbance",
@@ -131,7 +133,8 @@ def _add_replay(verbs: Any) -> None:  # noqa: ANN401
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="any setting of the vessel file's [filter] and [disturbance]: filter.gate=4",
+        help="any setting of the vessel file's [filter] and [disturbance], such as filter.gate=4 "
+        "or filter.process_ratio=auto, which leaves it to the log",
     )
     replay.add_argument(
         "-o", "--output", metavar="FILE", help="the review (default: LOG's name with .rrd, here)"
@@ -257,8 +260,8 @@ def replay_settings(parsed: argparse.Namespace) -> dict[str, object]:
             raise UsageError(f"--set wants KEY=VALUE, such as filter.gate=4, got {text!r}")
     if parsed.filter:
         found["filter.kind"] = parsed.filter
-    if parsed.disturbance:
-        found["disturbance.models"] = parsed.disturbance.split(",")
+    if parsed.disturbance is not None:
+        found["disturbance.models"] = [model.strip() for model in parsed.disturbance.split(",")]
     flags = {"filter.smooth": parsed.smooth, "filter.wave": parsed.wave}
     return found | {name: True for name, given in flags.items() if given}
 

@@ -18,30 +18,34 @@ OUTDATED_SECS = 86_400.0  # machine code of other sources may still be another p
 
 
 def _kept() -> Path:
-    """Where machine code is kept: a folder named after all that is compiled.
+    """Where machine code is kept: a folder named after all our sources.
 
-    Machine code holds what it calls, and numba looks at the file of the caller alone: without this
-    a change in one module would leave the old loops of another running.
+    Machine code holds what it calls and the shape of what it is given, and numba looks at the file
+    of the caller alone: without this a change in one module would leave the old loops of another
+    running.
     """
     ours, digest = Path(__file__).parents[1], sha256()
     for package in ("shiplog", "recorders", "analysis"):
         for path in sorted((ours / package).rglob("*.py")):
-            source = path.read_bytes()
-            if b"@compiled" in source or b"@case_of" in source:
-                digest.update(source)
+            digest.update(path.read_bytes())
     where = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _usual_place()
     return where / f"shiplog-{digest.hexdigest()[:16]}"
 
 
 def _usual_place() -> Path:
-    """Beside the package, or, where the user may not write, beside their other caches."""
+    """Beside the package, or, where the user may not write, beside their other caches.
+
+    Never where another user could have laid something before: it will be run.
+    """
     beside = Path(__file__).parent
     if os.access(beside, os.W_OK):
         return beside / "__pycache__"
-    home = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    return (home if os.access(home, os.W_OK) else Path(tempfile.gettempdir())) / (
-        f"shiplog-{os.getuid()}"
-    )
+    own = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "shiplog"
+    try:
+        own.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="shiplog-"))  # for this run alone
+    return own
 
 
 def _forget_others(kept: Path) -> None:

@@ -41,23 +41,24 @@ class FilterSettings:
 
     kind: str | None = _choice(FILTERS, None)
     smooth: bool = _flag()  # back from the end, too
-    gate: float = _number(6.0, positive=True)  # standard deviations a sample may be off
-    yaw_rate_std: float | None = _number(positive=True)  # rad/s, of the white noise of one sample
-    speed_std: float | None = _number(positive=True)  # m/s
-    # pseudo-input: process to measurement intensity, 1/s^2, the paper's Q/R
-    process_ratio: float | None = _number(positive=True)
+    gate: float = _number(6.0, positive=True, most=1e9)  # standard deviations a sample may be off
+    yaw_rate_std: float | None = _number(positive=True, most=10.0)  # rad/s, white, of one sample
+    speed_std: float | None = _number(positive=True, most=100.0)  # m/s
+    process_ratio: float | None = _number(positive=True, most=1e12)  # 1/s^2, the paper's Q/R
     as_printed: bool = _flag()  # pseudo-input: without the jumps that the rudder makes
     # the others: how fast the estimate follows what is measured, rad/s
-    yaw_bandwidth: float | None = _number(positive=True)
-    surge_bandwidth: float | None = _number(positive=True)
-    shift: float = _number(0.1, least=0.0)  # quality: every pole is left of half of it, 1/s
-    damping: float = _number(0.0, least=0.0)  # quality: its G on the yaw acceleration, over R
-    yaw_decay: float | None = _number(positive=True)  # per-tick: minus its poles, both, 1/s
-    surge_decay: float | None = _number(positive=True)  # per-tick: minus its pole, 1/s
+    yaw_bandwidth: float | None = _number(positive=True, most=1e3)
+    surge_bandwidth: float | None = _number(positive=True, most=1e3)
+    # quality: every pole is left of half the shift, 1/s; its G on the yaw acceleration, over R
+    shift: float = _number(0.1, least=0.0, most=1e3)
+    damping: float = _number(0.0, least=0.0, most=1e6)
+    # per-tick: minus the poles of yaw, a double one, and of surge, 1/s
+    yaw_decay: float | None = _number(positive=True, most=1e3)
+    surge_decay: float | None = _number(positive=True, most=1e3)
     wave: bool = _flag()  # waves in the yaw rate are told from the ship's own turning
-    wave_frequency: float | None = _number(positive=True)  # rad/s
+    wave_frequency: float | None = _number(positive=True, most=1e3)  # rad/s
     wave_damping: float | None = _number(positive=True, most=1.0)
-    wave_std: float | None = _number(positive=True)  # rad/s
+    wave_std: float | None = _number(positive=True, most=10.0)  # rad/s
 
     @property
     def chosen(self) -> str:
@@ -71,9 +72,37 @@ class DisturbanceSettings:
 
     models: tuple[str, ...] = _choice(DISTURBANCES, ("constant",), several=True)
     spectrum: str = _choice(SPECTRA, "butterworth")  # of the observer's poles
-    yaw_frequency: float = _number(0.05, positive=True)  # rad/s, of these; the paper's
-    surge_frequency: float = _number(0.02, positive=True)  # surge is slower, its sensor noisier
-    wave_frequency: float | None = _number(positive=True)  # rad/s; None: the residual tells
+    # rad/s, of these: yaw's is the paper's; surge is slower, and its sensor noisier
+    yaw_frequency: float = _number(0.05, positive=True, most=1e3)
+    surge_frequency: float = _number(0.02, positive=True, most=1e3)
+    wave_frequency: float | None = _number(positive=True, most=1e3)  # None: the residual tells
+
+
+ONLY_OF = {  # what the settings of single filters do nothing without
+    "as_printed": ("pseudo-input",),
+    "yaw_bandwidth": FILTERS[1:],
+    "surge_bandwidth": FILTERS[1:],
+    "shift": ("quality",),
+    "damping": ("quality",),
+    "yaw_decay": ("per-tick",),
+    "surge_decay": ("per-tick",),
+}
+
+
+def without_effect(filtering: FilterSettings, observing: DisturbanceSettings) -> list[str]:
+    """The settings, by their names, that are not as by default and do nothing."""
+    usual, names = as_table(FilterSettings()), []
+    changed = [key for key, value in as_table(filtering).items() if usual.get(key) != value]
+    names += [key for key in changed if filtering.chosen not in ONLY_OF.get(key, FILTERS)]
+    of_wave = ("wave_frequency", "wave_damping", "wave_std")
+    observes = "wave" in observing.models
+    for key in of_wave if not filtering.wave else ():
+        if key in changed and not (key == "wave_frequency" and observes):
+            names.append(key)
+    idle = [f"filter.{name}" for name in names]
+    if observing.wave_frequency is not None and not observes:
+        idle.append("disturbance.wave_frequency")
+    return idle
 
 
 def filter_settings(table: Mapping[str, object], faults: list[str]) -> FilterSettings:

@@ -16,6 +16,7 @@ from .settings import (
     disturbance_settings,
     filter_settings,
     number_fault,
+    without_effect,
 )
 from .units import did_you_mean
 
@@ -161,8 +162,8 @@ def parse_vessel(text: str, where: str) -> Vessel:
 def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
     """The vessel with settings of its own replaced, such as {"filter.kind": "extended"}.
 
-    The names are those of the vessel file's `[filter]` and `[disturbance]`. Raises `UsageError`
-    with all the faults at once.
+    The names are those of the vessel file's `[filter]` and `[disturbance]`; "auto" is as if it
+    stated nothing. Raises `UsageError` with all the faults at once.
     """
     if not settings:
         return vessel
@@ -170,15 +171,23 @@ def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
     tables = {"filter": as_table(vessel.filter), "disturbance": as_table(vessel.disturbance)}
     for name, value in settings.items():
         section, _, key = name.partition(".")
-        if section in tables:
+        if section in tables and value == "auto":
+            tables[section].pop(key, None)
+        elif section in tables:
             tables[section][key] = value
         else:
             faults.append(f"unknown setting {name!r}, they begin with filter. or disturbance.")
     filtering = filter_settings(tables["filter"], faults)
     observing = disturbance_settings(tables["disturbance"], faults)
     if faults:
-        raise UsageError(f"the settings do not do: {'; '.join(faults)}")
+        raise UsageError(f"these settings do not work: {'; '.join(faults)}")
     return replace(vessel, filter=filtering, disturbance=observing)
+
+
+def idle(vessel: Vessel) -> list[str]:
+    """Which of a vessel's settings do nothing, in words."""
+    names = ", ".join(without_effect(vessel.filter, vessel.disturbance))
+    return [f"nothing comes of {names}: filter.kind is {vessel.filter.chosen!r}"] if names else []
 
 
 def _section(name: str, section: object, faults: list[str]) -> Mapping[str, object]:

@@ -1,12 +1,16 @@
+import control
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from scipy.signal import cont2discrete
 
 from analysis.design.discrete import discretise
 from analysis.design.observer import butterworth_poles, discrete_observer
+from analysis.design.placement import hautus
 from analysis.design.pseudo_input import pseudo_input_matrices, pseudo_inputs
-from shiplog import Vessel
+from analysis.design.riccati import kalman_gain
+from shiplog import UsageError, Vessel
 from shiplog.ship import Coefficients, surge_acceleration, yaw_acceleration_rate
 
 # The paper's coefficients as printed, angles in degrees
@@ -106,3 +110,64 @@ def test_a_discrete_observer_has_the_poles_asked_for_and_says_its_noise() -> Non
         error = closed @ error + observer.correction * noise
         errors.append(error)
     assert np.std(errors[200:], axis=0) == pytest.approx(observer.noise_gain, rel=0.06)
+
+
+# identification, section 2: the page's rows, column: value; s = 1, b4 = α1 d, b5 = α2 d, ...
+B4, B5 = TABLE1.alpha1 * TABLE1.d, TABLE1.alpha2 * TABLE1.d
+B6, B7 = TABLE1.alpha1 * TABLE1.e, TABLE1.alpha2 * TABLE1.e
+INPUT_ROWS = [
+    {},
+    {4: TABLE1.b2, 5: TABLE1.b3, 7: B4, 8: B6, 9: B5, 10: B7},
+    {
+        8: B4, 10: B5, 11: B4, 12: B5, 14: 2 * TABLE1.b2, 16: 3 * TABLE1.b3, 17: B6, 18: B7,
+        19: -TABLE1.alpha3 * B7, 20: -TABLE1.alpha3 * B5,
+    },
+    {3: TABLE1.h, 4: TABLE1.f, 6: TABLE1.g},
+    {13: TABLE1.h, 14: 2 * TABLE1.f, 15: 2 * TABLE1.g},
+]  # fmt: skip
+MOTION_ROWS = [
+    [0, 1, 0, 0, 0],
+    [TABLE1.b1, TABLE1.a, 0, 0, 0],
+    [0, TABLE1.b1, TABLE1.a, 0, 0],
+    [0] * 5,
+    [0] * 5,
+]
+
+
+def test_the_matrices_are_the_pages_row_by_row() -> None:
+    A, B = pseudo_input_matrices(TABLE1, 1.0)
+    assert pytest.approx(np.array(MOTION_ROWS), rel=1e-15) == A
+    for found, row in zip(B, INPUT_ROWS, strict=True):
+        entries = {int(column) + 1: found[column] for column in np.flatnonzero(found)}
+        assert entries == pytest.approx(row, rel=1e-15)
+    _, port = pseudo_input_matrices(TABLE1, -1.0)
+    changed = {(2, 4), (3, 14)}  # those of w|w|
+    assert {(int(i) + 1, int(j) + 1) for i, j in np.argwhere(port != B)} == changed
+
+
+def test_the_five_states_are_shown_but_for_w_ddot_which_decays_and_v_dot_which_does_not() -> None:
+    A, _ = pseudo_input_matrices(TABLE1, 1.0)
+    C = np.eye(5)[[0, 3]]
+    seen = np.vstack([C @ np.linalg.matrix_power(A, k) for k in range(5)])
+    assert np.linalg.matrix_rank(seen, tol=1e-12) == 3
+    hidden = {mode.states: mode.value for mode in hautus(A, C)}
+    assert hidden == pytest.approx({(2,): TABLE1.a, (4,): 0.0}, abs=1e-12)
+    with pytest.raises(UsageError, match=r"A \(5, 5\) and C: the mode at 0 does not decay and can"):
+        kalman_gain(A, np.eye(5), C, 0.01 * np.eye(5), 400 * np.eye(2))
+
+
+def test_the_printed_covariance_is_stationary_in_yaw_and_still_on_its_way_in_surge() -> None:
+    A, _ = pseudo_input_matrices(TABLE1, 1.0)
+    yaw = kalman_gain(A[:2, :2], np.eye(2), [[1, 0]], 0.01 * np.eye(2), 400).covariance
+    surge = kalman_gain([[0]], [[1]], [[1]], 0.01, 400).covariance
+    assert [*yaw[0], yaw[1, 1]] == pytest.approx([30.27534702, 1.14074580, 0.12079779], abs=1e-8)
+    assert surge.item() == pytest.approx(2, rel=1e-12)  # √(QR); printed 2.06180082
+    assert pytest.approx(13.78, abs=1e-12) == 10 + 0.01 * 378  # v' has no other noise and no end
+
+
+def test_the_libraries_discretise_alike(vessel: Vessel) -> None:
+    A, B = pseudo_input_matrices(vessel.coefficients, 1.0)
+    C, D, dt = np.eye(5)[[0, 3]], np.zeros((2, 20)), 0.5
+    F, _ = discretise(A, np.eye(5), dt)
+    assert pytest.approx(cont2discrete((A, B, C, D), dt)[0], abs=1e-14) == F
+    assert pytest.approx(control.sample_system(control.ss(A, B, C, D), dt).A, abs=1e-14) == F

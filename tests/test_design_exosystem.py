@@ -291,3 +291,58 @@ def test_what_does_not_fit_is_refused_in_one_line(change: dict, said: str) -> No
 def test_an_exosystem_that_is_none_is_refused(make: object, said: str) -> None:
     with pytest.raises(UsageError, match=said):
         make()
+
+
+@pytest.mark.parametrize("I", [1.0, 1000.0])
+@pytest.mark.parametrize("omega", [0.02, 0.05, 0.3])
+def test_the_gains_of_the_roll_example_are_the_pages_formulas(I: float, omega: float) -> None:
+    formulas = {
+        "butterworth": [2 * omega, 2 * I * omega**2, I * omega**3],
+        "binomial": [3 * omega, 3 * I * omega**2, I * omega**3],
+    }
+    for spectrum, gain in formulas.items():
+        observer = disturbance_observer(*roll(I), spectrum, frequency=omega)
+        assert observer.L[:, 0] == pytest.approx(gain, rel=1e-12)
+        polynomial = np.poly(observer.A - observer.L @ observer.C)
+        expected = [1, gain[0], gain[1] / I, gain[2] / I]
+        assert polynomial == pytest.approx(expected, rel=1e-9)
+
+
+def test_of_an_inertia_of_1e12_a_rank_test_in_its_units_fails_and_ours_does_not() -> None:
+    """Of 1e16 even one to the last bit."""
+    for inertia, tolerance in ((1e12, 1e-10), (1e16, None)):
+        ship, influences = roll(inertia)
+        observer = disturbance_observer(ship, influences, frequency=0.05)
+        powers = [np.linalg.matrix_power(observer.A, k) for k in range(3)]
+        shown = np.vstack([observer.C @ power for power in powers])
+        assert np.linalg.matrix_rank(shown, tolerance) < 3
+        assert clashes(ship, influences) == ()
+
+
+def test_a_complex_rate_turns_in_two_by_two_blocks() -> None:
+    """Ac = λI + N of size d + 1, Cc = [1 0 …]."""
+    ramp = Exosystem.exponential(-0.3, 2)
+    assert ramp.Ac.tolist() == (-0.3 * np.eye(3) + np.eye(3, k=1)).tolist()
+    assert ramp.Cc.tolist() == [[1, 0, 0]]
+    wave = Exosystem.exponential(-0.1 + 0.6j)
+    assert wave.Ac.tolist() == [[-0.1, 0.6], [-0.6, -0.1]]
+    assert Exosystem.polynomial(1).Ac.tolist() == [[0, 1], [0, 0]]
+
+
+@settings(derandomize=True, max_examples=60, deadline=None)
+@given(st.floats(0.01, 0.5), st.floats(0.2, 1.5), st.floats(0.05, 0.5), st.integers(0, 4))
+def test_whatever_the_plant_and_the_wave_the_poles_are_those_asked_for(
+    decay: float, wave: float, frequency: float, which: int
+) -> None:
+    ship = plant([[-decay]], [[1]], "w", "gyro")
+    harmonic = Exosystem.harmonic(wave)
+    asked = [
+        [moment(RAMP)],
+        [moment(RAMP), moment(harmonic, "wave")],
+        [moment(CONSTANT), bias(exosystem=harmonic)],
+        [moment(harmonic, "wave"), bias()],
+        [moment(Exosystem.exponential(-0.05, 1)), bias(exosystem=harmonic)],
+    ][which]
+    for spectrum in ("butterworth", "binomial"):
+        observer = disturbance_observer(ship, asked, spectrum, frequency=frequency)
+        assert polynomial_error(observer.A - observer.L @ observer.C, observer.poles) < 1e-9

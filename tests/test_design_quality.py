@@ -7,6 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import ArrayLike
+from scipy.linalg import solve_continuous_are
 
 from analysis.design.cascade import cascade
 from analysis.design.quality import (
@@ -310,3 +311,93 @@ def test_cycles_and_stages_are_counted() -> None:
         cascade(SHIP, RATE, R1, R2, [[0.2], [0.01]], stages=2, correlation_secs=0)
     with pytest.raises(UsageError, match=r"a pole at .* expected a stable L"):
         cascade(SHIP, RATE, R1, R2, [[-1], [0]], stages=2, correlation_secs=10)
+
+
+# ---- methods, section 2, what is said there without a table
+
+
+def equation_of(
+    A: FloatArray, B: FloatArray, P: FloatArray, R: FloatArray, G: FloatArray, c: float
+) -> tuple[FloatArray, FloatArray]:
+    """Q and L of the page's one equation, by the library; the shift is not in the cross term."""
+    heavier, across = R + B.T @ G @ B, A.T @ G @ B
+    weight, heavier = P + A.T @ G @ A, (heavier + heavier.T) / 2
+    shifted = A + c / 2 * np.eye(len(A))
+    Q = solve_continuous_are(shifted, B, (weight + weight.T) / 2, heavier, s=across)
+    return Q, -np.linalg.solve(heavier, across.T + B.T @ Q)
+
+
+@FEW
+@given(SEEDS, st.floats(0, 3))
+def test_the_equation_is_one_standard_riccati_equation(seed: int, c: float) -> None:
+    A, B, P, R, G = random_regulator(seed)
+    Q, L = equation_of(A, B, P, R, G, c)
+    assume(np.linalg.norm(L) < 1e3)
+    found = quality_regulator(A, B, P, R, G=G, shift=c)
+    assert_allclose(found.cost, Q, rtol=1e-7, atol=1e-8 * np.abs(Q).max())
+    assert_allclose(found.gain, L, rtol=1e-7, atol=1e-7)
+
+
+@FEW
+@given(SEEDS)
+def test_a_weight_on_the_rates_is_controls_cross_term(seed: int) -> None:
+    A, B, P, R, G = random_regulator(seed)
+    weight, heavier = P + A.T @ G @ A, R + B.T @ G @ B
+    K, _, _ = control.lqr(A, B, (weight + weight.T) / 2, (heavier + heavier.T) / 2, A.T @ G @ B)
+    assume(np.linalg.norm(K) < 1e3)
+    assert_allclose(quality_regulator(A, B, P, R, G=G).gain, -K, rtol=1e-7, atol=1e-7)
+
+
+@FEW
+@given(SEEDS, st.floats(0, 3))
+def test_the_dual_equation_has_its_quadratic_term(seed: int, c: float) -> None:
+    """J21 + P J11 + J11* P - P J12 P = 0, K = (P S' + A G S') (R2 + S G S')⁻¹."""
+    A, B, R1, R2, G = random_regulator(seed)
+    S = B.T
+    found = quality_filter(A, S, R1, R2, G=G, shift=c)
+    P, heavier, across = found.covariance, R2 + S @ G @ S.T, A @ G @ S.T
+    J12 = S.T @ np.linalg.solve(heavier, S)
+    J11 = c / 2 * np.eye(len(A)) + A.T - S.T @ np.linalg.solve(heavier, across.T)
+    J21 = R1 + A @ G @ A.T - across @ np.linalg.solve(heavier, across.T)
+    left = J21 + P @ J11 + J11.T @ P - P @ J12 @ P
+    sizes = [np.linalg.norm(M) for M in (J21, A, P, J12)]
+    assert np.linalg.norm(left) < 1e-12 * (
+        sizes[0] + 2 * sizes[1] * sizes[2] + sizes[3] * sizes[2] ** 2
+    )
+    gain = np.linalg.solve(heavier, (P @ S.T + across).T).T
+    assert_allclose(found.gain, gain, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_of_300_random_systems_every_one_keeps_the_bound(weighted: bool) -> None:
+    for seed in range(300):
+        A, B, P, R, G = random_regulator(seed)
+        c = 0.01 * seed
+        found = quality_regulator(A, B, P, R, G=G if weighted else None, shift=c)
+        assert np.linalg.eigvals(A + B @ found.gain).real.max() < -c / 2
+        assert found.residual < 1e-12
+
+
+def test_without_weight_on_the_rates_the_cycles_add_up_without_end() -> None:
+    """The increments fall as 1/√j."""
+    done = cycle_regulator(DOUBLE, PUSH, np.eye(2), 1, 100)
+    j = np.arange(1, 101)
+    gains = np.array([step.gain[0] for step in done])
+    assert_allclose(gains, -np.column_stack((np.sqrt(j), np.sqrt(j + 2 * np.sqrt(j)))), rtol=1e-8)
+    increments = np.abs(np.diff(gains, axis=0)) * np.sqrt(j[1:, None])
+    assert increments[-1] == pytest.approx([0.5, 0.5], abs=0.05)
+
+
+def test_with_weight_on_the_rates_increments_fall_as_a_geometric_progression() -> None:
+    R, weight = 1.0, 0.25
+    done = cycle_regulator([[0.5]], [[1]], 1, R, 40, G=weight)
+    increments = np.diff([step.gain.item() for step in done])
+    assert (increments[1:] / increments[:-1])[-1] == pytest.approx(R / (R + weight), abs=1e-4)
+
+
+def test_a_first_stage_that_is_too_slow_no_cascade_repairs() -> None:
+    """Taken for ten thousand times noisier, as the page's words are, not its numbers."""
+    first = quality_filter(SHIP, RATE, R1, 1e4 * R2).gain
+    found = cascade(SHIP, RATE, R1, R2, first, stages=5, correlation_secs=10)
+    assert found.best == 1
+    assert found.relative[0, 0] > 12

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
-from scipy.linalg import expm
+from scipy.linalg import expm, solve_continuous_are
 
 from analysis.design.observability import unseen_modes
 from analysis.design.riccati import error_covariance, kalman_gain
@@ -178,3 +178,18 @@ def test_hidden_modes_are_found_in_any_coordinates(seed: int) -> None:
     assert np.sort(modes.real) == pytest.approx(np.sort(hidden), abs=1e-8)
     with pytest.raises(UsageError, match=r"the mode at 0\.3"):
         kalman_gain(T @ A @ T.T, np.eye(n), C @ T.T, np.eye(n), np.eye(2))
+
+
+@FEW
+@given(SEEDS)
+def test_a_cross_covariance_is_scipys_cross_term(seed: int) -> None:
+    A, G, C, Q, R = system(seed)
+    rng = np.random.default_rng(seed)
+    N = 0.1 * np.linalg.cholesky(Q) @ rng.uniform(-1, 1, (len(Q), len(R))) @ np.linalg.cholesky(R).T
+    N /= max(1.0, 10 * np.linalg.norm(N, 2))
+    W, R = G @ Q @ G.T, (R + R.T) / 2
+    P = solve_continuous_are(A.T, C.T, (W + W.T) / 2, R, s=G @ N)
+    found = kalman_gain(A, G, C, Q, R, N)
+    assert found.covariance == pytest.approx(P, rel=1e-7, abs=1e-7 * np.abs(P).max())
+    gain = np.linalg.solve(R, (P @ C.T + G @ N).T).T
+    assert found.gain == pytest.approx(gain, rel=1e-6, abs=1e-7 * max(1.0, np.abs(gain).max()))

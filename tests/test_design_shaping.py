@@ -232,3 +232,23 @@ def test_a_shaping_filter_that_does_not_fit_is_refused() -> None:
         augment_with_shaping(YAW, RUDDER, RATE, [1, 0], WHITE, noise=[[1, 0]])
     with pytest.raises(UsageError, match="frequency is -1"):
         wave_filter(1, -1)
+
+
+def test_the_factor_is_the_one_the_page_writes_down() -> None:
+    """H(s) = σ√(6/L)·(s + 1/(L√3))/(s + 1/L)²."""
+    H = spectral_factor(*DRYDEN)
+    size = SIGMA * np.sqrt(6 / L)
+    assert H.numerator == pytest.approx([size, size / (L * np.sqrt(3))], rel=1e-12)
+    assert H.denominator == pytest.approx([1, 2 / L, 1 / L**2], rel=1e-12)
+
+
+def test_the_papers_two_misprints_are_off_by_a_whole_number_and_nothing_else() -> None:
+    plant = augment_with_shaping(A0, B0, C0, G0, spectral_factor(*DRYDEN))
+    found = kalman_gain(plant.A, plant.G, plant.C, 1, R)
+    assert found.gain[PAPERS_ORDER][3, 1] - 2 == pytest.approx(-2.2457, abs=5e-5)
+    assert found.poles[-1].real - 1 == pytest.approx(-1.1661, abs=5e-5)
+    # its own numbers prove both: F = A - L C, and the trace of F is the sum of its poles
+    (_, printed), (sensed, _) = PRINTED_CLOSED[3][:2], PRINTED_GAIN[3]
+    assert -sensed * C0[0, 1] - printed == pytest.approx(PRINTED_GAIN[3][1], abs=1e-4)
+    printed_trace = sum(PRINTED_CLOSED[k][k] for k in range(5))
+    assert printed_trace == pytest.approx(sum(PRINTED_POLES), abs=3e-4)

@@ -288,3 +288,29 @@ def test_a_jacobian_that_does_not_fit_or_shows_nothing_is_refused() -> None:
         )  # fmt: skip
         with pytest.raises(UsageError, match=r"no gain at x̂ = \[0.1, -0.2.*mode at -0.1 cannot"):
             blind.gain(POINT)
+
+
+def test_on_the_ship_a_frozen_gain_is_hardly_to_be_told_from_one_found_at_each_tick() -> None:
+    """Her rudder swings by 20°, the estimate starts far off."""
+    tick, turn = 2.0, 2 * np.pi / 120
+    times = np.arange(401) * tick / 4
+    u = np.column_stack(
+        (0.35 * np.sin(turn * times), 0.35 * turn * np.cos(turn * times), np.full(401, 36.0))
+    )
+
+    def moving(t: float, x: np.ndarray) -> np.ndarray:
+        return ship(x, np.array([0.35 * np.sin(turn * t), 0.35 * turn * np.cos(turn * t), 36.0]))
+
+    run = solve_ivp(moving, times[[0, -1]], SHIP_POINT, "DOP853", times, rtol=1e-12, atol=1e-14).y.T
+    each_tick = tick_observer(ship, ship_jacobian, RATE_AND_SPEED, [-0.1] * 3)
+    at_first = ship_jacobian(SHIP_POINT, u[0])
+    frozen = tick_observer(ship, lambda *_: at_first, RATE_AND_SPEED, [-0.1] * 3)
+    errors = []
+    for observer in (each_tick, frozen):
+        x, off = SHIP_POINT + np.array([0.005, -5e-4, -1.0]), []
+        for k in range(0, 400, 4):
+            x = observer.step(x, run[k : k + 5, [0, 2]], u[k : k + 5], tick_secs=tick)
+            off.append(x - run[k + 4])
+        errors.append(np.array(off))
+    sizes = np.abs(errors[0]).max(axis=0)
+    assert np.all(np.abs(errors[0] - errors[1]).max(axis=0) < 0.01 * sizes)

@@ -251,12 +251,15 @@ def test_any_other_gain_is_kept_in_a_straight_ship_once_the_best_one_has_fallen_
     filtering = make_filter(c, NOISE, usual, settings)
     estimates, trace = filtering.trace(signals, last_inputs(signals))
     run = three_states(c, NOISE, usual, delta, n)
-    off, P, settled = np.zeros(3), run.P, [False, False]
+    off, P, settled, taken = np.zeros(3), run.P, [False, False], [0, 0]
+    poles = [np.abs(discrete_gain(settings, one)[1]).max() for one in (of_yaw, of_surge)]
     for k in range(count):
         for output in np.flatnonzero(np.isfinite(measured[k])):
             C = run.C[output]
             best = P @ C / (C @ P @ C + run.r[output])
+            taken[output] += 1
             settled[output] |= bool(C @ best <= 1.5 * C @ K[output])
+            settled[output] |= bool(poles[output] ** taken[output] < np.exp(-1))
             gain = K[output] if settled[output] else best
             kept = np.eye(3) - np.outer(gain, C)
             off = off + gain * (measured[k, output] - C @ (run.mean[k] + off))

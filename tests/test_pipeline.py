@@ -404,9 +404,19 @@ def test_a_spike_is_gated_counted_and_does_no_harm(
     assert found.residuals[0].gated == 1
     away = np.abs(found.estimates.states - zigzag_analysis.estimates.states)
     assert np.all(away < 0.3 * zigzag_analysis.estimates.stds)
+    moment = np.abs(found.disturbance.yaw - zigzag_analysis.disturbance.yaw)
+    assert moment.max() < zigzag_analysis.courses["yaw"].std  # nor does the observer believe it
     believing = analyse(spiked, settings={"filter.gate": 1e6})
     assert believing.residuals[0].gated == 0
     assert believing.residuals[0].normalised_squared > found.residuals[0].normalised_squared
+
+
+def test_poles_slower_than_the_best_ones_are_taken_all_the_same(zigzag_log: TrialLog) -> None:
+    slow = {"filter.kind": "per-tick", "filter.yaw_decay": 0.004, "filter.surge_decay": 0.004}
+    found = analyse(zigzag_log, settings={**slow, "filter.process_ratio": 1e-3})
+    best = analyse(zigzag_log, settings={"filter.kind": "extended", "filter.process_ratio": 1e-3})
+    assert np.array_equal(found.estimates.states[:2000], best.estimates.states[:2000])
+    assert not np.array_equal(found.estimates.states[4000:], best.estimates.states[4000:])
 
 
 def test_more_gated_than_spikes_explain_is_warned_of(zigzag_log: TrialLog) -> None:

@@ -16,8 +16,9 @@ from shiplog.settings import (
     as_table,
     disturbance_settings,
     filter_settings,
+    without_effect,
 )
-from shiplog.vessel import PRESETS, parse_vessel, with_settings
+from shiplog.vessel import PRESETS, idle, parse_vessel, with_settings
 
 
 def faults_of(section: str, table: dict[str, object]) -> str:
@@ -81,7 +82,7 @@ def test_what_has_not_the_best_gain_is_not_smoothed(kind: str) -> None:
         ("filter", "smooth", 1, "filter.smooth must be true or false, got 1"),
         ("filter", "gate", 0, "filter.gate must be positive, got 0"),
         ("filter", "gate", "6", "filter.gate must be a number, got '6'"),
-        ("filter", "shift", -0.1, "filter.shift must lie between 0 and inf, got -0.1"),
+        ("filter", "shift", -0.1, "filter.shift must lie between 0 and 1000, got -0.1"),
         ("filter", "wave_damping", 2.0, "filter.wave_damping must lie between -inf and 1, got 2"),
         ("filter", "speed_std", float("nan"), "filter.speed_std must be finite, got nan"),
         ("filter", "yaw_rate_std", True, "filter.yaw_rate_std must be a number, got True"),
@@ -111,6 +112,35 @@ def test_settings_given_stand_above_the_vessels_own(vessel: Vessel) -> None:
     assert changed.disturbance.models == ("ramp",)
     assert changed.coefficients == vessel.coefficients
     assert with_settings(vessel, {}) is vessel
+
+
+def test_a_setting_is_left_to_the_log_again(vessel: Vessel) -> None:
+    assert vessel.filter.process_ratio == 2.5e-5
+    assert with_settings(vessel, {"filter.process_ratio": "auto"}).filter.process_ratio is None
+    with_gate = with_settings(vessel, {"filter.gate": 3.0})
+    assert with_settings(with_gate, {"filter.gate": "auto"}).filter.gate == 6.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "names"),
+    [
+        ({"filter.shift": 0.2}, ["filter.shift"]),
+        ({"filter.kind": "quality", "filter.shift": 0.2}, []),
+        ({"filter.kind": "extended", "filter.as_printed": True}, ["filter.as_printed"]),
+        ({"filter.yaw_bandwidth": 0.1}, ["filter.yaw_bandwidth"]),
+        ({"filter.wave_std": 1e-3}, ["filter.wave_std"]),
+        ({"filter.wave": True, "filter.wave_std": 1e-3}, []),
+        ({"disturbance.wave_frequency": 0.6}, ["disturbance.wave_frequency"]),
+        ({"disturbance.models": ["wave"], "disturbance.wave_frequency": 0.6}, []),
+    ],
+)
+def test_a_setting_of_which_nothing_comes_is_told(
+    vessel: Vessel, settings: dict[str, object], names: list[str]
+) -> None:
+    changed = with_settings(vessel, settings)
+    assert without_effect(changed.filter, changed.disturbance) == names
+    assert all(name in idle(changed)[0] for name in names)
+    assert bool(idle(changed)) == bool(names)
 
 
 def test_settings_of_another_kind_are_refused_all_at_once(vessel: Vessel) -> None:

@@ -1,4 +1,4 @@
-"""What a filter is told of noise, and how the log tells what nobody stated."""
+"""What a filter is told of noise."""
 
 from dataclasses import dataclass
 

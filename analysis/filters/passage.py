@@ -24,11 +24,6 @@ class Estimates:
     gated: NDArray[np.bool_]  # (n, 2) what was measured and not believed
     wave: FloatArray | None = None  # (n,) rad/s: what of the yaw rate is waves', if it was asked
 
-    @property
-    def believed(self) -> FloatArray:
-        """The innovations (n, 2) of what was believed; NaN elsewhere."""
-        return np.where(self.gated, np.nan, self.innovations)
-
 
 @dataclass(frozen=True, eq=False)
 class Trace:

@@ -35,6 +35,7 @@ from .steps import believable, correct, project, propagate
 BEST, FIXED, TICKED = range(3)  # gains
 _GAINS = {"extended": BEST, "steady-state": FIXED, "quality": FIXED, "per-tick": TICKED}
 _STATES = 3  # beside the wave's
+TINY = 1e-300  # a pole that forgets at once
 NEARLY = 1.5  # times the gain designed for ever, which the best one need not quite fall to
 
 
@@ -60,21 +61,23 @@ class ThreeStateFilter:
         self._Q = _process_noise(model, noise, usual, self._wave)
         self._gain = _GAINS[settings.chosen]
         self._x, self._P = _start(model, usual, self._wave)
-        self._settled = np.zeros(len(OUTPUTS), np.bool_)
+        self._ages = np.zeros(len(OUTPUTS))
         self._off = np.zeros(len(OUTPUTS), np.int64)
         self._fixed = np.zeros((len(OUTPUTS), size))
         self._poles = np.zeros(size, np.complex128)
+        self._interval = usual.interval_secs
+        self._forgetting = np.zeros(len(OUTPUTS))
         if self._gain != BEST:
             self._design(settings, yaw, surge)
-        self._interval = usual.interval_secs
         self._wave_between = np.ascontiguousarray(expm(yaw.A[2:, 2:] * yaw.interval_secs))
 
     def _design(self, settings: FilterSettings, yaw: Channel, surge: Channel) -> None:
         of_yaw = [0, 1, *range(_STATES, len(self._fixed[0]))]
-        gain, poles = discrete_gain(settings, yaw)
-        self._fixed[0, of_yaw], self._poles[of_yaw] = gain, poles
-        gain, poles = discrete_gain(settings, surge)
-        self._fixed[1, 2], self._poles[2] = gain[0], poles[0]
+        for output, channel, states in ((0, yaw, of_yaw), (1, surge, [2])):
+            gain, poles = discrete_gain(settings, channel)
+            self._fixed[output, states], self._poles[states] = gain, poles
+            slowest = float(np.abs(poles).max())
+            self._forgetting[output] = -channel.interval_secs / np.log(max(slowest, TINY))
 
     def step(self, slab: Signals, following: Mapping[str, float]) -> Estimates:
         """Filter the next slab; `following` are the inputs at the instant after it."""
@@ -103,11 +106,11 @@ class ThreeStateFilter:
         delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
         correction = _Correction(
             self.outputs, self._r, self._gate, self._gain, self._fixed, self._poles,
-            self._interval, self._wave_between,
+            self._interval, self._forgetting, self._wave_between,
         )  # fmt: skip
         states, rows, innovations, gated, trace = _filter(
             self._model, self._x, self._P, self._Q, self._wave.F, correction, measured, delta, n,
-            slab.dt_secs, self._off, self._settled, keep,
+            slab.dt_secs, self._off, self._ages, keep,
         )  # fmt: skip
         told = Estimates(
             rows[:, :5], np.sqrt(rows[:, 5:]), innovations[:, :2], np.sqrt(innovations[:, 2:]),
@@ -173,6 +176,7 @@ class _Correction(NamedTuple):
     fixed: FloatArray  # (2, s)
     poles: NDArray[np.complex128]  # (s,) of the yaw's and the surge's states, from sample to sample
     interval: FloatArray  # (2,) s
+    forgetting: FloatArray  # (2,) s, that the slowest poles take to it
     wave: FloatArray  # (k, k) from a sample of the yaw rate to the next
 
 
@@ -192,12 +196,12 @@ def _filter(
     n: FloatArray,
     dt: float,
     off: NDArray[np.int64],
-    settled: NDArray[np.bool_],
+    ages: FloatArray,
     keep: bool,
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_], _Kept]:
     """The states (n, s), rows of what is told and its variances, (n, 10), of innovations, (n, 4).
 
-    And what was gated, and, if it is to be kept, the rest of a trace. `x`, `P`, `off` and `settled`
+    And what was gated, and, if it is to be kept, the rest of a trace. `x`, `P`, `off` and `ages`
     go on to the next slab; `delta` and `n` are one longer.
     """
     count, size = len(measured), len(x)
@@ -224,7 +228,7 @@ def _filter(
                 continue
             if by.gain == TICKED:
                 linearise(c, x, delta[k], delta_dot, n[k], J)
-            K = _gain(by, Pc, S, J, output, settled)
+            K = _gain(by, Pc, S, J, output, ages)
             correct(x, P, K, Pc, innovation, S)
             if keep:
                 Ks[k, output], es[k, output], Ss[k, output] = K, innovation, S
@@ -246,12 +250,13 @@ def _gain(
     S: float,
     J: FloatArray,
     output: int,
-    settled: NDArray[np.bool_],
+    ages: FloatArray,
 ) -> FloatArray:
     """The gain (s,) of an output, of which P c and c P c + r are given.
 
-    A gain that is designed is that of a filter which has forgotten its start; until then it is the
-    best one, which falls towards it.
+    A gain that is designed is that of a filter which has forgotten its start. Until then it is the
+    best one: until that has fallen to it, or for as long as the slowest pole takes to forget.
+    `ages` (2,) are the seconds that an output has been taken in.
     """
     best: FloatArray = Pc / S
     if by.gain == BEST:
@@ -260,5 +265,7 @@ def _gain(
     if by.gain == TICKED:
         designed = ticked_gain(J, by.wave, by.C[output], by.poles, by.interval[output], output)
     measured = 2 * output  # w or v
-    settled[output] |= best[measured] <= NEARLY * designed[measured]
-    return designed if settled[output] else best
+    ages[output] += by.interval[output]
+    if best[measured] <= NEARLY * designed[measured]:
+        ages[output] = np.inf
+    return designed if ages[output] > by.forgetting[output] else best
