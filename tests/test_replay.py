@@ -9,6 +9,8 @@ import pytest
 from analysis.check import compare, logs_in
 from analysis.pipeline import analyse
 from shiplog import load_vessel, read
+from shiplog.foreign import read_table
+from shiplog.layout import load_layout
 from shiplog.settings import DISTURBANCES, FILTERS, SMOOTHED
 from shiplog.vessel import PRESETS
 
@@ -76,3 +78,18 @@ def test_the_vessel_files_are_the_presets() -> None:
         path = SAMPLES / "vessels" / f"{name}.toml"
         assert path.read_text(encoding="utf-8") == text
         assert load_vessel(path)[0].coefficients == load_vessel(name)[0].coefficients
+
+
+KVLCC2 = Path(__file__).parents[2] / "shared" / "data" / "kvlcc2"
+RUNS = sorted(KVLCC2.glob("*/*.dat"))
+
+
+@pytest.mark.skipif(not RUNS, reason="the SIMMAN data are not in ../shared/data/kvlcc2")
+@pytest.mark.parametrize(("kind", "smooth"), KINDS)
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
+def test_every_filter_replays_every_run_of_the_kvlcc2(run: Path, kind: str, smooth: bool) -> None:
+    log = read_table(run, load_layout(SAMPLES / "layouts" / f"simman_{run.parent.name}.toml"))
+    found = analyse(log, settings={"filter.kind": kind, "filter.smooth": smooth})
+    assert np.isfinite(found.estimates.states).all()
+    assert np.isfinite(found.estimates.stds).all()
+    assert found.estimates.gated.mean() < 0.01
