@@ -25,7 +25,7 @@ from shiplog.types import FloatArray, Signals
 
 from .noise import Noise
 from .passage import OUTPUT_STATES, STATES, Estimates, Trace
-from .steps import believable, correct, project, propagate
+from .steps import BELIEVED, GATED, correct, propagate, weigh
 
 
 class MotionState(NamedTuple):
@@ -152,15 +152,12 @@ def _filter(
             x[2] += rudder_effect(c, x[3], n[k]) * c.e * (delta_dot - last_rate[0])
         last_rate[0] = delta_dot
         for output in range(2):
-            S = project(P, C[output], Pc) + r[output]
-            innovation = measured[k, output]
-            for i in range(size):
-                innovation -= C[output, i] * x[i]
+            innovation, S, verdict = weigh(
+                x, P, C[output], r[output], measured[k, output], gate, output, off, Pc
+            )
             told[k, output], told[k, 2 + output] = innovation, S
-            if not np.isfinite(innovation):
-                continue
-            if not believable(innovation, S, gate, output, off):
-                gated[k, output] = True
+            gated[k, output] = verdict == GATED
+            if verdict != BELIEVED:
                 continue
             K = Pc / S
             correct(x, P, K, Pc, innovation, S)

@@ -22,6 +22,7 @@ from shiplog.compiled import compiled
 from shiplog.types import FloatArray, Signals
 
 from .passage import Estimates, Filter, Trace
+from .steps import propagate
 
 ROUNDING = 1e-9  # of a variance: no less is left of it in the difference
 
@@ -112,10 +113,10 @@ def _back(
     count, size = len(F), C.shape[1]
     slopes, curvatures = np.empty((count, size)), np.empty((count, size, size))
     slope, curvature, across = slope.copy(), curvature.copy(), np.eye(size)
-    room, row = np.empty((size, size)), np.empty(size)
+    room, row, nothing = np.empty((size, size)), np.empty(size), np.zeros((size, size))
     for k in range(count - 1, -1, -1):
         _transpose_through(F[k], slope, row)
-        _congruence(F[k], curvature, room)
+        propagate(curvature, F[k].T, nothing, room)
         _multiply(across, F[k], room)
         slopes[k], curvatures[k] = slope, curvature
         for output in range(1, -1, -1):
@@ -134,23 +135,6 @@ def _transpose_through(F: FloatArray, slope: FloatArray, room: FloatArray) -> No
         for j in range(size):
             room[i] += F[j, i] * slope[j]
     slope[:] = room
-
-
-@compiled
-def _congruence(F: FloatArray, curvature: FloatArray, room: FloatArray) -> None:
-    """F' Λ F in place, symmetric."""
-    size = len(F)
-    for i in range(size):
-        for j in range(size):
-            room[i, j] = 0.0
-            for m in range(size):
-                room[i, j] += curvature[i, m] * F[m, j]
-    for i in range(size):
-        for j in range(i + 1):
-            total = 0.0
-            for m in range(size):
-                total += F[m, i] * room[m, j]
-            curvature[i, j], curvature[j, i] = total, total
 
 
 @compiled
@@ -208,10 +192,11 @@ def _smoothed(
 ) -> tuple[FloatArray, FloatArray]:
     """x - P λ and P - P Λ P at every instant."""
     size = x.shape[1]
-    states, covariances, room = np.empty_like(x), np.empty_like(P), np.empty((size, size))
+    states, covariances = np.empty_like(x), np.empty_like(P)
+    room, nothing = np.empty((size, size)), np.zeros((size, size))
     for k in range(len(x)):
         covariances[k] = curvatures[k]
-        _congruence(P[k], covariances[k], room)
+        propagate(covariances[k], P[k], nothing, room)
         for i in range(size):
             states[k, i] = x[k, i]
             for j in range(size):

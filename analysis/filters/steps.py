@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray
 
+MISSING, GATED, BELIEVED = range(3)  # measurements
 PATIENCE = 5  # so many in a row that are off are no spikes: it is the filter that is
 
 
@@ -22,6 +23,33 @@ def project(P: FloatArray, c: FloatArray, Pc: FloatArray) -> float:
             Pc[i] += P[i, j] * c[j]
         variance += c[i] * Pc[i]
     return variance
+
+
+@compiled
+def weigh(
+    x: FloatArray,
+    P: FloatArray,
+    c: FloatArray,
+    r: float,
+    measured: float,
+    gate: float,
+    output: int,
+    off: NDArray[np.int64],
+    Pc: FloatArray,
+) -> tuple[float, float, int]:
+    """The innovation of an output c x, its variance, and whether it is BELIEVED, GATED or MISSING.
+
+    `Pc` is left as P c, which the gain is made of.
+    """
+    variance = project(P, c, Pc) + r
+    innovation = measured
+    for i in range(len(c)):
+        innovation -= c[i] * x[i]
+    if not np.isfinite(innovation):
+        return innovation, variance, MISSING
+    if believable(innovation, variance, gate, output, off):
+        return innovation, variance, BELIEVED
+    return innovation, variance, GATED
 
 
 @compiled

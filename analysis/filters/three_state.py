@@ -30,7 +30,7 @@ from .gains import Channel, channels, discrete_gain, ticked_gain
 from .noise import Noise
 from .passage import Estimates, Trace
 from .ship_step import linearise, predict, tell, tell_all
-from .steps import believable, correct, project, propagate
+from .steps import BELIEVED, GATED, correct, propagate, weigh
 
 BEST, FIXED, TICKED = range(3)  # gains
 _GAINS = {"extended": BEST, "steady-state": FIXED, "quality": FIXED, "per-tick": TICKED}
@@ -216,15 +216,12 @@ def _filter(
     for k in range(count):
         delta_dot, n_dot = (delta[k + 1] - delta[k]) / dt, (n[k + 1] - n[k]) / dt
         for output in range(2):
-            S = project(P, by.C[output], Pc) + by.r[output]
-            innovation = measured[k, output]
-            for i in range(size):
-                innovation -= by.C[output, i] * x[i]
+            innovation, S, verdict = weigh(
+                x, P, by.C[output], by.r[output], measured[k, output], by.gate, output, off, Pc
+            )
             told[k, output], told[k, 2 + output] = innovation, S
-            if not np.isfinite(innovation):
-                continue
-            if not believable(innovation, S, by.gate, output, off):
-                gated[k, output] = True
+            gated[k, output] = verdict == GATED
+            if verdict != BELIEVED:
                 continue
             if by.gain == TICKED:
                 linearise(c, x, delta[k], delta_dot, n[k], J)
