@@ -1,7 +1,7 @@
 """From logs to a ship's coefficients, what they are worth, and what they say of other logs."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,13 +12,18 @@ from shiplog.types import FloatArray, Log
 from shiplog.vessel import Vessel
 
 from .advice import Ties, ties_of, told_by
+from .augmented import augmented
 from .choice import Candidate, compare
+from .courses import Courses
+from .echo import Echo, second_run
 from .output_error import OutputError, output_error, pose
+from .papers_scheme import papers_scheme
 from .problem import residuals
 from .runs import contradictions, run_of, ship_of
 from .trial import Trial
 from .uncertainty import Uncertainty, uncertainty
 from .validation import Validation, validate
+from .windows import windows
 
 AUTO = "auto"
 WRITABLE = ("burylin", "burylin-tied")  # models that a vessel file can hold
@@ -48,6 +53,8 @@ class IdentifiedShip:
     model: Model
     fit: OutputError
     uncertainty: Uncertainty
+    echo: Echo
+    courses: tuple[Courses, ...]  # of other methods, for comparison
     runs: tuple[RunFit, ...]
     validations: tuple[Validation, ...]
     candidates: tuple[Candidate, ...]  # the best first; empty where the model was named
@@ -116,11 +123,15 @@ def identify(
         fit = output_error(trials, considered[0], known=settled, length=length)
     on_step("uncertainty")
     found = uncertainty(fit)
+    on_step("echo")
+    echo = second_run(fit, found)
+    found = replace(found, prior_share=np.fmax(found.prior_share, echo.shares))
+    courses = [method(fit, found) for method in (augmented, windows, papers_scheme)]
     on_step("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
     every = [*runs, *held_out]
     warnings = [w for run in every for w in run.warnings]
-    warnings += [*contradictions(every), *_doubts(fit, found, validations)]
+    warnings += [*contradictions(every), *_doubts(fit, found, echo, validations)]
     warnings += _passed_over(fit.problem.model, candidates)
     if fit.problem.scale.secs != 1.0 and length is None:
         warnings.append(
@@ -129,7 +140,8 @@ def identify(
             "little; state it in a vessel file"
         )
     return IdentifiedShip(
-        fit.problem.model, fit, found, tuple(_run_fits(fit)), tuple(validations),
+        fit.problem.model, fit, found, echo, tuple(each for each in courses if each is not None),
+        tuple(_run_fits(fit)), tuple(validations),
         tuple(candidates), ties_of(fit), ship, length is not None,
         {n: v for n, v in zip(fit.problem.model.names, fit.parameters.tolist(), strict=True)
          if n not in found.names},
@@ -218,11 +230,17 @@ def _rms(off: FloatArray) -> float:
 
 
 def _doubts(
-    fit: OutputError, found: Uncertainty, validations: Sequence[Validation]
+    fit: OutputError, found: Uncertainty, echo: Echo, validations: Sequence[Validation]
 ) -> Iterator[str]:
     """What makes a fit hard to believe."""
     if not fit.minimum.settled:
         yield "the search has not come to an end: the values are where it stopped"
+    if echo.elsewhere:
+        yield (
+            "from another start the search ends elsewhere, where the fit is "
+            f"{'better' if echo.worse_by < 0 else 'worse'}: the logs hardly tell this model; "
+            "give more manoeuvres, or take a simpler one"
+        )
     left = residuals(fit.problem, fit.minimum.unknowns)
     for i, trial in enumerate(fit.problem.trials):
         rate = trial.measured[:, OUTPUTS.index("yaw_rate")]

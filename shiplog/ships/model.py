@@ -72,6 +72,16 @@ def _as_they_are(values: ComplexArray) -> Sequence[complex]:
     return tuple(values)
 
 
+@dataclass(frozen=True, eq=False)
+class Advance:
+    """A run of `count` samples, and how it changes along k directions."""
+
+    outputs: FloatArray  # (count, 4) SI, in the order of OUTPUTS
+    end: FloatArray  # (s,) the state at the last sample, in the units of the equations
+    outputs_by: FloatArray  # (k, count, 4)
+    end_by: FloatArray  # (k, s)
+
+
 @dataclass(frozen=True)
 class Model:
     """A ship's equations, for simulation and for estimation.
@@ -141,19 +151,32 @@ class Model:
         A direction is a row of `directions`: of the parameters, the initial state and the offset
         of the rudder, in this order, (k, p + s + 1). All else as `simulate`.
         """
+        return self.advance(
+            parameters, initial, path, count, directions, offset=offset, scale=scale
+        ).outputs_by
+
+    def advance(
+        self, parameters: FloatArray, initial: FloatArray, path: Path, count: int,
+        directions: FloatArray, *, offset: float = 0.0, scale: Scale = SI,
+    ) -> "Advance":  # fmt: skip
+        """A run, where it ends, and how both change along one or more `directions`.
+
+        All as `sensitivities`.
+        """
         scaled, p = scale.scaled(path), len(parameters)
-        found = np.empty((len(directions), count, len(OUTPUTS)))
-        for row, along in zip(found, directions * (1j * STEP), strict=True):
-            moved = along[:p], along[p:-1], along[-1]
-            out = self._sail(
-                parameters + moved[0], initial + moved[1], offset + moved[2], scaled, count
-            )
-            row[:] = out.imag / STEP * scale.outputs
-        return found
+        outputs_by = np.empty((len(directions), count, len(OUTPUTS)))
+        ends = np.empty((len(directions), len(initial)), np.complex128)
+        out = np.empty((count, len(OUTPUTS)), np.complex128)
+        for i, along in enumerate(directions * (1j * STEP)):
+            ends[i] = initial + along[p:-1]
+            out = self._sail(parameters + along[:p], ends[i], offset + along[-1], scaled, count)
+            outputs_by[i] = out.imag / STEP * scale.outputs
+        return Advance(out.real * scale.outputs, ends[-1].real.copy(), outputs_by, ends.imag / STEP)
 
     def _sail(
         self, parameters: ComplexArray, initial: ComplexArray, offset: complex, path: Path,
         count: int,
     ) -> ComplexArray:  # fmt: skip
+        """The outputs, (count, 4); `initial` is left where the run ends."""
         coefficients = self.kind(*(complex(value) for value in self.expand(parameters)))
         return self.compiled(coefficients, initial, complex(offset), path, count)
