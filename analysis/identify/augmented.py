@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from shiplog.ships.motion import Path
+from shiplog.ships.path import part_of
 from shiplog.types import FloatArray
 
 from .courses import Courses, begins_secs, run_secs, two_priors
@@ -112,9 +113,7 @@ def _strides(trial: Trial, stride: float) -> Iterator[tuple[Path, slice]]:
     edges = [-1, *ends[last].tolist()]
     for before, end in pairwise(edges):
         first = int(path.sample[before]) if before >= 0 else 0
-        piece = Path(*(column[before + 1 : end + 1] for column in path))
-        counted = np.where(piece.sample >= 0, piece.sample - first, -1)
-        yield piece._replace(sample=counted), slice(first, int(path.sample[end]) + 1)
+        yield part_of(path, before + 1, end + 1), slice(first, int(path.sample[end]) + 1)
 
 
 def _taken_in(

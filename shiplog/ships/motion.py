@@ -87,9 +87,9 @@ def root(x: complex) -> complex:
 def sail(c: Any, x: ComplexArray, offset: complex, path: Path, samples: int) -> ComplexArray:  # noqa: ANN401
     """The outputs at so many samples, (samples, 4), of a run that begins in the state `x`.
 
-    `x` is left where the run ends. `offset` is added to the rudder. One Runge-Kutta step of order four for each step of the path;
-    where there are samples between its ends, Hermite's cubic by the rates there. A run that leaves
-    the numbers ends in NaN.
+    `x` is left where the run ends. `offset` is added to the rudder. One Runge-Kutta step of order
+    four for each step of the path; where there are samples between its ends, Hermite's cubic by the
+    rates there. A run that leaves the numbers ends in NaN.
     """
     out = np.full((samples, 4), np.nan + 0j)
     between, after, at_sample = x.copy(), x.copy(), x.copy()
