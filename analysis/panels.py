@@ -115,7 +115,7 @@ def _coefficient(
     if not known.any():
         return None
     size = max(abs(model), float(np.median(np.abs(value[known]))))
-    prefix, scale = _thousands(size)
+    prefix, scale = thousands(size)
     value, spread = value * scale, GUIDE * std * scale
     result, doubt = whole.value * scale, GUIDE * whole.std * scale
     axis = _coefficient_limits(value[known], spread[known], result, doubt, model * scale)
@@ -128,7 +128,7 @@ def _coefficient(
         Series("model", span, (reference,)),
         Series("window", at, banded("window", value, spread, colour)),
     )
-    said = _rounded(result, doubt) if whole.determined else "not determined"
+    said = rounded(result, doubt) if whole.determined else "not determined"
     title = f"{name} {said} [{prefix}{whole.unit}]"
     return Panel(f"coefficient_{name}", title, series, axis)
 
@@ -161,14 +161,14 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _thousands(size: float) -> tuple[str, float]:
+def thousands(size: float) -> tuple[str, float]:
     """A power of a thousand for a unit, in words, and the factor that brings `size` near 1."""
     exponent = 3 * floor(log10(size) / 3) if 0 < size < np.inf else 0
     digits = str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return (f"10{digits} " if exponent else ""), 10.0**-exponent
 
 
-def _rounded(value: float, doubt: float) -> str:
+def rounded(value: float, doubt: float) -> str:
     """A result to two digits of its doubt."""
     if not (np.isfinite(value) and 0 < doubt < np.inf):
         return "not determined"

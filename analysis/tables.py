@@ -44,13 +44,20 @@ def sections(findings: Findings) -> tuple[Section, ...]:
 
 def markdown(findings: Findings) -> str:
     """The summary as a page of text."""
-    blocks = [f"# {findings.name}"]
     log, *found = sections(findings)
-    for section in (*found, log):  # what was found first: a page is read from its top
-        blocks += [f"## {section.title}", _markdown_table(section.columns, section.rows)]
+    # what was found first: a page is read from its top
+    return page(findings.name, (*found, log), findings.warnings)
+
+
+def page(title: str, tables: Iterable[Section], warnings: Iterable[str]) -> str:
+    """Tables, their remarks and warnings in Markdown."""
+    blocks = [f"# {title}"]
+    for section in tables:
+        columns = (column.replace("\n", " ") for column in section.columns)
+        blocks += [f"## {section.title}", _markdown_table(columns, section.rows)]
         blocks += [f"*{remark}*" for remark in section.remarks]
-    if findings.warnings:
-        blocks += ["## Warnings", "\n".join(f"- {warning}" for warning in findings.warnings)]
+    said = "\n".join(f"- {warning}" for warning in warnings)
+    blocks += ["## Warnings", said] if said else []
     return "\n\n".join(blocks) + "\n"
 
 

@@ -4,15 +4,16 @@ Each method goes through the runs from two priors, one to either side of what wa
 it ends apart by as much as it began, it has learnt nothing: it echoes.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shiplog.types import FloatArray
 
 from .trial import Trial
-from .uncertainty import Uncertainty
+from .uncertainty import ECHO, Uncertainty
 
 OFF = 0.3  # of a value: how far to either side of it the priors are
 MOST_OFF = 1.0  # the same where the value is hardly told
@@ -44,14 +45,24 @@ class Courses:
         return np.asarray(apart / np.abs(self.priors[0] - self.priors[1]))
 
     @property
-    def last_echo(self) -> FloatArray:
-        """(p,) of the last value that is told of each; NaN where none is."""
-        return np.array([_last(column) for column in self.echo.T])
+    def echoing(self) -> NDArray[np.bool_]:
+        """(k, p) where a value is more prior than data, or will be so again.
+
+        Two courses that cross have learnt nothing there.
+        """
+        later = np.fmax.accumulate(self.echo[::-1])[::-1]
+        return np.asarray(later > ECHO)
+
+    @property
+    def usual_echo(self) -> FloatArray:
+        """(p,) the median over the latter half; NaN where nothing is told."""
+        half = self.echo[len(self.time_secs) // 2 :]
+        return np.array([_median(column) for column in half.T])
 
 
-def _last(values: FloatArray) -> float:
+def _median(values: FloatArray) -> float:
     known = values[np.isfinite(values)]
-    return float(known[-1]) if len(known) else np.nan
+    return float(np.median(known)) if len(known) else np.nan
 
 
 def two_priors(told: Uncertainty) -> FloatArray:
@@ -64,6 +75,17 @@ def two_priors(told: Uncertainty) -> FloatArray:
     reach = np.where(reach > 0, reach, np.minimum(3 * told.std, 1.0))
     sides = np.where(np.arange(len(size)) % 2, -1.0, 1.0)
     return np.array([told.values + sides * reach, told.values - sides * reach])
+
+
+def with_breaks(parts: Sequence[FloatArray]) -> FloatArray:
+    """Instants or values of several runs, one below the other, and a break between runs.
+
+    An instant that breaks is that before it; a value is NaN.
+    """
+    rows = []
+    for part in parts:
+        rows += [part, part[-1:] if part.ndim == 1 else np.full((1, *part.shape[1:]), np.nan)]
+    return np.concatenate(rows[:-1])
 
 
 def run_secs(trials: tuple[Trial, ...]) -> float:

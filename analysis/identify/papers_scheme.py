@@ -16,7 +16,7 @@ from shiplog.settings import FilterSettings
 from shiplog.ship import Coefficients, rudder_effects
 from shiplog.types import FloatArray, Signals
 
-from .courses import Courses, begins_secs, two_priors
+from .courses import Courses, begins_secs, two_priors, with_breaks
 from .output_error import OutputError
 from .trial import Trial
 from .uncertainty import Uncertainty
@@ -39,8 +39,8 @@ def papers_scheme(fit: OutputError, told: Uncertainty) -> Courses | None:
     parts = [list(_courses(problem.trials, _coefficients(fit, prior))) for prior in priors]
     wanted = [NINE.index(name) for name in told.names if name in NINE]
     columns = [i for i, name in enumerate(told.names) if name in NINE]
-    times = np.concatenate([time for time, _ in parts[0]])
-    values = np.array([np.concatenate([found for _, found in part]) for part in parts])
+    times = with_breaks([time for time, _ in parts[0]])
+    values = np.array([with_breaks([found for _, found in part]) for part in parts])
     values = values[:, :, wanted]
     values[values == 0] = np.nan  # of a column of zeros: the pseudo-inverse's 0 is nobody's
     names = tuple(told.names[i] for i in columns)

@@ -127,8 +127,8 @@ def _echoes(found: IdentifiedShip) -> Section:
     remark = (
         "How much of a value is what was believed before, by a second run from other beliefs: the "
         "fit from priors a standard deviation off and a start elsewhere, the other methods from "
-        f"priors to either side, {100 * OFF:.0f} % off or more. 100 % is a copy of the prior; "
-        "beyond it errors grow."
+        f"priors to either side, {100 * OFF:.0f} % off or more, over the latter half of the runs. "
+        "100 % is a copy of the prior; beyond it errors grow."
     )
     return Section("Echo of what was believed before", ("coefficient", *by_method), rows, (remark,))
 
@@ -137,7 +137,7 @@ def _echoes_by_method(found: IdentifiedShip) -> dict[str, dict[str, float]]:
     told = {FITTED: dict(zip(found.uncertainty.names, found.uncertainty.prior_share, strict=True))}
     for courses in found.courses:
         if len(courses.priors) > 1:
-            told[courses.method] = dict(zip(courses.names, courses.last_echo, strict=True))
+            told[courses.method] = dict(zip(courses.names, courses.usual_echo, strict=True))
     return told
 
 

@@ -9,7 +9,7 @@ from shiplog.ship import Coefficients
 from shiplog.ships.motion import OUTPUTS
 from shiplog.types import FloatArray
 
-from .courses import Courses, begins_secs
+from .courses import Courses, begins_secs, with_breaks
 from .output_error import OutputError
 from .trial import Trial
 from .uncertainty import Uncertainty
@@ -31,7 +31,7 @@ def windows(fit: OutputError, told: Uncertainty) -> Courses | None:
     model = Coefficients(*(complex(value).real for value in values))
     begins = dict(zip(map(id, problem.trials), begins_secs(problem.trials), strict=True))
     parts = [_history(trial, model, begins[id(trial)], names) for trial in usable]
-    times, found, stds = (np.concatenate(each) for each in zip(*parts, strict=True))
+    times, found, stds = (with_breaks(each) for each in zip(*parts, strict=True))
     return Courses(METHOD, names, times, found[None], stds[None], np.full((1, len(names)), np.nan))
 
 
