@@ -213,16 +213,15 @@ def _coefficient(found: IdentifiedShip, i: int, end: float) -> Panel:
     courses = [each for each in found.courses if name in each.names]
     priors = [each.priors[:, each.names.index(name)] for each in courses if len(each.priors) > 1]
     reach = max([float(np.ptp(each)) / 2 for each in priors], default=abs(value) / 3)
-    prefix, scale = thousands(abs(value))
+    unit = found.model.parameter(name).unit
+    prefix, scale = ("", 1.0) if unit == "1" else thousands(abs(value))
     series = [_final(value * scale, half * scale, end, vague=name in told.vague)]
     for each in courses:
         series += _course(each, name, scale, limit=(value, 3 * reach))
-    unit = found.model.parameter(name).unit
     said = "not identifiable" if name in told.vague else rounded(value * scale, half * scale)
     axis = np.array([value - 1.4 * reach, value + 1.4 * reach]) * scale
-    return Panel(
-        f"coefficient_{name}", f"{name} {said} [{prefix}{unit}]", tuple(series), limits(axis)
-    )
+    title = f"{name} {said}" + ("" if unit == "1" else f" [{prefix}{unit}]")
+    return Panel(f"coefficient_{name}", title, tuple(series), limits(axis))
 
 
 def _final(value: float, half: float, end: float, *, vague: bool) -> Series:

@@ -26,6 +26,7 @@ from .identified import IdentifiedShip
 from .panels import RunSheet, coefficient_panels, run_sheets
 from .report import sections
 
+MOST_LARGE = 12  # coefficients; more are drawn smaller
 KEY = """\
 *Runs: grey measured, coloured simulated. Residuals over what is usual, with ±2σ. Coefficients, \
 over the runs put end to end: grey the value by output error with its 95 % interval; blue the \
@@ -85,8 +86,9 @@ def _blueprint(
     found: IdentifiedShip, sheets: list[RunSheet], coefficients: list[Panel]
 ) -> rrb.Blueprint:
     axis = until(run_secs(found.fit.problem.trials))
+    columns = 3 if len(coefficients) <= MOST_LARGE else 4
     overview = rrb.Horizontal(
-        rrb.Grid(*(plot(panel, axis) for panel in coefficients), grid_columns=3),
+        rrb.Grid(*(plot(panel, axis) for panel in coefficients), grid_columns=columns),
         rrb.TextDocumentView(origin="summary", name="summary"),
         column_shares=[3, 2],
         name="coefficients",
