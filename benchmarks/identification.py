@@ -24,6 +24,7 @@ from shiplog import TrialLog, load_vessel, resample
 from shiplog.ships import Model, ship_model
 from shiplog.types import FloatArray
 
+from .identification_methods import methods
 from .identification_speed import speed
 from .tanker import KVLCC2, tanker
 
@@ -192,6 +193,7 @@ def main() -> None:
     arguments = parser.parse_args()
     print(INTRODUCTION)
     known_ship(arguments.seeds)
+    methods(known_trial, load_vessel("table1")[0].coefficients)
     if KVLCC2.is_dir():
         tanker(arguments.figures)
     speed(lambda seconds, noise: known_trial(MANOEUVRES[0], FIRST_SEED, seconds, noise))

@@ -9,6 +9,7 @@ from conftest import as_log
 from scipy.optimize import least_squares
 
 from analysis.identify.augmented import _begun, _Belief, _calm, _strides, _taken_in, augmented
+from analysis.identify.courses import two_priors
 from analysis.identify.output_error import OutputError, output_error
 from analysis.identify.problem import Nuisance
 from analysis.identify.trial import Trial, trials_of
@@ -84,7 +85,7 @@ def test_strides_put_together_are_the_whole_run() -> None:
 @pytest.mark.parametrize("runs", [1, 2])
 def test_from_priors_a_third_off_it_ends_where_output_error_is(runs: int) -> None:
     fit, told = fitted(runs=runs)
-    found = augmented(fit, told)
+    found = augmented(fit, two_priors(told))
     for values, stds in zip(found.values, found.stds, strict=True):
         np.testing.assert_array_less(np.abs(values[-1] - told.values), 1.0 * told.std)
         np.testing.assert_allclose(stds[-1], told.bound, rtol=0.25)
@@ -93,7 +94,8 @@ def test_from_priors_a_third_off_it_ends_where_output_error_is(runs: int) -> Non
 
 
 def test_it_begins_at_its_priors() -> None:
-    found = augmented(*fitted())
+    fit, told = fitted()
+    found = augmented(fit, two_priors(told))
     np.testing.assert_array_equal(found.values[:, 0], found.priors)
     np.testing.assert_allclose(found.echo[0], 1.0)
 
@@ -107,7 +109,7 @@ def test_what_was_never_told_stays_what_it_was() -> None:
             type(s)(s.effective[:90], s.usual[:90]) for s in fit.spreads
         ),
     )  # fmt: skip
-    found = augmented(short, told)
+    found = augmented(short, two_priors(told))
     assert found.echo[-1, told.names.index("e")] > 0.99
     assert found.echoing[:, told.names.index("b1")].all()
 
@@ -115,7 +117,7 @@ def test_what_was_never_told_stays_what_it_was() -> None:
 def test_nothing_but_states_and_parameters_will_do() -> None:
     fit = output_error([a_trial()], ship_model("burylin"), nuisance=Nuisance.none())
     told = uncertainty(fit)
-    found = augmented(fit, told)
+    found = augmented(fit, two_priors(told))
     d = told.names.index("d")
     np.testing.assert_allclose(found.values[:, -1, d], TRUE["d"], rtol=0.005)
 

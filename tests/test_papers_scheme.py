@@ -5,6 +5,7 @@ import pytest
 from test_augmented import TRUE, a_trial, fitted
 
 from analysis.identification import identify
+from analysis.identify.courses import two_priors
 from analysis.identify.papers_scheme import (
     NINE,
     papers_scheme,
@@ -47,7 +48,8 @@ def test_with_the_truth_for_a_prior_it_finds_the_truth_whatever_it_is_worth() ->
 
 
 def test_from_two_priors_it_comes_apart_where_the_fit_does_not() -> None:
-    found = papers_scheme(*fitted())
+    fit, told = fitted()
+    found = papers_scheme(fit, two_priors(told))
     assert found is not None
     echo = dict(zip(found.names, found.usual_echo, strict=True))
     assert echo["d"] > 0.5
@@ -57,8 +59,8 @@ def test_from_two_priors_it_comes_apart_where_the_fit_does_not() -> None:
 
 def test_it_knows_the_papers_model_alone() -> None:
     fit, told = fitted("norrbin")
-    assert papers_scheme(fit, told) is None
-    assert windows(fit, told) is None
+    assert papers_scheme(fit, two_priors(told)) is None
+    assert windows(fit) is None
 
 
 def test_a_filter_that_ran_away_leaves_no_number() -> None:
@@ -67,8 +69,8 @@ def test_a_filter_that_ran_away_leaves_no_number() -> None:
 
 @pytest.mark.parametrize("model", ["burylin", "burylin-tied"])
 def test_windows_in_weak_form_are_the_replays(model: str) -> None:
-    fit, told = fitted(model, runs=2)
-    found = windows(fit, told)
+    fit, _ = fitted(model, runs=2)
+    found = windows(fit)
     assert found is not None
     yaw = identify(weak_form(a_trial().signals, PRIOR)[0])[1]
     first = len(yaw.time_secs)

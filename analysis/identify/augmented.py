@@ -19,12 +19,11 @@ from shiplog.ships.motion import Path
 from shiplog.ships.path import part_of
 from shiplog.types import FloatArray
 
-from .courses import Courses, begins_secs, run_secs, two_priors
+from .courses import Courses, begins_secs, run_secs
 from .least_squares import weighed
 from .output_error import OutputError
 from .problem import Problem, residuals
 from .trial import Trial
-from .uncertainty import Uncertainty
 
 METHOD = "extended Kalman filter"
 STRIDE_SECS, MOST_STRIDES = 2.0, 1000  # a ship's fastest motion takes several; of long runs more
@@ -41,14 +40,13 @@ class _Belief:
     covariance: FloatArray
 
 
-def augmented(fit: OutputError, told: Uncertainty) -> Courses:
-    """The courses of a fit's parameters by the extended Kalman filter, from two priors."""
-    priors = two_priors(told)
+def augmented(fit: OutputError, priors: FloatArray) -> Courses:
+    """The courses of a fit's parameters by the extended Kalman filter, from two priors, (2, p)."""
     reach = np.abs(priors[0] - priors[1]) / 2
     parts = [list(_course(fit, prior, reach)) for prior in priors]
     times = np.array([time for time, _, _ in parts[0]])
     values, stds = (np.array([[row[i] for row in part] for part in parts]) for i in (1, 2))
-    return Courses(METHOD, told.names, times, values, stds, priors)
+    return Courses(METHOD, fit.problem.free_names, times, values, stds, priors)
 
 
 def _course(

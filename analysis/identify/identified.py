@@ -14,7 +14,7 @@ from shiplog.vessel import Vessel
 from .advice import Ties, ties_of, told_by
 from .augmented import augmented
 from .choice import Candidate, compare
-from .courses import Courses
+from .courses import Courses, two_priors
 from .echo import Echo, second_run
 from .output_error import OutputError, output_error, pose
 from .papers_scheme import papers_scheme
@@ -126,7 +126,8 @@ def identify(
     on_step("echo")
     echo = second_run(fit, found)
     found = replace(found, prior_share=np.fmax(found.prior_share, echo.shares))
-    courses = [method(fit, found) for method in (augmented, windows, papers_scheme)]
+    priors = two_priors(found)
+    courses = augmented(fit, priors), windows(fit), papers_scheme(fit, priors)
     on_step("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
     every = [*runs, *held_out]

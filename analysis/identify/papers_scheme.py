@@ -16,10 +16,9 @@ from shiplog.settings import FilterSettings
 from shiplog.ship import Coefficients, rudder_effects
 from shiplog.types import FloatArray, Signals
 
-from .courses import Courses, begins_secs, two_priors, with_breaks
+from .courses import Courses, begins_secs, with_breaks
 from .output_error import OutputError
 from .trial import Trial
-from .uncertainty import Uncertainty
 
 METHOD = "the paper's scheme"
 Q, R = 0.01, 400.0  # of its filter
@@ -27,23 +26,22 @@ WINDOW_SECS, STRIDE_SECS = 200.0, 2.0
 NINE = Coefficients._fields[:9]  # what it identifies; the alphas are known
 
 
-def papers_scheme(fit: OutputError, told: Uncertainty) -> Courses | None:
-    """Its courses of the coefficients of the paper's model, from two priors; else None.
+def papers_scheme(fit: OutputError, priors: FloatArray) -> Courses | None:
+    """Its courses of the coefficients of the paper's model, from two priors, (2, p); else None.
 
     There are none where a model in the filter runs away, and none of T3: e stands for it.
     """
     problem = fit.problem
     if problem.model.kind is not Coefficients:
         return None
-    priors = two_priors(told)
     parts = [list(_courses(problem.trials, _coefficients(fit, prior))) for prior in priors]
-    wanted = [NINE.index(name) for name in told.names if name in NINE]
-    columns = [i for i, name in enumerate(told.names) if name in NINE]
+    wanted = [NINE.index(name) for name in problem.free_names if name in NINE]
+    columns = [i for i, name in enumerate(problem.free_names) if name in NINE]
     times = with_breaks([time for time, _ in parts[0]])
     values = np.array([with_breaks([found for _, found in part]) for part in parts])
     values = values[:, :, wanted]
     values[values == 0] = np.nan  # of a column of zeros: the pseudo-inverse's 0 is nobody's
-    names = tuple(told.names[i] for i in columns)
+    names = tuple(problem.free_names[i] for i in columns)
     return Courses(METHOD, names, times, values, np.full(values.shape, np.nan), priors[:, columns])
 
 

@@ -12,18 +12,17 @@ from shiplog.types import FloatArray
 from .courses import Courses, begins_secs, with_breaks
 from .output_error import OutputError
 from .trial import Trial
-from .uncertainty import Uncertainty
 
 METHOD = "windows in weak form"
 
 
-def windows(fit: OutputError, told: Uncertainty) -> Courses | None:
+def windows(fit: OutputError) -> Courses | None:
     """The window by window histories of the paper's coefficients; else None.
 
     What a window cannot tell is NaN.
     """
     problem = fit.problem
-    names = tuple(name for name in told.names if name in Coefficients._fields)
+    names = tuple(name for name in problem.free_names if name in Coefficients._fields)
     usable = [t for t in problem.trials if all(t.has(c) for c in CHANNELS if c in OUTPUTS)]
     if problem.model.kind is not Coefficients or not usable:
         return None
