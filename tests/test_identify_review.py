@@ -78,7 +78,8 @@ def test_residuals_are_measured_less_simulated_over_what_is_usual() -> None:
     drawn = sheet.residuals[0].series[0].lines[0].values
     fit = ship().fit
     left = residuals(fit.problem, fit.minimum.unknowns)[0][:, 0]
-    _, usual = fit.noises[0].spread(fit.problem.predicted(fit.minimum.unknowns, 0)[:, 0])
+    predicted = fit.problem.predicted(fit.minimum.unknowns, 0)[:, 0]
+    _, usual = fit.noises[0].spread(predicted, 0.1)
     np.testing.assert_allclose(drawn, (left / usual)[np.isfinite(left)], rtol=1e-9)
     assert 0.9 < np.std(drawn) < 1.1
 

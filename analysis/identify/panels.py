@@ -131,7 +131,7 @@ def _normalised(
     """Measured less simulated over what the fit leaves of it as a rule, (n,)."""
     column = OUTPUTS.index(name)
     noise = found.fit.noises[found.fit.problem.outputs.index(name)]
-    _, usual = noise.spread(simulated[:, column])
+    _, usual = noise.spread(simulated[:, column], trial.dt_secs)
     return np.asarray((trial.measured[:, column] - simulated[:, column]) / usual)
 
 

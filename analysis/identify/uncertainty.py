@@ -130,12 +130,12 @@ def _sandwich(fit: OutputError, inverse: FloatArray) -> FloatArray:
     """White's covariance, neighbouring scores summed over windows as Newey and West have it."""
     problem, z = fit.problem, fit.minimum.unknowns
     middle, left = np.diag(problem.prior[1]), residuals(problem, z)
-    longest = max(noise.slow_count for noise in fit.noises)
+    longest = max(noise.slow_secs for noise in fit.noises)
     for i, spread in enumerate(fit.spreads):
         off, weight = weighed(left[i], spread)
         scores = np.einsum("ncq,nc->nq", fit.minimum.jacobians[i], weight * off)
-        least = LEAST_WINDOW_SECS / problem.trials[i].dt_secs
-        window = int(min(max(longest, least, 1), len(scores) / 2))
+        together = max(longest, LEAST_WINDOW_SECS) / problem.trials[i].dt_secs
+        window = int(min(max(together, 1), len(scores) / 2))
         sums = np.cumsum(scores, axis=0)
         ends = np.vstack((sums, np.tile(sums[-1], (window, 1))))
         starts = np.vstack((np.zeros((window, sums.shape[1])), sums))
