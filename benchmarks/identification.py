@@ -9,13 +9,14 @@ finite differences. What is printed is the page; --figures names another folder 
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
 
 import numpy as np
 
-from analysis.identify.output_error import output_error
+from analysis.identify.least_squares import Spread, eliminated, information
+from analysis.identify.output_error import LEAST_STD, output_error, pose
 from analysis.identify.trial import Trial, trials_of
 from analysis.identify.uncertainty import uncertainty
 from recorders.sensors import suite
@@ -33,6 +34,8 @@ CHANNELS = ("yaw_rate", "speed", "rudder", "rpm")
 SECONDS, SEEDS, FIRST_SEED = 500.0, 50, 1000
 OFF = 0.5  # of the truth: where the searches begin that begin somewhere
 TOLD = 0.2  # of the truth: a bound below it counts
+WAVE = 0.1  # rad/s, of the paper's noise, as are the standard deviations
+RATE_SHARE, SPEED_STD = 0.02 / 3**0.5, 0.2 / 3**0.5
 FIGURES = Path(__file__).resolve().parents[1] / "docs" / "images" / "accuracy"
 INTRODUCTION = """\
 # How far identification can be believed
@@ -109,6 +112,30 @@ def one(
     exact = np.array([true[name] for name in found.names])
     rows = (found.values - exact, found.bound, 1.96 * found.std)
     return np.vstack((np.array(rows) / np.abs(exact), np.full(len(exact), spent)))
+
+
+def true_bound(manoeuvre: str, model: Model, known: Mapping[str, float]) -> FloatArray:
+    """Cramér and Rao's bound, (p,) stds, of the true coefficients under the noise as it is.
+
+    Unknown are, as to the identifier, the ship's first state, the rudder's zero, the gyro's bias
+    and the wave, with the identifier's priors; the noise of each sample is known, and Gaussian.
+    """
+    clean, true = known_trial(manoeuvre, FIRST_SEED, noise="none"), truth()
+    posed = pose([clean], model, known=known)
+    values = np.array([true[name] for name in model.names])
+    problem = replace(posed, values=values, waves=((WAVE,),))
+    rate = clean.measured[:, 0]
+    stds = np.column_stack(
+        (
+            np.maximum(RATE_SHARE * np.abs(rate), LEAST_STD["yaw_rate"]),
+            np.full(len(rate), SPEED_STD),
+        )
+    )
+    z, left = problem.start(), [np.zeros_like(stds)]
+    told = information(problem, left, [Spread(stds, stds)], [problem.jacobian(z, 0)], power=0)
+    precision = eliminated(told + np.diag(problem.prior[1]), len(problem.free))
+    scale = np.sqrt(np.diag(precision))
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(precision / np.outer(scale, scale)))) / scale)
 
 
 def sought(model: Model, known: Mapping[str, float]) -> tuple[str, ...]:

@@ -32,7 +32,8 @@ def sailed(
 
 
 def a_trial(*args: object, **settings: object) -> Trial:
-    return trials_of(sailed(*args, **settings), "trial.mcap")[0]  # type: ignore[arg-type]
+    name = f"{args}{settings}.mcap"  # pieces of one name are pieces of one run
+    return trials_of(sailed(*args, **settings), name)[0]  # type: ignore[arg-type]
 
 
 def errors(fit: OutputError) -> dict[str, float]:

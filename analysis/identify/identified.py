@@ -19,7 +19,7 @@ from .echo import Echo, second_run
 from .output_error import OutputError, output_error, pose
 from .papers_scheme import papers_scheme
 from .problem import residuals
-from .runs import contradictions, run_of, ship_of
+from .runs import contradictions, distinct_runs, ship_of
 from .trial import Trial
 from .uncertainty import Uncertainty, uncertainty
 from .validation import Validation, validate
@@ -109,7 +109,7 @@ def identify(
     considered = [ship_model(name) for name in (LADDER if model == AUTO else (model,))]
     _require_known(considered, stated)
     on_step("read")
-    runs, held_out = [run_of(log) for log in logs], [run_of(log) for log in validation_logs]
+    runs, held_out = distinct_runs(logs, validation_logs)
     ship = ship_of([*runs, *held_out], vessel)
     trials = [trial for run in runs for trial in run.trials]
     length = ship.length if ship else None
@@ -153,8 +153,15 @@ def identify(
 
 def _require_known(models: Sequence[Model], known: Mapping[str, float]) -> None:
     for name, value in known.items():
-        if not any(name in model.names for model in models):
+        having = [model for model in models if name in model.names]
+        if not having:
             models[0].parameter(name)
+        units = {model.parameter(name).unit for model in having}
+        if len(units) > 1:
+            raise UsageError(
+                f"--known {name} is in {' or '.join(sorted(units))}, as the model has it; "
+                "name the model with --model"
+            )
         if not np.isfinite(value):
             raise UsageError(f"--known {name} must be a finite number, got {value}")
 
@@ -225,6 +232,25 @@ def _run_fits(fit: OutputError) -> Iterator[RunFit]:
         )  # fmt: skip
 
 
+def _unexplained(fit: OutputError) -> Iterator[str]:
+    """The runs of which the fit leaves much, white noise aside."""
+    problem = fit.problem
+    for trial, left, spread in zip(
+        problem.trials, residuals(problem, fit.minimum.unknowns), fit.spreads, strict=True
+    ):
+        for c, output in enumerate(problem.outputs):
+            measured = trial.measured[:, OUTPUTS.index(output)]
+            white = max(float(np.mean(spread.usual[:, c] ** 2)) - fit.noises[c].slow ** 2, 0.0)
+            stays = np.sqrt(max(_rms(left[:, c]) ** 2 - white, 0.0))
+            size = float(np.nanstd(measured)) if np.isfinite(measured).any() else 0.0
+            if stays > UNEXPLAINED * size and stays**2 > white:
+                yield (
+                    f"{trial.name}: the fit leaves {100 * stays / size:.0f} % of the "
+                    f"{output.replace('_', ' ')} unexplained: "
+                    "a contrary rudder, wrong units, another ship, or a model that is not hers"
+                )
+
+
 def _rms(off: FloatArray) -> float:
     known = off[np.isfinite(off)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
@@ -242,22 +268,14 @@ def _doubts(
             f"{'better' if echo.worse_by < 0 else 'worse'}: the logs hardly tell this model; "
             "give more manoeuvres, or take a simpler one"
         )
-    left = residuals(fit.problem, fit.minimum.unknowns)
-    for i, trial in enumerate(fit.problem.trials):
-        rate = trial.measured[:, OUTPUTS.index("yaw_rate")]
-        share = _rms(left[i][:, fit.problem.outputs.index("yaw_rate")]) / float(np.nanstd(rate))
-        if share > UNEXPLAINED:
-            yield (
-                f"{trial.name}: the fit leaves {100 * share:.0f} % of the yaw rate unexplained: "
-                "a contrary rudder, wrong units, another ship, or a model that is not hers"
-            )
-    told = np.isfinite(found.between_runs) & (found.coloured > 0)
-    apart = float(np.median(found.between_runs[told] / found.coloured[told])) if told.any() else 1.0
-    if max(found.enlarged, apart) > CONTRADICTING:
+    yield from _unexplained(fit)
+    apart = found.agreement.enlarged
+    if apart > CONTRADICTING:
+        odd = f", {found.agreement.odd} the others" if found.agreement.odd else ""
         yield (
-            f"the logs contradict each other, {max(found.enlarged, apart):.0f} times what their "
-            "noise explains: another ship, loading or depth, or a model that is not hers; "
-            "the intervals allow for it"
+            f"the logs contradict each other{odd}, {apart:.0f} times what their noise explains: "
+            "another ship, loading or depth, or a model that is not hers; the intervals allow for "
+            "it"
         )
     if set(found.vague) == set(found.names):
         yield "nothing is identifiable from these logs: no value of the model is to be believed"

@@ -7,7 +7,8 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
-LEAST_SHARE = 0.05  # of the usual noise: no sample is believed to have less
+LEAST_SHARE = 0.02  # of the usual noise: no sample is believed to have less
+FINEST_SHARE = 0.005  # the same when all that stays off was found
 SURE = 4.0  # standard errors: a smaller autocovariance is none
 LAGS = 5  # of which it is taken
 
@@ -53,16 +54,18 @@ def interval_secs(values: FloatArray, dt: float) -> float:
     return float(np.median(steps)) * dt if len(steps) else dt
 
 
-def noise_of(every: Sequence[Left], *, proportional: bool, least: float) -> Noise:
+def noise_of(
+    every: Sequence[Left], *, proportional: bool, least: float, share: float = LEAST_SHARE
+) -> Noise:
     """The noise of one output, of what is left of it in each trial.
 
     What changes from sample to sample is white; what stays is slow. `least` is a std below which
-    no instrument is believed.
+    no instrument is believed, nor is any sample to have less than a `share` of the usual.
     """
     white, relative = _white(every, proportional=proportional)
     levels = np.concatenate([left.level for left in every])
     usual = float(np.sqrt(np.mean(white**2 + (relative * levels) ** 2))) if len(levels) else 0.0
-    white = max(white, LEAST_SHARE * usual, least)
+    white = max(white, share * usual, least)
     stds = [np.sqrt(white**2 + (relative * left.level) ** 2) for left in every]
     slow, secs = _slow(every, stds)
     return Noise(white, relative, slow, secs)

@@ -13,10 +13,11 @@ import numpy as np
 from analysis.weak_form import LEAST_RUDDER
 from shiplog.errors import LogError, UsageError
 from shiplog.ships import Model
+from shiplog.ships.motion import OUTPUTS
 from shiplog.types import FloatArray
 
 from .least_squares import Minimum, Spread, minimise
-from .noise import Left, Noise, interval_secs, noise_of
+from .noise import FINEST_SHARE, LEAST_SHARE, Left, Noise, interval_secs, noise_of
 from .problem import Nuisance, Problem, residuals
 from .start import starts
 from .trial import Trial, usual
@@ -83,12 +84,15 @@ def pose(
     if not trials:
         raise UsageError("no trial to identify from; give at least one log")
     _require_steering(trials)
+    _require_turning(trials)
     values = model.starts()
     for name, value in {**(start or {}), **(known or {})}.items():
         values[model.names.index(model.parameter(name).name)] = value
     sought = {model.parameter(name).name for name in free}
     sought |= {p.name for p in model.parameters if not p.known}
     sought -= set(known or {})
+    if not sought:
+        raise UsageError(f"every parameter of {model.name} is known, and nothing is left to seek")
     speed, rpm = usual(trials, "speed"), usual(trials, "rpm")
     _require_way(trials, speed, rpm)
     scale = model.scale(length or USUAL_LENGTH, speed, rpm)
@@ -107,6 +111,18 @@ def _require_steering(trials: Sequence[Trial]) -> None:
         raise LogError(
             f"the rudder moves by {np.degrees(moved):.1f}° in all, and from that nothing can be "
             f"identified; give a log of a zig-zag or of a turning circle: {names}"
+        )
+
+
+def _require_turning(trials: Sequence[Trial]) -> None:
+    column = OUTPUTS.index("yaw_rate")
+    if not any(
+        trial.has("yaw_rate") and np.nanstd(trial.measured[:, column]) > 0 for trial in trials
+    ):
+        names = ", ".join(trial.name for trial in trials)
+        raise LogError(
+            f"the yaw rate never changes, and from that nothing can be identified; is the gyro "
+            f"stuck? {names}"
         )
 
 
@@ -135,24 +151,35 @@ def fit(problem: Problem, *, start: FloatArray | None = None, waves: bool = True
             f"{', '.join(dict.fromkeys(t.name for t in problem.trials))}"
         )
     calm = settled(problem, minimum)
-    return _with_waves(calm) if waves else calm
+    return _refined(_with_waves(calm) if waves else calm)
 
 
-def settled(problem: Problem, minimum: Minimum) -> OutputError:
+def settled(problem: Problem, minimum: Minimum, share: float = LEAST_SHARE) -> OutputError:
     """The fit and its noise, found in turn from a first fit.
 
     Noise is found from what a fit leaves, and tells the next fit what to leave: where runs
     contradict each other an output could so be given up to please another. There it ends before.
     """
-    noises, spreads = noise_left(problem, minimum.unknowns)
+    noises, spreads = noise_left(problem, minimum.unknowns, share)
     off = _rms_left(problem, minimum)
     for _ in range(ROUNDS):
         after = minimise(problem, minimum.unknowns, spreads, minimum.jacobians)
         if (_rms_left(problem, after) > GIVEN_UP * off).any():
             break
         minimum = after
-        noises, spreads = noise_left(problem, minimum.unknowns)
+        noises, spreads = noise_left(problem, minimum.unknowns, share)
     return OutputError(problem, minimum, tuple(noises), tuple(spreads))
+
+
+def _refined(found: OutputError) -> OutputError:
+    """The fit with the quietest samples believed as far as they are quiet.
+
+    An instrument whose noise is in proportion says most when it says least; but where something
+    stays off, it is no noise of the instrument's.
+    """
+    fine = settled(found.problem, found.minimum, FINEST_SHARE)
+    stays = any(new.slow > old.slow for new, old in zip(fine.noises, found.noises, strict=True))
+    return found if stays else fine
 
 
 def _rms_left(problem: Problem, minimum: Minimum) -> FloatArray:
@@ -200,15 +227,17 @@ def first_spreads(problem: Problem) -> list[Spread]:
     ]
 
 
-def noise_left(problem: Problem, z: FloatArray) -> tuple[list[Noise], list[Spread]]:
-    """The noise of each output, and the spread of each trial's residuals."""
+def noise_left(
+    problem: Problem, z: FloatArray, share: float = LEAST_SHARE
+) -> tuple[list[Noise], list[Spread]]:
+    """The noise of each output, and the spread of each trial's residuals; `share` as `noise_of`."""
     trials = range(len(problem.trials))
     levels = [problem.predicted(z, i) for i in trials]
     off = [problem.measured(i) - levels[i] for i in trials]
     noises = [
         noise_of(
             [Left.of(off[i][:, c], levels[i][:, c], problem.trials[i].dt_secs) for i in trials],
-            proportional=output != "heading", least=LEAST_STD[output],
+            proportional=output != "heading", least=LEAST_STD[output], share=share,
         )
         for c, output in enumerate(problem.outputs)
     ]  # fmt: skip

@@ -12,7 +12,6 @@ from shiplog.types import FloatArray, Signals
 
 from .least_squares import minimise
 from .output_error import OutputError, first_spreads
-from .problem import Problem
 from .trial import Trial
 
 JUDGED = ("yaw_rate", "speed", "heading")  # every model predicts them
@@ -165,13 +164,3 @@ def _overshoots(heading: FloatArray, executes: Sequence[int], switch: float) -> 
             for start, end in zip(executes, ends, strict=False)
         ]
     )
-
-
-def problem_without(fit: OutputError, left_out: int) -> tuple[Problem, FloatArray]:
-    """A fit's problem without one of its runs, and where its search begins: where the fit is."""
-    problem, z = fit.problem, fit.minimum.unknowns
-    kept = [i for i in range(len(problem.trials)) if i != left_out]
-    waves = tuple(problem.waves[i] for i in kept) if problem.waves else ()
-    rest = replace(problem, trials=tuple(problem.trials[i] for i in kept), waves=waves)
-    own = [z[problem.own_slice(i)] for i in kept]
-    return rest, np.concatenate([z[: len(problem.free)], *own])

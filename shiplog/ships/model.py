@@ -28,6 +28,12 @@ class Parameter:
     highest: float = inf
     prior_std: float = inf  # how far from `start` it is believed to be, before any data
     known: bool = False  # kept at `start` unless it is asked for
+    usual: float = 0.0  # its size of ships in general, where `start` is none
+
+    @property
+    def size(self) -> float:
+        """What its size is of ships in general."""
+        return self.usual or abs(self.start) or self.prior_std
 
 
 @dataclass(frozen=True)
