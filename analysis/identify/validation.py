@@ -26,6 +26,8 @@ REVERSED = 0.5  # of the greatest rudder, passed on either side: a zig-zag,
 HELD = 0.9  # in which so much of it is the rudder ordered
 SWITCH = radians(1.0)  # a zig-zag's heading is a whole number of these
 MOST_OVERSHOOTS = 4
+FIXES_SECS = 5.0, 60.0  # of fixes before the rudder moves, at least and at most, tell a course
+ASTRAY = 0.03  # of their length, off the way sailed: more is no course
 FIGURES = {
     "advance": ("advance", "m"),
     "transfer": ("transfer", "m"),
@@ -78,34 +80,61 @@ def validate(fit: OutputError, run: Run) -> list[Validation]:
 
 
 def _validation(fit: OutputError, trial: Trial, fixes: FloatArray | None) -> Validation:
-    measured = known_throughout(trial)
+    course = 0.0 if fixes is None or trial.has("heading") else first_course(trial, fixes)
+    if course is None:  # the fixes are north and east of a ship that headed nobody knows where
+        course, fixes = 0.0, None
+    measured = known_throughout(trial, course)
     simulated = predict(fit, _headed(trial, measured))
-    track = made_good(simulated, trial.dt_secs)
-    sailed = made_good(measured, trial.dt_secs) if fixes is None else _from_start(fixes)
+    track, sailed = made_good(simulated, trial.dt_secs), made_good(measured, trial.dt_secs)
+    if fixes is not None:
+        sailed = _from_first_fix(fixes, sailed if np.isnan(track).any() else track)
     off = simulated - trial.measured
     predicted = (*fit.problem.model.outputs, "heading")
     rms = {
-        name: _rms(off[:, i])
+        name: rms_of(off[:, i])
         for i, name in enumerate(OUTPUTS)
         if trial.has(name) and name in predicted
     }
-    rms["track"] = _rms(np.hypot(*(track - sailed).T))
+    rms["track"] = rms_of(np.hypot(*(track - sailed).T))
     figures = tuple(_figures(trial, measured, sailed, simulated, track))
     return Validation(trial, simulated, track, sailed, rms, figures)
 
 
-def known_throughout(trial: Trial) -> FloatArray:
-    """What was measured, its holes bridged; a heading nobody measured is the turning summed up."""
-    columns = [_bridged(column) for column in trial.measured.T]
+def known_throughout(trial: Trial, course: float = 0.0) -> FloatArray:
+    """What was measured, its holes filled in.
+
+    A heading nobody measured is the turning summed up, from the `course` she began on.
+    """
+    columns = [_filled_in(column) for column in trial.measured.T]
     if not trial.has("heading"):
         rate = columns[0]
-        columns[3] = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2)) * trial.dt_secs
+        turned = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2)) * trial.dt_secs
+        columns[3] = course + turned
     return np.column_stack(columns)
 
 
-def _bridged(values: FloatArray) -> FloatArray:
+def _filled_in(values: FloatArray) -> FloatArray:
     at = np.flatnonzero(np.isfinite(values))
     return np.interp(np.arange(len(values)), at, values[at]) if len(at) > 1 else 0.0 * values
+
+
+def first_course(trial: Trial, fixes: FloatArray) -> float | None:
+    """The course a ship without heading began on, in rad: that which lays her way on the fixes.
+
+    Only those before the rudder moves are looked at, for in a turn she drifts. None where they are
+    too few, or where no course lays one on the other.
+    """
+    order = first_order(trial.signals["rudder"], trial.dt_secs)
+    least, most = (round(secs / trial.dt_secs) for secs in FIXES_SECS)
+    before = len(trial) if order is None else order + 1
+    known = np.flatnonzero(np.isfinite(fixes[:before]).all(axis=1))[:most]
+    if len(known) <= least:
+        return None
+    sailed = made_good(known_throughout(trial), trial.dt_secs)[known]
+    way, seen = ((each - each.mean(axis=0)) @ [1, 1j] for each in (sailed, fixes[known]))
+    course = float(np.angle(np.vdot(way, seen)))
+    off = rms_of(np.abs(way * np.exp(1j * course) - seen))
+    return course if off < ASTRAY * abs(way[-1] - way[0]) else None
 
 
 def _headed(trial: Trial, measured: FloatArray) -> Trial:
@@ -117,12 +146,14 @@ def _headed(trial: Trial, measured: FloatArray) -> Trial:
     return Trial(trial.name, trial.signals, trial.path, given)
 
 
-def _from_start(fixes: FloatArray) -> FloatArray:
-    known = fixes[np.isfinite(fixes).all(axis=1)]
-    return fixes - known[0] if len(known) else fixes
+def _from_first_fix(fixes: FloatArray, track: FloatArray) -> FloatArray:
+    """The fixes laid on a track at the first of them, which need not be where the run begins."""
+    known = np.flatnonzero(np.isfinite(fixes).all(axis=1))
+    return fixes - fixes[known[0]] + track[known[0]] if len(known) else fixes
 
 
-def _rms(off: FloatArray) -> float:
+def rms_of(off: FloatArray) -> float:
+    """The root of the mean square of what is known; NaN where nothing is."""
     known = off[np.isfinite(off)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
@@ -162,9 +193,12 @@ def first_order(rudder: FloatArray, dt: float) -> int | None:
 
 
 def _circle(measured: Turn, simulated: Turn) -> Iterator[Figure]:
+    """The figures that were measured: none of a track that is not known where the turn began."""
     for each in fields(Turn):
         name, unit = FIGURES[each.name]
-        yield Figure(name, unit, getattr(measured, each.name), getattr(simulated, each.name))
+        figure = Figure(name, unit, getattr(measured, each.name), getattr(simulated, each.name))
+        if np.isfinite(figure.measured):
+            yield figure
 
 
 def _reverses(rudder: FloatArray) -> list[int]:
