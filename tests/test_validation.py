@@ -277,6 +277,8 @@ def test_a_zigzag_goes_from_one_angle_to_the_same_on_the_other_side() -> None:
     rudder = log["rudder"]
     time = (rudder.measured_ns - rudder.measured_ns[0]) * 1e-9
     values = np.degrees(rudder.values)
+    shifted = figures(steered(log, time.tolist(), (values + 1.2).tolist()))
+    assert list(shifted) == list(figures(log))
     uneven = np.where(values < 0, 0.6 * values, values)
     assert figures(steered(log, time.tolist(), uneven.tolist())) == {}
     halting = np.where((time > 50) & (time < 60), 0.0, values)

@@ -294,7 +294,7 @@ def _is_zigzag(rudder: FloatArray, order: int, holds: list[tuple[int, int]], dt:
     if len(parts) < 3:
         return False
     levels = np.array([np.median(part) for part in parts])
-    angle = float(np.median(levels[:-1]))
+    angle = float(np.max(levels[:-1]) + np.min(levels[:-1])) / 2  # a rudder's zero may be off
     held = all(
         np.mean(_near(part, level)) > HELD for part, level in zip(parts, levels, strict=True)
     )
