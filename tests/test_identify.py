@@ -14,7 +14,6 @@ from analysis.identify.identified import IdentifiedShip, _best, _passed_over, id
 from analysis.identify.prediction import predict
 from analysis.identify.report import as_json, sections
 from analysis.identify.runs import run_of
-from analysis.identify.validation import Validation, first_order, validate
 from analysis.identify.written import require_writable, vessel_toml
 from recorders.sensors import suite
 from recorders.simulate import simulate
@@ -89,21 +88,6 @@ def test_held_out_logs_are_predicted_in_the_units_of_a_trial() -> None:
     assert degrees(figures["overshoot 2"].measured) == pytest.approx(8.093, abs=0.15)
     assert abs(degrees(figures["overshoot 1"].error)) < 1
     assert figures["period"].measured == pytest.approx(2 * (406.2 - 275.8), abs=10)
-
-
-def test_figures_count_from_where_the_rudder_leaves_its_rest() -> None:
-    rudder = np.radians(np.interp(np.arange(100.0), [0, 40, 54, 99], [0.1, 0.1, 35, 35]))
-    assert first_order(rudder, 1.0) == 40
-    assert first_order(np.zeros(100), 1.0) is None
-
-
-def test_a_run_without_heading_and_position_is_validated_all_the_same() -> None:
-    bare = without(a_log("turning-circle-35", 7, seconds=500.0), "heading", "position")
-    (found,) = validate(known_ship().fit, run_of(bare))
-    assert {"heading"} & set(found.rms) == set()
-    figures = {f.name: f for f in found.figures}
-    assert figures["advance"].measured == pytest.approx(1149, rel=0.02)
-    assert abs(figures["tactical diameter"].error) < 0.02 * figures["tactical diameter"].measured
 
 
 @cache
@@ -255,15 +239,6 @@ def test_a_contrary_rudder_is_said() -> None:
     turned = replace(rudder, values=-rudder.values)
     contrary = replace(log, channels=tuple(turned if c is rudder else c for c in log.channels))
     assert any("rudder" in w and "port" in w for w in identify([contrary]).warnings)
-
-
-def test_a_ship_that_runs_away_on_a_held_out_log_is_said() -> None:
-    fit = known_ship().fit
-    wild = replace(fit, minimum=replace(fit.minimum, unknowns=fit.minimum.unknowns * -40.0))
-    (found,) = validate(wild, run_of(a_log()))
-    assert isinstance(found, Validation)
-    assert found.ran_away
-    assert found.figures == ()
 
 
 def test_a_length_nobody_gave_is_said_and_one_given_is_taken() -> None:
