@@ -213,9 +213,9 @@ def test_no_logs_no_models_and_no_numbers_are_refused() -> None:
 def test_logs_that_carry_different_ships_are_refused() -> None:
     other = TOML.replace("T1 = 150.0", "T1 = 90.0").replace("Table 1", "Table 2")
     with pytest.raises(LogError, match=r"different ships.*Table 1.*Table 2"):
-        identify([a_log(), a_log(toml=other)])
+        identify([a_log(), a_log(seed=1, toml=other)])
     with pytest.raises(LogError, match="different ships"):
-        identify([a_log()], validation_logs=[a_log(toml=LONG)])
+        identify([a_log()], validation_logs=[a_log(seed=1, toml=LONG)])
     # how a log is filtered is no matter of the ship
     filtered = TOML.replace("process_ratio = 2.5e-5", "process_ratio = 1e-4")
     assert identify([a_log(), a_log(seed=1, toml=filtered)]).vessel == VESSEL

@@ -17,7 +17,8 @@ from shiplog.ships import Model
 from shiplog.ships.motion import OUTPUTS
 from shiplog.types import FloatArray
 
-from .output_error import OutputError, fit, output_error
+from .least_squares import minimise
+from .output_error import OutputError, first_spreads, output_error, settled
 from .prediction import JUDGED, misfit
 from .trial import Trial
 
@@ -68,15 +69,15 @@ def _candidate(trials: Sequence[Trial], model: Model, settings: Mapping[str, Any
 def _left_out(whole: OutputError, run: Sequence[int]) -> list[FloatArray]:
     """How far off the trials of a run is a fit to the others, which knows nothing of it.
 
-    Its search begins where the whole fit is, its noise and its waves are its own.
+    Its search begins where the whole fit is; its noise is its own, a swell counts as noise.
     """
     kept = [i for i in range(len(whole.problem.trials)) if i not in run]
     calm = replace(whole.problem, waves=())
     rest, _ = calm.of_trials(kept, calm.start())
     start = rest.start()
     start[: len(rest.free)] = whole.minimum.unknowns[: len(rest.free)]
-    try:
-        others = fit(rest, start=start)
-    except LogError:
+    minimum = minimise(rest, start, first_spreads(rest))
+    if not np.isfinite(minimum.cost):
         return [np.full(len(OUTPUTS), np.inf)] * len(run)
+    others = settled(rest, minimum)
     return [misfit(others, whole.problem.trials[i]) for i in run]

@@ -269,7 +269,7 @@ def _doubts(
             "give more manoeuvres, or take a simpler one"
         )
     yield from _unexplained(fit)
-    apart = found.agreement.enlarged
+    apart = found.agreement.contradiction
     if apart > CONTRADICTING:
         odd = f", {found.agreement.odd} the others" if found.agreement.odd else ""
         yield (

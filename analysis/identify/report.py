@@ -47,8 +47,9 @@ def _comparison(found: IdentifiedShip) -> Section:
         )
     columns = ("model", "sought", "score [%]", *(f"{OUTPUTS[i]} [%]" for i in JUDGED_COLUMNS))
     remark = (
-        "Each run in turn is predicted by a fit to the others: the rms of what is off over the "
-        "standard deviation of what was measured. The least is taken."
+        "Each run in turn is predicted by a fit to the others, which know nothing of it but where "
+        "it began, its rudder's zero and its gyro's bias: the rms of what is off over the standard "
+        "deviation of what was measured. The least is taken."
     )
     title = f"Models by cross-validation: {found.model.name}"
     return Section(title, columns, tuple(rows), (remark,))
@@ -235,6 +236,13 @@ def as_json(found: IdentifiedShip) -> dict[str, Any]:
         "correlation": told.correlation.tolist(),
         "condition": told.condition,
         "enlarged": told.enlarged,
+        "agreement": {
+            "logs": list(told.agreement.names),
+            "by_own_noise": list(told.agreement.by_own_noise),
+            "by_noise_of_all": list(told.agreement.by_noise_of_all),
+            "contradiction": told.agreement.contradiction,
+            "odd": told.agreement.odd,
+        },
         "ties": None if found.ties is None else {
             "sum_over_d": found.ties.sum_over_d,
             "std": found.ties.std,

@@ -84,7 +84,7 @@ def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
     bound = _stds(_inverse(problem, _white_information(fit, left)))[:p]
     covariance = _sandwich(fit, left, inverse)[:p, :p]
     coloured = _stds(covariance)
-    jackknife, agreement = np.full(p, np.nan), Agreement((), ())
+    jackknife, agreement = np.full(p, np.nan), Agreement((), (), ())
     if between_runs:
         agreement = agreement_of(fit)
         if len(problem.runs) >= LEAST_RUNS:
