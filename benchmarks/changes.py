@@ -67,7 +67,8 @@ intervals hold the truth. *Others*: changes told that were none.
 
 Table 1 in radians turns so slowly that its f tells nothing and its b2 little: the noise is larger
 than what they do. Under the paper's noise, which holds a slow wave, f is found in a zig-zag, but
-seldom among the revolutions of a pseudo-random run.
+seldom among the revolutions of a pseudo-random run. There the intervals of a d whose model was
+guessed are too short, for what the race does is only nearly allowed for.
 """
 
 
