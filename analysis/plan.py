@@ -15,7 +15,7 @@ from shiplog.clock import Clock, on_clock, set_clock
 from shiplog.gyro_bias import GyroWatch
 from shiplog.quality import faults
 from shiplog.rudder_sign import RudderWatch
-from shiplog.settings import DisturbanceSettings, FilterSettings
+from shiplog.settings import SHORTEST_WINDOW_SECS, DisturbanceSettings, FilterSettings
 from shiplog.ship import INPUTS, OUTPUTS, Coefficients
 from shiplog.survey import Survey, survey_log
 from shiplog.types import FloatArray, Log
@@ -29,10 +29,12 @@ from .first_model import BARE, fit_first_model
 from .gauge import Gauge, Gauger
 from .identification import Identifier
 from .inputs import InputHold
+from .sliding import least_window_secs
 from .weak_form import WeakForm
 
 FITTED = "a first model, fitted to this log"
 FEWEST = 4  # samples of an output: their third difference shows its noise
+OF_WINDOWS = ("yaw", "surge")
 NEEDED = (*OUTPUTS, *INPUTS)
 USUAL_SEA = 0.6  # rad/s, where no wave shows
 
@@ -68,7 +70,8 @@ class Planner:
         self._warnings: list[str] = []
         stated = _stated_model(log, vessel, settings)
         survey, clock = self._surveyed()
-        usual, self.yaw, self.surge = self._gauged(survey, clock, stated[0] if stated else None)
+        given = stated[0] if stated else with_settings(Vessel("", BARE), settings)
+        usual, self.yaw, self.surge = self._gauged(survey, clock, given)
         tell("model", 0.0)
         vessel, origin = stated or (with_settings(self._first_model(usual), settings), FITTED)
         self._warnings += idle(vessel)
@@ -94,31 +97,33 @@ class Planner:
         return found, set_clock(self._log, found, channels=NEEDED, optional=("heading",))
 
     def _gauged(
-        self, found: Survey, clock: Clock, vessel: Vessel | None
+        self, found: Survey, clock: Clock, vessel: Vessel
     ) -> tuple[Gauge, Identifier, Identifier]:
         """The second time: what is usual, and the whole trial's yaw and surge equations.
 
         For these one must know how far apart samples stand on the clock, which is only told by
         then. It is nearly always what the survey lets expect; where not, they are made once more.
         """
-        alphas = vessel.coefficients if vessel else BARE
+        alphas, window_secs = vessel.coefficients, vessel.identifier.window_secs
         doubts = RudderWatch(found), GyroWatch(found)
         holding, gauger = InputHold(clock), Gauger(alphas)
         expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in OUTPUTS]
-        equations = _Equations(alphas, clock, np.maximum(np.round(expected), 1.0))
+        intervals = np.maximum(np.round(expected), 1.0)
+        equations = _Equations(alphas, clock, intervals, window_secs)
         watches = holding.add_raw, *(doubt.add for doubt in doubts)
         for signals in signals_of(self._log, clock, self._tell, "one clock", *watches):
             gauger.add(holding.step(signals))
             equations.add(signals, gauger.fastest)
         usual = gauger.result()
         if not np.array_equal(usual.intervals, equations.intervals):
-            equations = _Equations(alphas, clock, usual.intervals)
+            equations = _Equations(alphas, clock, usual.intervals, window_secs)
             for signals in signals_of(self._log, clock, self._tell, "one clock"):
                 equations.add(signals, usual.fastest)
         _require_outputs(self._log, usual)
         self._warnings += doubtful(found, NEEDED)
         self._warnings += [said for doubt in doubts if (said := doubt.result())]
         self._warnings += [*silent_ends(found, clock, NEEDED), *holding.said()]
+        self._warnings += equations.said()
         return usual, equations.yaw, equations.surge
 
     def _first_model(self, usual: Gauge) -> Vessel:
@@ -188,18 +193,37 @@ def signals_of(
 class _Equations:
     """The whole trial's equations of yaw and surge, from signals in slabs."""
 
-    def __init__(self, alphas: Coefficients, clock: Clock, intervals: FloatArray) -> None:
-        self.intervals = intervals
+    def __init__(
+        self, alphas: Coefficients, clock: Clock, intervals: FloatArray, window_secs: float
+    ) -> None:
+        self.intervals, self._window_secs = intervals, window_secs
+        self._log_secs = clock.count * clock.dt_secs
         self._weak_form = weak_form_of(alphas, clock, intervals)
         count = self._weak_form.row_count
-        self.yaw = Identifier(self._weak_form.yaw, count, constant=True)
-        self.surge = Identifier(self._weak_form.surge, count)
+        self.yaw = Identifier(self._weak_form.yaw, count, constant=True, window_secs=window_secs)
+        self.surge = Identifier(self._weak_form.surge, count, window_secs=window_secs)
 
     def add(self, signals: Signals, fastest: float) -> None:
         """Take the next signals; `fastest` is the greatest speed so far, m/s."""
         yaw_rows, surge_rows = self._weak_form.step(signals, fastest)
         self.yaw.add(yaw_rows)
         self.surge.add(surge_rows)
+
+    def said(self) -> list[str]:
+        """What is to be said of the windows, in words."""
+        window = f"identifier.window_secs = {self._window_secs:g}"
+        least = {name: least_window_secs(getattr(self._weak_form, name)) for name in OF_WINDOWS}
+        if self._window_secs > self._log_secs:
+            said = f"{window} is longer than the log ({self._log_secs:.0f} s): the whole of it is "
+            room = self._log_secs > max(*least.values(), SHORTEST_WINDOW_SECS)
+            shorter = "ask for shorter windows, or " if room else ""
+            return [said + f"the one window; {shorter}give a longer log"]
+        blind = [name for name, secs in least.items() if self._window_secs <= secs]
+        if not blind:
+            return []
+        needed = max(least[name] for name in blind)
+        said = f"{window} is too short to tell so many coefficients of {' and '.join(blind)}: its "
+        return [said + f"windows are blank; ask for more than {needed:.0f} s"]
 
 
 def weak_form_of(model: Coefficients, clock: Clock, intervals: FloatArray) -> WeakForm:

@@ -30,7 +30,8 @@ ROWS = [1.3, 0.9, 1.0, 0.9]  # heights: outputs, inputs, disturbances, residuals
 KEY = """\
 *Grey: measured, or in the model. Blue, orange: estimated, of yaw and of surge, ±2σ. \
 Green: inputs. Red: disturbance; between the grey lines it may be sensor noise. Cyan: waves. \
-Coefficients: in the title over the whole trial, ±2σ; as a line at the end of each window. \
+Coefficients: in the title over the whole trial, ±2σ; as a line at the end of each window; red, \
+if one changed, before and after. \
 A gap: not measured, or a window that cannot tell.*
 
 """

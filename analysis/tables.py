@@ -9,6 +9,7 @@ import numpy as np
 from shiplog.units import CATALOGUE, factor
 
 from .disturbance import DISTURBANCE_UNITS
+from .drawing import GUIDE
 from .pipeline import Findings
 from .plan import FITTED
 from .residuals import OutputResiduals
@@ -39,6 +40,7 @@ def sections(findings: Findings) -> tuple[Section, ...]:
         _filter_section(findings),
         _disturbance_section(findings),
         _coefficient_section(findings),
+        *_change_sections(findings),
     )
 
 
@@ -188,3 +190,33 @@ def _coefficient_section(findings: Findings) -> Section:
         )
     columns = ("coefficient", "from this log", "std", "unit", "in the model")
     return Section("Coefficients", columns, tuple(rows), tuple(remarks))
+
+
+def _change_sections(findings: Findings) -> tuple[Section, ...]:
+    """What changed within the trial; nothing where nothing did."""
+    rows = [
+        (
+            f"{change.name} [{change.unit}]",
+            f"{change.at_secs:.0f} s",
+            f"{change.before:.3g} ± {GUIDE * change.before_std:.2g}",
+            f"{change.after:.3g} ± {GUIDE * change.after_std:.2g}",
+            change.by.removeprefix("by ").replace(" %", "", 1) if isfinite(change.share) else "",
+        )
+        for change in findings.changes
+    ]
+    if not rows:
+        return ()
+    remark = (
+        "A coefficient that differs before and after says that the ship did, her loading, the "
+        "depth or the weather, or that the model does not hold for both; over the whole trial it "
+        "is a mixture. Each by itself, ±2σ; the difference with its 95 % interval."
+    )
+    remarks = [remark]
+    remarks += [
+        f"At {change.at_secs:.0f} s {' or '.join(change.instead)} may have changed in place of "
+        f"{change.name}: the log cannot tell which."
+        for change in findings.changes
+        if change.instead
+    ]
+    columns = ("coefficient", "at", "before", "after", "difference")
+    return (Section("Changes within the trial", columns, tuple(rows), tuple(remarks)),)

@@ -133,8 +133,9 @@ def _add_replay(verbs: Any) -> None:  # noqa: ANN401
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="any setting of the vessel file's [filter] and [disturbance], such as filter.gate=4 "
-        "or filter.process_ratio=auto, which leaves it to the log",
+        help="any setting of the vessel file's [filter], [disturbance] and [identifier], such as "
+        "filter.gate=4, identifier.window_secs=300 or filter.process_ratio=auto, which leaves it "
+        "to the log",
     )
     replay.add_argument(
         "-o", "--output", metavar="FILE", help="the review (default: LOG's name with .rrd, here)"
