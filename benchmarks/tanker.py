@@ -50,8 +50,8 @@ where the rudder leaves its rest by 0.5°. What misses its goal is set bold."""
 CAUTION = """
 **These figures are not wholly blind.** The model with three degrees of freedom got its flow
 straightening at the rudder, its drift's drag and its thrust that grows as she slows while its
-errors on this very circle were in sight. Its parameters and the choice among the models come from the
-zig-zags alone. A second attempt was blind: some forty variants (other inflow and stall of the
+errors on this very circle were in sight. Its parameters and the choice among the models come from
+the zig-zags alone. A second attempt was blind: some forty variants (other inflow and stall of the
 rudder, wake lost in drift, thrust and race tied by momentum, the screw's asymmetry, uneven
 cross-flow, wider and narrower priors) were judged by how zig-zags predict harder ones, by somebody
 who had neither the circle nor its figures. Only narrower priors of the surge were worth keeping,
