@@ -188,7 +188,9 @@ def _add_identify(verbs: Any) -> None:  # noqa: ANN401
         metavar="FILE",
         help="an .rrd for Rerun: measured against simulated, residuals, how coefficients settled",
     )
-    identify.add_argument("--view", action="store_true", help="open the review in Rerun's viewer")
+    identify.add_argument(
+        "--view", action="store_true", help="open the review, else identified.rrd, in Rerun"
+    )
     identify.add_argument("--json", metavar="FILE", help="the result as JSON, - for stdout")
     identify.set_defaults(verb="identify")
 

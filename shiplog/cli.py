@@ -179,9 +179,10 @@ def _run_identify(arguments: argparse.Namespace) -> int:
         for paths in (arguments.log, arguments.validate)
     )
     require_distinct(fitted, held_out)
-    outputs = [arguments.output, arguments.json, arguments.review]
+    review = arguments.review or ("identified.rrd" if arguments.view else None)
+    outputs = [arguments.output, arguments.json, review]
     _require_distinct(outputs, [*fitted, *held_out, arguments.vessel])
-    _require_suffix(".rrd", arguments.review)
+    _require_suffix(".rrd", review)
     if arguments.output:
         _require_suffix(".toml", arguments.output)
         require_writable(arguments.model)
@@ -205,14 +206,14 @@ def _run_identify(arguments: argparse.Namespace) -> int:
             part.write_text(text, encoding="utf-8")
     if arguments.json:
         _write_json(as_json(found), arguments.json)
-    if arguments.review:
+    if review:
         from analysis.identify.review import write_review
 
-        write_review(found, arguments.review)
+        write_review(found, review)
     _print_tables(sections(found), to_stderr=arguments.json == "-")
     _warn(found.warnings)
-    if arguments.review:
-        _show_review(arguments.review, view=arguments.view)
+    if review:
+        _show_review(review, view=arguments.view)
     if arguments.output:
         vague = ", ".join(found.uncertainty.vague)
         said = (
