@@ -9,17 +9,10 @@ import numpy as np
 import pytest
 from conftest import as_log
 
+from analysis.identify.figures import Figure, _switch, first_order
 from analysis.identify.output_error import OutputError, output_error
 from analysis.identify.runs import run_of
-from analysis.identify.validation import (
-    Figure,
-    Validation,
-    _switch,
-    first_course,
-    first_order,
-    rms_of,
-    validate,
-)
+from analysis.identify.validation import Validation, first_course, rms_of, validate
 from recorders.sensors import suite
 from recorders.simulate import simulate
 from shiplog import TrialLog, load_vessel

@@ -22,7 +22,7 @@ from .problem import residuals
 from .runs import contradictions, distinct_runs, ship_of
 from .trial import Trial
 from .uncertainty import Uncertainty, uncertainty
-from .validation import Validation, validate
+from .validation import Validation, rms_of, validate
 from .windows import windows
 
 AUTO = "auto"
@@ -224,7 +224,7 @@ def _run_fits(fit: OutputError) -> Iterator[RunFit]:
         omegas = own[waves :: 1 + 2 * len(problem.outputs)]
         yield RunFit(
             trial.name, (len(trial) - 1) * trial.dt_secs,
-            {output: _rms(left[i][:, c]) for c, output in enumerate(problem.outputs)},
+            {output: rms_of(left[i][:, c]) for c, output in enumerate(problem.outputs)},
             float(own[at]) if has_offset else 0.0,
             {problem.outputs[c]: float(own[biases + k])
              for k, (c, _) in enumerate(problem.biases)},
@@ -241,7 +241,7 @@ def _unexplained(fit: OutputError) -> Iterator[str]:
         for c, output in enumerate(problem.outputs):
             measured = trial.measured[:, OUTPUTS.index(output)]
             white = max(float(np.mean(spread.usual[:, c] ** 2)) - fit.noises[c].slow ** 2, 0.0)
-            stays = np.sqrt(max(_rms(left[:, c]) ** 2 - white, 0.0))
+            stays = np.sqrt(max(rms_of(left[:, c]) ** 2 - white, 0.0))
             size = float(np.nanstd(measured)) if np.isfinite(measured).any() else 0.0
             if stays > UNEXPLAINED * size and stays**2 > white:
                 yield (
@@ -249,11 +249,6 @@ def _unexplained(fit: OutputError) -> Iterator[str]:
                     f"{output.replace('_', ' ')} unexplained: "
                     "a contrary rudder, wrong units, another ship, or a model that is not hers"
                 )
-
-
-def _rms(off: FloatArray) -> float:
-    known = off[np.isfinite(off)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
 def _doubts(

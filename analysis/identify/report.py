@@ -13,8 +13,9 @@ from shiplog.units import CATALOGUE, factor
 
 from .choice import JUDGED_COLUMNS, Candidate
 from .courses import OFF
+from .figures import Figure
 from .identified import IdentifiedShip
-from .validation import Figure, Validation
+from .validation import Validation
 
 FITTED = "output error"
 PEOPLES = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}
