@@ -152,6 +152,11 @@ def identify(
 
 
 def _require_known(models: Sequence[Model], known: Mapping[str, float]) -> None:
+    for model in models:
+        if all(parameter.known or parameter.name in known for parameter in model.parameters):
+            raise UsageError(
+                f"every parameter of {model.name} is known, and nothing is left to seek"
+            )
     for name, value in known.items():
         having = [model for model in models if name in model.names]
         if not having:

@@ -91,8 +91,6 @@ def pose(
     sought = {model.parameter(name).name for name in free}
     sought |= {p.name for p in model.parameters if not p.known}
     sought -= set(known or {})
-    if not sought:
-        raise UsageError(f"every parameter of {model.name} is known, and nothing is left to seek")
     speed, rpm = usual(trials, "speed"), usual(trials, "rpm")
     _require_way(trials, speed, rpm)
     scale = model.scale(length or USUAL_LENGTH, speed, rpm)
