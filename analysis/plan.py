@@ -70,7 +70,9 @@ class Planner:
         survey, clock = self._surveyed()
         usual, self.yaw, self.surge = self._gauged(survey, clock, stated[0] if stated else None)
         tell("model", 0.0)
-        vessel, origin = stated or (with_settings(self._first_model(usual), settings), FITTED)
+        vessel, origin = stated or (with_settings(Vessel("", None), settings), FITTED)
+        if vessel.coefficients is None:
+            vessel, origin = self._with_first_model(vessel, usual), FITTED
         self._warnings += idle(vessel)
         noise = self._noise(vessel, survey, clock, usual)
         observed = self._observed(vessel, usual, noise)
@@ -101,7 +103,7 @@ class Planner:
         For these one must know how far apart samples stand on the clock, which is only told by
         then. It is nearly always what the survey lets expect; where not, they are made once more.
         """
-        alphas = vessel.coefficients if vessel else BARE
+        alphas = (vessel.coefficients if vessel else None) or BARE
         doubts = RudderWatch(found), GyroWatch(found)
         holding, gauger = InputHold(clock), Gauger(alphas)
         expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in OUTPUTS]
@@ -121,18 +123,25 @@ class Planner:
         self._warnings += [*silent_ends(found, clock, NEEDED), *holding.said()]
         return usual, equations.yaw, equations.surge
 
-    def _first_model(self, usual: Gauge) -> Vessel:
+    def _with_first_model(self, known: Vessel, usual: Gauge) -> Vessel:
+        """What is known of a ship, with a model fitted to this log."""
         vessel = fit_first_model(self.yaw, self.surge, usual, self._log.name)
-        model = vessel.coefficients
+        model = vessel.paper
+        if known.model is not None:
+            self._warnings.append(
+                f"the vessel file has {known.model.name} alone, and filters are built on the "
+                "paper's model: a first one is fitted to this log"
+            )
+            vessel = replace(known, coefficients=model)
         if not (model.a < 0 and model.g <= 0 and model.h >= 0):
             self._warnings.append(
                 "the model fitted to this log is no ship's: too little moves in it to tell"
             )
-        return vessel
+        return replace(vessel, filter=known.filter, disturbance=known.disturbance)
 
     def _noise(self, vessel: Vessel, found: Survey, clock: Clock, usual: Gauge) -> Noise:
         settings = _averaged(vessel.filter, found, clock.dt_secs)
-        noise = noise_of(usual, vessel.coefficients, settings)
+        noise = noise_of(usual, vessel.paper, settings)
         if settings.wave and noise.wave is None:
             self._warnings.append(
                 "no wave stands out of the yaw rate's residual: none is told from the ship's "
@@ -152,7 +161,7 @@ class Planner:
             return wanted
         frequency = wanted.wave_frequency or vessel.filter.wave_frequency
         if frequency is None:
-            wave = noise.wave or wave_in(usual, vessel.coefficients, noise, vessel.filter)
+            wave = noise.wave or wave_in(usual, vessel.paper, noise, vessel.filter)
             frequency = wave.frequency if wave is not None and wave.stands_out else None
         if frequency is None:
             frequency = USUAL_SEA
@@ -216,7 +225,7 @@ def _stated_model(
     if log.vessel_toml is not None:
         carried = parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}")
         return with_settings(carried, settings), "carried by the log"
-    with_settings(Vessel("", BARE), settings)  # what is wrong with them is said before any work
+    with_settings(Vessel("", None), settings)  # what is wrong with them is said before any work
     return None
 
 

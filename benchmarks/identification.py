@@ -81,7 +81,7 @@ class Study:
 
 def truth() -> dict[str, float]:
     """The coefficients of the paper's ship, and T3 = e / d."""
-    c = load_vessel("table1")[0].coefficients
+    c = load_vessel("table1")[0].paper
     return {**c._asdict(), "T3": c.e / c.d}
 
 
