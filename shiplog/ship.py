@@ -1,7 +1,9 @@
-"""The ship's equations of motion, shared by simulation and estimation.
+"""The paper's equations of motion, which filters and observers are built on.
 
-The model is Burylin's, "Continuous identification of a nonlinear vessel movement model with an
-estimator", eqs (1)-(4): a second-order nonlinear Nomoto model of yaw, coupled with surge.
+`shiplog.ships.burylin` has them beside other models, for simulation and for identification; they
+give the same to the last bit. The model is Burylin's, "Continuous identification of a nonlinear
+vessel movement model with an estimator", eqs (1)-(4): a second-order nonlinear Nomoto model of yaw,
+coupled with surge.
 
     w'' = a w' + b1 w + b2 w|w| + b3 w^3 + ks (d delta + e delta')
     v'  = f w^2 + g v^2 + h n

@@ -3,6 +3,7 @@
 from math import radians
 
 import pytest
+from conftest import PROJECT
 from ladder import LENGTH, RPM, SHIPS, SPEED, toml_of
 
 from shiplog import VesselError, load_vessel
@@ -106,3 +107,10 @@ def test_a_model_that_is_no_section_is_not_asked_for_its_name() -> None:
     assert fault_of("model = 3\n") == (
         "one fault in the vessel file: [model] must be a section: ship.toml"
     )
+
+
+def test_the_example_of_the_documentation_is_one() -> None:
+    text = (PROJECT / "docs" / "vessel.md").read_text(encoding="utf-8")
+    _, papers, own = (block.partition("```\n")[0] for block in text.split("```toml\n"))
+    assert parse_vessel(own, "docs").model is not None
+    assert parse_vessel(papers.replace("as_printed = false", ""), "docs").length == 200.0
