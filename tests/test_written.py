@@ -118,6 +118,17 @@ def test_a_papers_model_whose_rudder_acts_to_the_other_side_is_left_out() -> Non
     assert parse_vessel(vessel_toml(turned), "v.toml").coefficients is None
 
 
+@pytest.mark.parametrize("name", SHIPS)
+def test_every_ships_log_is_replayed_by_the_file_that_was_written(name: str) -> None:
+    log = replace(logs_of(name)[0], vessel_toml=found_of(name)[1])
+    replayed = analyse(log)
+    assert replayed.vessel.model is not None
+    yaw, speed = (replayed.signals[n] for n in ("yaw_rate", "speed"))
+    for measured, estimated in ((yaw, 0), (speed, 3)):
+        off = measured - replayed.estimates.states[:, estimated]
+        assert np.nanstd(off[len(off) // 4 :]) < 0.1 * np.nanstd(measured)
+
+
 def with_rudder_turned(log: TrialLog) -> TrialLog:
     rudder = log["rudder"]
     turned = replace(rudder, values=-rudder.values)

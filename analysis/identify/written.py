@@ -65,10 +65,11 @@ def _untold(model: Model, found: Uncertainty) -> Iterator[str]:
 
 
 def _beside(found: IdentifiedShip) -> tuple[OutputError, Uncertainty] | None:
-    """The paper's model fitted to the same logs; None where they do not tell it.
+    """The paper's model fitted to the same logs; None where it runs away or is no ship's.
 
-    Its second order has nothing to hold on to in a ship of the first: a pole that the rudder never
-    shows may then lie anywhere, and a rudder that acts to the other side with it.
+    It is not hers, so that no value of it need be told: it is as near as filters come. But its
+    second order has nothing to hold on to in a ship of the first: a pole that the rudder never
+    shows may lie anywhere, and a rudder that acts to the contrary side with it.
     """
     trials = found.fit.problem.trials
     fits = [c.fit for c in found.candidates if c.model.name == "burylin" and c.fit is not None]
@@ -82,7 +83,7 @@ def _beside(found: IdentifiedShip) -> tuple[OutputError, Uncertainty] | None:
         return None
     told, c = uncertainty(fit), _coefficients(fit)
     works = rudder_effect(c, usual(trials, "speed"), usual(trials, "rpm")) * c.d > 0 > c.a
-    return (fit, told) if works and not any(_untold(fit.problem.model, told)) else None
+    return (fit, told) if works else None
 
 
 def _head(found: IdentifiedShip) -> Iterator[str]:
