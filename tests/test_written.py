@@ -219,7 +219,14 @@ def test_numbers_that_nobody_knows_are_not_written() -> None:
     found, _ = found_of("nomoto")
     told = found.uncertainty
     for part, names in (("yaw", ("a", "k")), ("surge", ("f", "g", "h"))):
-        std = np.where(np.isin(told.names, names), 100.0, told.std)
-        vague = replace(found, uncertainty=replace(told, std=std))
+        std = np.where(np.isin(told.names, names), 100.0, told.coloured)
+        vague = replace(found, uncertainty=replace(told, std=std, coloured=std))
         with pytest.raises(LogError, match=f"nothing of the {part} is identifiable"):
             vessel_toml(vague)
+
+
+def test_a_model_that_is_not_the_ship_is_written_with_a_caution() -> None:
+    found, _ = found_of("nomoto")
+    wide = replace(found.uncertainty, std=np.full(len(found.uncertainty.names), 100.0))
+    text = vessel_toml(replace(found, uncertainty=wide))
+    assert f"k = {found.coefficients['k']!r}  # NOT IDENTIFIABLE from these logs" in text

@@ -5,7 +5,9 @@ and observers are built on: where another was identified, that one is fitted bes
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from math import degrees, isfinite
+from math import degrees
+
+import numpy as np
 
 from shiplog.errors import LogError
 from shiplog.model_section import PAPERS
@@ -16,7 +18,7 @@ from shiplog.vessel import Vessel
 from .identified import ALPHAS, IdentifiedShip, Tell
 from .output_error import USUAL_LENGTH, OutputError, output_error
 from .trial import usual
-from .uncertainty import ECHO, Uncertainty, uncertainty
+from .uncertainty import ECHO, VAGUE, Uncertainty, uncertainty
 
 SECTIONS = {"yaw": YAW_COEFFICIENTS, "surge": ("f", "g", "h")}
 SURGE = ("f", "f1", "f2", "g", "h", "p", "xvr", "x4", "xd")  # of any model; the others turn her
@@ -56,11 +58,15 @@ def _text(lines: Iterable[str]) -> str:
 
 
 def _untold(model: Model, found: Uncertainty) -> Iterator[str]:
-    """Whether nothing is known of her yaw, of her surge."""
+    """Whether nothing is known of her yaw, of her surge.
+
+    By the noise alone: a model that is not the ship has wider intervals, and may be near enough.
+    """
+    told = (found.coloured <= VAGUE * np.abs(found.values)) & (found.prior_share <= ECHO)
     for part in ("yaw", "surge"):
-        names = [name for name in found.names if (name in SURGE) == (part == "surge")]
-        believed = all(isfinite(model.parameter(name).prior_std) for name in names)
-        if not believed and not set(names) - set(found.vague):
+        own = np.array([(name in SURGE) == (part == "surge") for name in found.names], bool)
+        priors = [model.parameter(name).prior_std for name in np.array(found.names)[own]]
+        if not (told[own].any() or np.isfinite(priors).all()):
             yield part
 
 
