@@ -32,44 +32,68 @@ class Chart:
     scale: FloatArray  # (2, 2)
     scale_label: str
     bounds: tuple[FloatArray, FloatArray]  # the corners with the least and the greatest x and y
+    simulated: FloatArray | None = None  # (m, 2) another track, of a simulated ship
 
 
 def draw_track(findings: Findings, drawn: Mapping[str, Series]) -> Chart | None:
     """The chart of a track; None where no position is known."""
-    track = drawn["track"]
+    track, compass = drawn["track"], drawn.get("heading")
     north, east = (line.values for line in track.lines)
-    points = np.column_stack((east, -north))
-    known = np.isfinite(points).all(axis=1)
-    points, at = points[known], track.time_secs[known]
+    heading = None
+    if compass is not None and len(compass.time_secs):
+        heading = np.interp(track.time_secs, compass.time_secs, compass.lines[0].values)
+    title = f"track, north up: {findings.track_origin}"
+    positions = np.column_stack((north, east))
+    return chart(title, positions, track.time_secs, heading, findings.vessel.length)
+
+
+def chart(
+    title: str,
+    positions: FloatArray,
+    at: FloatArray,
+    heading: FloatArray | None,
+    length: float | None,
+    simulated: FloatArray | None = None,
+) -> Chart | None:
+    """The chart of positions north and east, (k, 2) in m, at so many seconds, (k,).
+
+    `heading`, (k,) rad, turns the ships, else the track does; `simulated`, (m, 2), is another
+    track. None where no position is known.
+    """
+    known = np.isfinite(positions).all(axis=1)
+    points, at = _drawn(positions[known]), at[known]
     if len(points) < 2:
         return None
-    low, high = points.min(axis=0), points.max(axis=0)
+    other = None if simulated is None else _drawn(simulated[np.isfinite(simulated).all(axis=1)])
+    every = points if other is None else np.concatenate((points, other))
+    low, high = every.min(axis=0), every.max(axis=0)
     width = max(float((high - low).max()), 1.0)
-    length = max(findings.vessel.length or 0.0, SYMBOL * width)
     bar = _round_length(width / 4)
     foot = np.array([low[0], high[1] + 0.12 * width])
     margin = 0.08 * width
     return Chart(
-        f"track, north up: {findings.track_origin}",
-        points,
-        at,
-        _ships(drawn.get("heading"), points, at, length),
+        title, points, at,
+        _ships(points, None if heading is None else heading[known],
+               max(length or 0.0, SYMBOL * width)),
         foot + np.array([[0.0, 0.0], [bar, 0.0]]),
         f"{bar:g} m" if bar < 1000 else f"{bar / 1000:g} km",
         (low - margin, np.array([max(high[0], foot[0] + bar), foot[1]]) + margin),
-    )
+        other,
+    )  # fmt: skip
 
 
-def _ships(
-    compass: Series | None, points: FloatArray, at: FloatArray, length: float
-) -> list[FloatArray]:
+def _drawn(positions: FloatArray) -> FloatArray:
+    """North and east as (x, y) of the drawing."""
+    return np.column_stack((positions[:, 1], -positions[:, 0]))
+
+
+def _ships(points: FloatArray, heading: FloatArray | None, length: float) -> list[FloatArray]:
     """Outlines evenly along the way, headed as measured, or else along the track."""
     sailed = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
     rows = np.unique(np.searchsorted(sailed, np.linspace(0.0, sailed[-1], SHIPS)))
-    east, south = np.gradient(points, axis=0).T
-    heading = np.arctan2(east, -south)
-    if compass is not None and len(compass.time_secs):
-        heading = np.interp(at, compass.time_secs, compass.lines[0].values)
+    if heading is None:
+        east, south = np.gradient(points, axis=0).T
+        heading = np.arctan2(east, -south)
     return [points[row] + _turned(HULL * length, heading[row]) for row in rows]
 
 

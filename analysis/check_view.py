@@ -11,7 +11,7 @@ from shiplog.files import replacing
 from shiplog.types import FloatArray, TimeArray
 
 from .check import Comparison
-from .rerun_view import WHOLE_RUN
+from .rerun_sheet import WHOLE_RUN
 
 MOST_VIEWS = 9  # the first to differ are where to look
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from shiplog.clock import Clock
 from shiplog.compiled import compiled
 from shiplog.ship import INPUTS, OUTPUTS
+from shiplog.survey import longest_step_secs
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, factor
 
@@ -150,6 +151,23 @@ def banded(
     pale = (*colour[:3], 120)
     band = (Line("±2σ", values + sign * spread, pale) for sign in (1, -1))
     return (*band, Line(name, values, colour, 1.5))  # type: ignore[return-value]
+
+
+def measured_line(values: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+    """The times, in s, and the values of what was measured, (k,) each, with a NaN in each gap."""
+    at = np.flatnonzero(np.isfinite(values))
+    usual = float(np.median(np.diff(at))) if len(at) > 1 else 1.0
+    rows, columns = _Samples(longest_step_secs(usual * dt) / dt).step(0, values[:, None])
+    return rows * dt, columns[:, 0]
+
+
+def thinned(series: Series) -> Series:
+    """A series that is all there, thinned to about `POINTS`."""
+    at = series.time_secs
+    count = _stretch(len(at), len(series.lines))
+    thinning = Thinning(count * float(at[-1] - at[0]) / max(len(at) - 1, 1) if count else 0.0)
+    thinning.add(series)
+    return thinning.result()
 
 
 class _Samples:

@@ -1,6 +1,6 @@
 """Panels of what is drawn: which series share an axis, its title and its limits."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, log10
 
@@ -10,12 +10,14 @@ from shiplog.ship import INPUTS, OUTPUTS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
 
+from .changes import Change
 from .disturbance import DISTURBANCE_UNITS
 from .drawing import (
     BLUE,
     GREY,
     GUIDE,
     ORANGE,
+    RED,
     Colour,
     Line,
     Series,
@@ -115,10 +117,13 @@ def _coefficient(
     if not known.any():
         return None
     size = max(abs(model), float(np.median(np.abs(value[known]))))
-    prefix, scale = _thousands(size)
+    prefix, scale = thousands(size)
     value, spread = value * scale, GUIDE * std * scale
     result, doubt = whole.value * scale, GUIDE * whole.std * scale
+    changes = [change for change in findings.changes if change.name == name]
+    steps = [_levels(changes, scale)] if changes else []
     axis = _coefficient_limits(value[known], spread[known], result, doubt, model * scale)
+    axis = limits(np.array(axis), *(line.values for step in steps for line in step.lines))
     # a window less sure than the panel is high says nothing and would be a vertical stroke
     value = np.where(spread > axis[1] - axis[0], np.nan, value)
     if len(at) == 1:  # a point has no length: the one window is the whole trial
@@ -127,10 +132,25 @@ def _coefficient(
     series = (
         Series("model", span, (reference,)),
         Series("window", at, banded("window", value, spread, colour)),
+        *steps,
     )
-    said = _rounded(result, doubt) if whole.determined else "not determined"
+    said = rounded(result, doubt) if whole.determined else "not determined"
+    if changes:  # the whole trial's is a mixture
+        said = ", ".join(f"{c.before * scale:.4g} → {c.after * scale:.4g}" for c in changes)
     title = f"{name} {said} [{prefix}{whole.unit}]"
     return Panel(f"coefficient_{name}", title, series, axis)
+
+
+def _levels(changes: Sequence[Change], scale: float) -> Series:
+    """What a coefficient was before and after each of its changes: they meet at its instant."""
+    instants = np.unique([(c.from_secs, c.at_secs, c.until_secs) for c in changes])
+    lines = []
+    for c in changes:
+        spans = (c.from_secs, c.at_secs, c.before), (c.at_secs, c.until_secs, c.after)
+        for first, last, level in spans:
+            there = (instants >= first) & (instants <= last)
+            lines.append(Line("level", np.where(there, level * scale, np.nan), RED, 2.5))
+    return Series("with a step", instants, tuple(lines))
 
 
 def _coefficient_limits(
@@ -161,14 +181,14 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _thousands(size: float) -> tuple[str, float]:
+def thousands(size: float) -> tuple[str, float]:
     """A power of a thousand for a unit, in words, and the factor that brings `size` near 1."""
     exponent = 3 * floor(log10(size) / 3) if 0 < size < np.inf else 0
     digits = str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return (f"10{digits} " if exponent else ""), 10.0**-exponent
 
 
-def _rounded(value: float, doubt: float) -> str:
+def rounded(value: float, doubt: float) -> str:
     """A result to two digits of its doubt."""
     if not (np.isfinite(value) and 0 < doubt < np.inf):
         return "not determined"

@@ -16,13 +16,14 @@ from shiplog.errors import UsageError
 from shiplog.ship import OUTPUTS
 from shiplog.types import Log
 
+from .changes import Change, ShipWatch
 from .disturbance import Course, Disturbance, ForceObserver
 from .filters.kinds import make_filter
 from .filters.passage import OUTPUT_STATES, Estimates, Filter
 from .filters.smoother import Adjoint, SmoothingPass, smoothed
 from .identification import Identification
 from .inputs import InputHold, held_throughout
-from .plan import Plan, Planner, Tell, signals_of, weak_form_of
+from .plan import FITTED, Plan, Planner, Tell, signals_of, weak_form_of
 from .residuals import OutputResiduals, ResidualTest
 from .sliding import History
 from .stacking import stacked
@@ -52,6 +53,7 @@ class Findings(Plan):
     courses: dict[str, Course]  # of the disturbances
     yaw: Identification
     surge: Identification
+    changes: tuple[Change, ...]  # of coefficients, within the trial
     track_origin: str  # how the track is known, in words
 
 
@@ -120,6 +122,7 @@ class Replay:
         holding, (filtering, observing) = InputHold(clock), self._designed()
         tests = [self._residual_test(output) for output in range(len(OUTPUTS))]
         weak_form = weak_form_of(plan.vessel.paper, clock, plan.usual.intervals)
+        watching = ShipWatch(weak_form, guessed=plan.model_origin == FITTED)
         tracking = Tracker(clock, plan.survey.get("position"))
         watches = holding.add_raw, tracking.add_raw
         on_clock = signals_of(self._log, clock, self._tell, "replay", *watches)
@@ -132,11 +135,14 @@ class Replay:
                 test.add(e[:, i], stds[:, i], gated[:, i])
             disturbance = observing.step(_without_gated(held, estimates), following)
             yaw_rows, surge_rows = weak_form.step(signals, fastest)
+            watching.add(yaw_rows, surge_rows)
             yaw, surge = self._yaw.step(yaw_rows), self._surge.step(surge_rows)
             track = tracking.step(signals, *(estimates.states[:, i] for i in OUTPUT_STATES))
             yield Slab(signals, estimates, disturbance, yaw, surge, track)
         residuals = tuple(test.result() for test in tests)
-        said = tuple(residual.caution for residual in residuals if residual.caution)
+        changes = watching.result()
+        said = [residual.caution for residual in residuals if residual.caution]
+        said += map(str, changes)
         self._findings = Findings(
             **vars(plan) | {"warnings": (*plan.warnings, *said)},
             metadata=dict(self._log.metadata),
@@ -144,6 +150,7 @@ class Replay:
             courses=observing.result(),
             yaw=self._yaw.result(),
             surge=self._surge.result(),
+            changes=changes,
             track_origin=tracking.origin,
         )
 

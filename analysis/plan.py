@@ -15,7 +15,7 @@ from shiplog.clock import Clock, on_clock, set_clock
 from shiplog.gyro_bias import GyroWatch
 from shiplog.quality import faults
 from shiplog.rudder_sign import RudderWatch
-from shiplog.settings import DisturbanceSettings, FilterSettings
+from shiplog.settings import SHORTEST_WINDOW_SECS, DisturbanceSettings, FilterSettings
 from shiplog.ship import INPUTS, OUTPUTS, Coefficients
 from shiplog.survey import Survey, survey_log
 from shiplog.types import FloatArray, Log
@@ -29,10 +29,12 @@ from .first_model import BARE, fit_first_model
 from .gauge import Gauge, Gauger
 from .identification import Identifier
 from .inputs import InputHold
+from .sliding import least_window_secs
 from .weak_form import WeakForm
 
 FITTED = "a first model, fitted to this log"
 FEWEST = 4  # samples of an output: their third difference shows its noise
+OF_WINDOWS = ("yaw", "surge")
 NEEDED = (*OUTPUTS, *INPUTS)
 USUAL_SEA = 0.6  # rad/s, where no wave shows
 
@@ -66,11 +68,10 @@ class Planner:
     ) -> None:
         self._log, self._tell = log, tell
         self._warnings: list[str] = []
-        stated = _stated_model(log, vessel, settings)
+        vessel, origin = _stated_model(log, vessel, settings)
         survey, clock = self._surveyed()
-        usual, self.yaw, self.surge = self._gauged(survey, clock, stated[0] if stated else None)
+        usual, self.yaw, self.surge = self._gauged(survey, clock, vessel)
         tell("model", 0.0)
-        vessel, origin = stated or (with_settings(Vessel("", None), settings), FITTED)
         if vessel.coefficients is None:
             vessel, origin = self._with_first_model(vessel, usual), FITTED
         self._warnings += idle(vessel)
@@ -96,48 +97,51 @@ class Planner:
         return found, set_clock(self._log, found, channels=NEEDED, optional=("heading",))
 
     def _gauged(
-        self, found: Survey, clock: Clock, vessel: Vessel | None
+        self, found: Survey, clock: Clock, vessel: Vessel
     ) -> tuple[Gauge, Identifier, Identifier]:
         """The second time: what is usual, and the whole trial's yaw and surge equations.
 
         For these one must know how far apart samples stand on the clock, which is only told by
         then. It is nearly always what the survey lets expect; where not, they are made once more.
         """
-        alphas = (vessel.coefficients if vessel else None) or BARE
+        alphas, window_secs = vessel.coefficients or BARE, vessel.identifier.window_secs
         doubts = RudderWatch(found), GyroWatch(found)
         holding, gauger = InputHold(clock), Gauger(alphas)
         expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in OUTPUTS]
-        equations = _Equations(alphas, clock, np.maximum(np.round(expected), 1.0))
+        intervals = np.maximum(np.round(expected), 1.0)
+        equations = _Equations(alphas, clock, intervals, window_secs)
         watches = holding.add_raw, *(doubt.add for doubt in doubts)
         for signals in signals_of(self._log, clock, self._tell, "one clock", *watches):
             gauger.add(holding.step(signals))
             equations.add(signals, gauger.fastest)
         usual = gauger.result()
         if not np.array_equal(usual.intervals, equations.intervals):
-            equations = _Equations(alphas, clock, usual.intervals)
+            equations = _Equations(alphas, clock, usual.intervals, window_secs)
             for signals in signals_of(self._log, clock, self._tell, "one clock"):
                 equations.add(signals, usual.fastest)
         _require_outputs(self._log, usual)
         self._warnings += doubtful(found, NEEDED)
         self._warnings += [said for doubt in doubts if (said := doubt.result())]
         self._warnings += [*silent_ends(found, clock, NEEDED), *holding.said()]
+        self._warnings += equations.said()
         return usual, equations.yaw, equations.surge
 
     def _with_first_model(self, known: Vessel, usual: Gauge) -> Vessel:
         """What is known of a ship, with a model fitted to this log."""
-        vessel = fit_first_model(self.yaw, self.surge, usual, self._log.name)
-        model = vessel.paper
-        if known.model is not None:
+        first = fit_first_model(self.yaw, self.surge, usual, self._log.name)
+        vessel, model = replace(known, coefficients=first.coefficients), first.paper
+        if known.model is None:
+            vessel = replace(vessel, name=first.name, approach_rpm=first.approach_rpm)
+        else:
             self._warnings.append(
                 f"the vessel file has {known.model.name} alone, and filters are built on the "
                 "paper's model: a first one is fitted to this log"
             )
-            vessel = replace(known, coefficients=model)
         if not (model.a < 0 and model.g <= 0 and model.h >= 0):
             self._warnings.append(
                 "the model fitted to this log is no ship's: too little moves in it to tell"
             )
-        return replace(vessel, filter=known.filter, disturbance=known.disturbance)
+        return vessel
 
     def _noise(self, vessel: Vessel, found: Survey, clock: Clock, usual: Gauge) -> Noise:
         settings = _averaged(vessel.filter, found, clock.dt_secs)
@@ -197,18 +201,37 @@ def signals_of(
 class _Equations:
     """The whole trial's equations of yaw and surge, from signals in slabs."""
 
-    def __init__(self, alphas: Coefficients, clock: Clock, intervals: FloatArray) -> None:
-        self.intervals = intervals
+    def __init__(
+        self, alphas: Coefficients, clock: Clock, intervals: FloatArray, window_secs: float
+    ) -> None:
+        self.intervals, self._window_secs = intervals, window_secs
+        self._log_secs = clock.count * clock.dt_secs
         self._weak_form = weak_form_of(alphas, clock, intervals)
         count = self._weak_form.row_count
-        self.yaw = Identifier(self._weak_form.yaw, count, constant=True)
-        self.surge = Identifier(self._weak_form.surge, count)
+        self.yaw = Identifier(self._weak_form.yaw, count, constant=True, window_secs=window_secs)
+        self.surge = Identifier(self._weak_form.surge, count, window_secs=window_secs)
 
     def add(self, signals: Signals, fastest: float) -> None:
         """Take the next signals; `fastest` is the greatest speed so far, m/s."""
         yaw_rows, surge_rows = self._weak_form.step(signals, fastest)
         self.yaw.add(yaw_rows)
         self.surge.add(surge_rows)
+
+    def said(self) -> list[str]:
+        """What is to be said of the windows, in words."""
+        window = f"identifier.window_secs = {self._window_secs:g}"
+        least = {name: least_window_secs(getattr(self._weak_form, name)) for name in OF_WINDOWS}
+        if self._window_secs > self._log_secs:
+            said = f"{window} is longer than the log ({self._log_secs:.0f} s): the whole of it is "
+            room = self._log_secs > max(*least.values(), SHORTEST_WINDOW_SECS)
+            shorter = "ask for shorter windows, or " if room else ""
+            return [said + f"the one window; {shorter}give a longer log"]
+        blind = [name for name, secs in least.items() if self._window_secs <= secs]
+        if not blind:
+            return []
+        needed = max(least[name] for name in blind)
+        said = f"{window} is too short to tell so many coefficients of {' and '.join(blind)}: its "
+        return [said + f"windows are blank; ask for more than {needed:.0f} s"]
 
 
 def weak_form_of(model: Coefficients, clock: Clock, intervals: FloatArray) -> WeakForm:
@@ -218,15 +241,14 @@ def weak_form_of(model: Coefficients, clock: Clock, intervals: FloatArray) -> We
 
 def _stated_model(
     log: Log, given: Vessel | None, settings: Mapping[str, object]
-) -> tuple[Vessel, str] | None:
-    """The vessel that is known beforehand, with the settings given in place of its own."""
+) -> tuple[Vessel, str]:
+    """What is known of the vessel, the settings given in place of her own, and where it is from."""
     if given is not None:
         return with_settings(given, settings), "given"
     if log.vessel_toml is not None:
         carried = parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}")
         return with_settings(carried, settings), "carried by the log"
-    with_settings(Vessel("", None), settings)  # what is wrong with them is said before any work
-    return None
+    return with_settings(Vessel("", None), settings), FITTED
 
 
 def _require_outputs(log: Log, usual: Gauge) -> None:

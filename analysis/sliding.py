@@ -175,6 +175,12 @@ class Errors:
         )
 
 
+def least_window_secs(equation: Equation) -> float:
+    """The length up to which no window has more rows that could differ than coefficients."""
+    rows = int(len(equation.names) * equation.overlap * CORRELATED)
+    return equation.bump_secs + (rows - 1) * equation.stride_secs
+
+
 def _judge(
     found: Solutions,
     tallies: FloatArray,

@@ -1,5 +1,6 @@
 """What a replay found, as plain numbers: the summary in JSON."""
 
+from dataclasses import asdict
 from datetime import UTC, datetime
 from math import isfinite
 from typing import Any
@@ -11,6 +12,7 @@ from shiplog.settings import as_table
 from shiplog.ship import COEFFICIENT_UNITS
 from shiplog.survey import ChannelSurvey
 
+from .changes import Change
 from .disturbance import Course
 from .identification import Identification
 from .pipeline import Findings
@@ -50,6 +52,7 @@ def summarise(findings: Findings) -> Summary:
         "wave": _wave(findings.noise.wave),
         "disturbance": _disturbance(findings),
         "coefficients": _coefficients(findings.yaw) | _coefficients(findings.surge),
+        "changes": [_change(change) for change in findings.changes],
         "windows": {"yaw": _windows(findings.yaw), "surge": _windows(findings.surge)},
         "track": findings.track_origin,
         "warnings": list(findings.warnings),
@@ -89,7 +92,11 @@ def _residuals(findings: Findings, output: int) -> Summary:
 
 def _settings(findings: Findings) -> Summary:
     filtering = as_table(findings.vessel.filter) | {"kind": findings.vessel.filter.chosen}
-    return {"filter": filtering, "disturbance": as_table(findings.observed)}
+    return {
+        "filter": filtering,
+        "disturbance": as_table(findings.observed),
+        "identifier": as_table(findings.vessel.identifier),
+    }
 
 
 def _wave(wave: Wave | None) -> Summary | None:
@@ -135,6 +142,10 @@ def _coefficients(found: Identification) -> Summary:
         }
         for name, coefficient in found.coefficients.items()
     }
+
+
+def _change(change: Change) -> Summary:
+    return asdict(change) | {"instead": list(change.instead)}
 
 
 def _windows(found: Identification) -> Summary:

@@ -9,6 +9,7 @@ import numpy as np
 from shiplog.units import CATALOGUE, factor
 
 from .disturbance import DISTURBANCE_UNITS
+from .drawing import GUIDE
 from .pipeline import Findings
 from .plan import FITTED
 from .residuals import OutputResiduals
@@ -39,18 +40,26 @@ def sections(findings: Findings) -> tuple[Section, ...]:
         _filter_section(findings),
         _disturbance_section(findings),
         _coefficient_section(findings),
+        *_change_sections(findings),
     )
 
 
 def markdown(findings: Findings) -> str:
     """The summary as a page of text."""
-    blocks = [f"# {findings.name}"]
     log, *found = sections(findings)
-    for section in (*found, log):  # what was found first: a page is read from its top
-        blocks += [f"## {section.title}", _markdown_table(section.columns, section.rows)]
+    # what was found first: a page is read from its top
+    return page(findings.name, (*found, log), findings.warnings)
+
+
+def page(title: str, tables: Iterable[Section], warnings: Iterable[str]) -> str:
+    """Tables, their remarks and warnings in Markdown."""
+    blocks = [f"# {title}"]
+    for section in tables:
+        columns = (column.replace("\n", " ") for column in section.columns)
+        blocks += [f"## {section.title}", _markdown_table(columns, section.rows)]
         blocks += [f"*{remark}*" for remark in section.remarks]
-    if findings.warnings:
-        blocks += ["## Warnings", "\n".join(f"- {warning}" for warning in findings.warnings)]
+    said = "\n".join(f"- {warning}" for warning in warnings)
+    blocks += ["## Warnings", said] if said else []
     return "\n\n".join(blocks) + "\n"
 
 
@@ -181,3 +190,33 @@ def _coefficient_section(findings: Findings) -> Section:
         )
     columns = ("coefficient", "from this log", "std", "unit", "in the model")
     return Section("Coefficients", columns, tuple(rows), tuple(remarks))
+
+
+def _change_sections(findings: Findings) -> tuple[Section, ...]:
+    """What changed within the trial; nothing where nothing did."""
+    rows = [
+        (
+            f"{change.name} [{change.unit}]",
+            f"{change.at_secs:.0f} s",
+            f"{change.before:.3g} ± {GUIDE * change.before_std:.2g}",
+            f"{change.after:.3g} ± {GUIDE * change.after_std:.2g}",
+            change.by.removeprefix("by ").replace(" %", "", 1) if isfinite(change.share) else "",
+        )
+        for change in findings.changes
+    ]
+    if not rows:
+        return ()
+    remark = (
+        "A coefficient that differs before and after says that the ship did, her loading, the "
+        "depth or the weather, or that the model does not hold for both; over the whole trial it "
+        "is a mixture. Each by itself, ±2σ; the difference with its 95 % interval."
+    )
+    remarks = [remark]
+    remarks += [
+        f"At {change.at_secs:.0f} s {' or '.join(change.instead)} may have changed in place of "
+        f"{change.name}: the log cannot tell which."
+        for change in findings.changes
+        if change.instead
+    ]
+    columns = ("coefficient", "at", "before", "after", "difference")
+    return (Section("Changes within the trial", columns, tuple(rows), tuple(remarks)),)

@@ -34,6 +34,7 @@ BUMP_SECS = 60.0  # long against the noise, short against the ship's turning
 STRIDE_SECS = 1.0
 LEAST_RUDDER = np.radians(2.0)  # a rudder that moves less tells nothing of yaw,
 LEAST_SPEED = 0.02  # nor does a speed that changes by a smaller share of itself tell of surge
+SLIPSTREAM = "slipstream"  # a regressor: what the rudder does in the propeller's race
 BUMP_POWER = 4  # (1 - s^2)^4: three derivatives vanish at the ends
 
 
@@ -53,6 +54,10 @@ class Equation:
     def with_constant(self) -> "Equation":
         """The same with one more regressor: a disturbance that never changes."""
         return replace(self, names=(*self.names, "constant"))
+
+    def with_slipstream(self) -> "Equation":
+        """The same with one more regressor, for a rudder of which nothing is known."""
+        return replace(self, names=(*self.names, SLIPSTREAM))
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,6 +214,19 @@ def with_constant(rows: Rows) -> Rows:
     ones = np.ones((len(rows.target), 1))
     regressors = np.hstack((rows.regressors, ones))
     return replace(rows, equation=rows.equation.with_constant(), regressors=regressors)
+
+
+def with_slipstream(yaw: Rows, surge: Rows) -> Rows:
+    """The rows of yaw with one more regressor: the rudder in proportion to the revolutions.
+
+    `yaw` takes it in proportion to the speed alone, as a first model does; `surge` knows both.
+    """
+    d, g, h = yaw.equation.names.index("d"), *map(surge.equation.names.index, ("g", "h"))
+    speed, revolutions = np.sqrt(surge.regressors[:, g]), surge.regressors[:, h]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rudder = np.where(speed > 0, yaw.regressors[:, d] / speed, 0.0) * revolutions
+    regressors = np.column_stack((yaw.regressors, rudder))
+    return replace(yaw, equation=yaw.equation.with_slipstream(), regressors=regressors)
 
 
 def _bump(half: int, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -134,8 +134,9 @@ def _add_replay(verbs: Any) -> None:  # noqa: ANN401
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="any setting of the vessel file's [filter] and [disturbance], such as filter.gate=4 "
-        "or filter.process_ratio=auto, which leaves it to the log",
+        help="any setting of the vessel file's [filter], [disturbance] and [identifier], such as "
+        "filter.gate=4, identifier.window_secs=300 or filter.process_ratio=auto, which leaves it "
+        "to the log",
     )
     replay.add_argument(
         "-o", "--output", metavar="FILE", help="the review (default: LOG's name with .rrd, here)"
@@ -182,6 +183,14 @@ def _add_identify(verbs: Any) -> None:  # noqa: ANN401
     )
     identify.add_argument(
         "-o", "--output", metavar="FILE", help="the vessel.toml, to simulate and to replay with"
+    )
+    identify.add_argument(
+        "--review",
+        metavar="FILE",
+        help="an .rrd for Rerun: measured against simulated, residuals, how coefficients settled",
+    )
+    identify.add_argument(
+        "--view", action="store_true", help="open the review, else identified.rrd, in Rerun"
     )
     identify.add_argument("--json", metavar="FILE", help="the result as JSON, - for stdout")
     identify.set_defaults(verb="identify")

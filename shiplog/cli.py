@@ -151,12 +151,16 @@ def _run_replay(arguments: argparse.Namespace) -> int:
         _write_json(summarise(findings), arguments.json)
     _print_tables(sections(findings), to_stderr=arguments.json == "-")
     _warn(findings.warnings)
-    print(f"review: {output} (open it with: rerun {output})", file=sys.stderr)
-    if arguments.view:
+    _show_review(output, view=arguments.view)
+    return DATA_LOST if log.data_lost else FINE
+
+
+def _show_review(path: str | Path, *, view: bool) -> None:
+    print(f"review: {path} (open it with: rerun {path})", file=sys.stderr)
+    if view:
         from analysis.viewer import view_review
 
-        view_review(output)
-    return DATA_LOST if log.data_lost else FINE
+        view_review(path)
 
 
 def _run_identify(arguments: argparse.Namespace) -> int:
@@ -174,7 +178,10 @@ def _run_identify(arguments: argparse.Namespace) -> int:
         for paths in (arguments.log, arguments.validate)
     )
     require_distinct(fitted, held_out)
-    _require_distinct([arguments.output, arguments.json], [*fitted, *held_out, arguments.vessel])
+    review = arguments.review or ("identified.rrd" if arguments.view else None)
+    outputs = [arguments.output, arguments.json, review]
+    _require_distinct(outputs, [*fitted, *held_out, arguments.vessel])
+    _require_suffix(".rrd", review)
     if arguments.output:
         _require_suffix(".toml", arguments.output)
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
@@ -196,8 +203,14 @@ def _run_identify(arguments: argparse.Namespace) -> int:
             part.write_text(text, encoding="utf-8")
     if arguments.json:
         _write_json(as_json(found), arguments.json)
+    if review:
+        from analysis.identify.review import write_review
+
+        write_review(found, review)
     _print_tables(sections(found), to_stderr=arguments.json == "-")
     _warn(found.warnings)
+    if review:
+        _show_review(review, view=arguments.view)
     if arguments.output:
         vague = ", ".join(found.uncertainty.vague)
         said = (

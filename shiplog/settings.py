@@ -1,4 +1,4 @@
-"""How a log is filtered and observed: `[filter]` and `[disturbance]` of a vessel file.
+"""How a log is replayed: `[filter]`, `[disturbance]` and `[identifier]` of a vessel file.
 
 Each key is a field; its kind and its limits stand beside it.
 """
@@ -15,7 +15,9 @@ SMOOTHED = ("pseudo-input", "extended")  # whose gain is the one that a smoother
 DISTURBANCES = ("constant", "ramp", "wave")
 SPECTRA = ("butterworth", "binomial")
 
-Settings = TypeVar("Settings", "FilterSettings", "DisturbanceSettings")
+SHORTEST_WINDOW_SECS = 60.0  # one bump of the equations in integral form
+
+Settings = TypeVar("Settings", "FilterSettings", "DisturbanceSettings", "IdentifierSettings")
 
 
 def _flag() -> Any:  # noqa: ANN401 - as dataclasses.field
@@ -78,6 +80,13 @@ class DisturbanceSettings:
     wave_frequency: float | None = _number(positive=True, most=1e3)  # None: the residual tells
 
 
+@dataclass(frozen=True)
+class IdentifierSettings:
+    """What a vessel file says of the windows in which coefficients are identified."""
+
+    window_secs: float = _number(200.0, least=SHORTEST_WINDOW_SECS, most=1e9)
+
+
 ONLY_OF = {  # what the settings of single filters do nothing without
     "as_printed": ("pseudo-input",),
     "yaw_bandwidth": FILTERS[1:],
@@ -123,7 +132,14 @@ def disturbance_settings(table: Mapping[str, object], faults: list[str]) -> Dist
     return _parsed("disturbance", DisturbanceSettings, table, faults)
 
 
-def as_table(settings: FilterSettings | DisturbanceSettings) -> dict[str, object]:
+def identifier_settings(table: Mapping[str, object], faults: list[str]) -> IdentifierSettings:
+    """The settings of an `[identifier]` section; what is wrong with it goes to `faults`."""
+    return _parsed("identifier", IdentifierSettings, table, faults)
+
+
+def as_table(
+    settings: FilterSettings | DisturbanceSettings | IdentifierSettings,
+) -> dict[str, object]:
     """The section that gives these settings."""
     return {key: value for key, value in asdict(settings).items() if value is not None}
 

@@ -13,9 +13,11 @@ from .model_section import ModelSection, model_section
 from .settings import (
     DisturbanceSettings,
     FilterSettings,
+    IdentifierSettings,
     as_table,
     disturbance_settings,
     filter_settings,
+    identifier_settings,
     number_fault,
     without_effect,
 )
@@ -37,6 +39,7 @@ class Vessel:
     rudder_rate: float = 2.5 * pi / 180  # rad/s
     filter: FilterSettings = field(default_factory=FilterSettings)
     disturbance: DisturbanceSettings = field(default_factory=DisturbanceSettings)
+    identifier: IdentifierSettings = field(default_factory=IdentifierSettings)
     angle_unit: str = "rad"  # of its file; inside all angles are radians
     model: ModelSection | None = None  # that she is sailed by, if not by the paper's
 
@@ -110,7 +113,7 @@ _KEYS: dict[str, dict[str, tuple[float, float]]] = {
     },
     "surge": dict.fromkeys(("f", "g", "h"), (-inf, inf)),
 }
-_SETTINGS = ("filter", "disturbance")
+_SETTINGS = ("filter", "disturbance", "identifier")
 _ALPHAS = ("alpha1", "alpha2", "alpha3")
 _TEXTS = ("name", "angle_unit")
 _POSITIVE = {"T1", "T2", "approach_rpm", "length", "max", "rate"}
@@ -154,6 +157,7 @@ def parse_vessel(text: str, where: str) -> Vessel:
     sections = {key: _section(key, table.pop(key, {}), faults) for key in _SETTINGS}
     filtering = filter_settings(sections["filter"], faults)
     observing = disturbance_settings(sections["disturbance"], faults)
+    identifying = identifier_settings(sections["identifier"], faults)
     numbers = _numbers(table, faults)
     length = numbers[""].get("length", nan if "length" in table else None)  # one fault is enough
     model = None if own is None else model_section(own, length, faults)
@@ -176,20 +180,25 @@ def parse_vessel(text: str, where: str) -> Vessel:
     coefficients = _coefficients(numbers, per_rad) if is_papers else None
     vessel = _vessel(str(table.get("name", Path(where).stem)), coefficients, numbers, per_rad)
     return replace(
-        vessel, filter=filtering, disturbance=observing, angle_unit=angle_unit, model=model
+        vessel,
+        filter=filtering,
+        disturbance=observing,
+        identifier=identifying,
+        angle_unit=angle_unit,
+        model=model,
     )
 
 
 def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
     """The vessel with settings of its own replaced, such as {"filter.kind": "extended"}.
 
-    The names are those of the vessel file's `[filter]` and `[disturbance]`; "auto" is as if it
-    stated nothing. Raises `UsageError` with all the faults at once.
+    The names are those of its file's `[filter]`, `[disturbance]` and `[identifier]`; "auto" is as
+    if it stated nothing. Raises `UsageError` with all the faults at once.
     """
     if not settings:
         return vessel
     faults: list[str] = []
-    tables = {"filter": as_table(vessel.filter), "disturbance": as_table(vessel.disturbance)}
+    tables = {section: as_table(getattr(vessel, section)) for section in _SETTINGS}
     for name, value in settings.items():
         section, _, key = name.partition(".")
         if section in tables and value == "auto":
@@ -197,12 +206,14 @@ def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
         elif section in tables:
             tables[section][key] = value
         else:
-            faults.append(f"unknown setting {name!r}, they begin with filter. or disturbance.")
+            begin = ", ".join(f"{section}." for section in _SETTINGS)
+            faults.append(f"unknown setting {name!r}, they begin with one of {begin}")
     filtering = filter_settings(tables["filter"], faults)
     observing = disturbance_settings(tables["disturbance"], faults)
+    identifying = identifier_settings(tables["identifier"], faults)
     if faults:
         raise UsageError(f"these settings do not work: {'; '.join(faults)}")
-    return replace(vessel, filter=filtering, disturbance=observing)
+    return replace(vessel, filter=filtering, disturbance=observing, identifier=identifying)
 
 
 def idle(vessel: Vessel) -> list[str]:

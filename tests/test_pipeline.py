@@ -453,3 +453,80 @@ def test_every_real_run_of_the_kvlcc2_replays(run: Path) -> None:
     assert found.yaw.coefficients["e"].value > 0
     assert found.surge.coefficients["f"].determined
     assert not any("contrary" in w for w in found.warnings)
+
+
+def of_windows(found: Analysis) -> list[str]:
+    return [said for said in found.warnings if "identifier.window_secs" in said]
+
+
+def test_windows_are_as_long_as_the_settings_say(zigzag_log: TrialLog) -> None:
+    found = analyse(zigzag_log, settings={"identifier.window_secs": 300})
+    assert found.yaw_history.time_secs[0] == pytest.approx(300.0, abs=1.0)
+    assert found.surge_history.time_secs[0] == pytest.approx(300.0, abs=1.0)
+    assert np.isfinite(found.yaw_history.values).any()
+    assert of_windows(found) == []
+    bare = analyse(without_vessel(zigzag_log), settings={"identifier.window_secs": 300})
+    assert bare.yaw_history.time_secs[0] == pytest.approx(300.0, abs=1.0)
+
+
+def without_vessel(log: TrialLog) -> TrialLog:
+    return replace(log, vessel_toml=None)
+
+
+def test_a_window_longer_than_the_log_is_the_whole_of_it_and_said(zigzag_log: TrialLog) -> None:
+    found = analyse(zigzag_log, settings={"identifier.window_secs": 1000})
+    (said,) = of_windows(found)
+    assert "longer than the log (500 s): the whole of it is the one window" in said
+    assert found.yaw_history.values.shape == (1, 6)
+
+
+@pytest.mark.parametrize(("secs", "blind"), [(170, ["yaw"]), (100, ["yaw", "surge"])])
+def test_windows_too_short_for_so_many_coefficients_are_blank_and_said(
+    zigzag_log: TrialLog, secs: float, blind: list[str]
+) -> None:
+    found = analyse(zigzag_log, settings={"identifier.window_secs": secs})
+    (said,) = of_windows(found)
+    assert f"coefficients of {' and '.join(blind)}: its windows are blank" in said
+    for name, history in (("yaw", found.yaw_history), ("surge", found.surge_history)):
+        assert np.isfinite(history.values).any() == (name not in blind)
+    needed = float(said.split("more than ")[1].split(" s")[0])
+    enough = analyse(zigzag_log, settings={"identifier.window_secs": needed + 1})
+    assert np.isfinite(enough.yaw_history.values).any()
+
+
+@pytest.mark.parametrize("manoeuvre", ["turning-circle", "zigzag-20-20"])
+def test_ten_seconds_tell_no_coefficient(vessel: Vessel, manoeuvre: str) -> None:
+    trial = simulate(vessel, manoeuvre, duration_secs=10.0, sensors=suite("paper"))
+    found = analyse(as_log(trial), vessel)
+    every = found.yaw.coefficients | found.surge.coefficients
+    assert not any(coefficient.determined for coefficient in every.values())
+    assert "give a longer log" in of_windows(found)[0]
+    assert "shorter windows" not in of_windows(found)[0]
+    with pytest.raises(LogError, match="too little moves in it to fit one"):
+        analyse(as_log(trial))
+
+
+def test_a_rudder_at_rest_tells_nothing_of_yaw(vessel: Vessel) -> None:
+    """A straight run of ten minutes, its revolutions kept: not even surge is told."""
+    trial = simulate(vessel, "turning-circle", duration_secs=10.0, sensors=suite("none"))
+    times = np.arange(6001) / 10
+    stamps = START_NS + (times * 1e9).astype(np.int64)
+    rng, usual = np.random.default_rng(0), {c.name: c.values[0] for c in trial.channels}
+    noise = {"yaw_rate": 1e-4, "speed": 0.1}
+    log = TrialLog(
+        "straight.mcap",
+        tuple(
+            Channel(
+                c.name, c.source, c.unit, stamps, stamps,
+                usual[c.name] + noise.get(c.name, 0.0) * rng.standard_normal(len(times)),
+            )
+            for c in trial.channels
+            if c.name in NEEDED
+        ),
+    )  # fmt: skip
+    found = analyse(log, vessel)
+    every = found.yaw.coefficients | found.surge.coefficients
+    assert not any(coefficient.determined for coefficient in every.values())
+    assert found.changes == ()
+    with pytest.raises(LogError, match="too little moves in it to fit one of yaw and surge"):
+        analyse(log)

@@ -155,6 +155,18 @@ def test_the_figures_of_a_true_circle_are_its_own() -> None:
     assert found.steady_speed == pytest.approx(speed)
 
 
+def test_a_first_course_that_is_given_counts_for_the_first_samples_heading() -> None:
+    time = np.arange(0, 500, 1.0)
+    heading = 0.01 * time
+    outputs = np.column_stack((0 * time + 0.01, 5 + 0 * time, 0 * time, heading))
+    positions, rudder = made_good(outputs, 1.0), np.full(500, 0.6)
+    noisy = outputs.copy()
+    noisy[0, 3] += 0.05
+    exact = turn(outputs, positions, rudder, 1.0)
+    assert turn(noisy, positions, rudder, 1.0, course=0.0) == exact
+    assert turn(noisy, positions, rudder, 1.0).advance > exact.advance + 20
+
+
 def test_a_ship_that_does_not_come_round_has_no_diameter() -> None:
     time = np.arange(0, 100, 1.0)
     outputs = np.column_stack((0.02 + 0 * time, 5 + 0 * time, 0 * time, 0.02 * time))

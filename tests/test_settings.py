@@ -4,27 +4,37 @@ from dataclasses import fields
 
 import pytest
 
+from analysis.sliding import WINDOW_SECS
+from analysis.weak_form import BUMP_SECS
 from shiplog import Vessel, load_vessel
 from shiplog.arguments import parser, replay_settings
 from shiplog.errors import UsageError, VesselError
 from shiplog.settings import (
     DISTURBANCES,
     FILTERS,
+    SHORTEST_WINDOW_SECS,
     SMOOTHED,
     DisturbanceSettings,
     FilterSettings,
+    IdentifierSettings,
     as_table,
     disturbance_settings,
     filter_settings,
+    identifier_settings,
     without_effect,
 )
 from shiplog.vessel import PRESETS, idle, parse_vessel, with_settings
 
+PARSERS = {
+    "filter": filter_settings,
+    "disturbance": disturbance_settings,
+    "identifier": identifier_settings,
+}
+
 
 def faults_of(section: str, table: dict[str, object]) -> str:
     faults: list[str] = []
-    parse = filter_settings if section == "filter" else disturbance_settings
-    parse(table, faults)
+    PARSERS[section](table, faults)
     return "; ".join(faults)
 
 
@@ -52,6 +62,17 @@ def test_every_filter_can_be_named_in_a_vessel_file(kind: str) -> None:
 def test_every_disturbance_can_be_named_in_a_vessel_file(models: list[str]) -> None:
     vessel = parse_vessel(f"{PRESETS['table1']}\n[disturbance]\nmodels = {models}\n", "ship.toml")
     assert vessel.disturbance.models == tuple(models)
+
+
+def test_windows_are_what_a_file_and_the_command_line_say(vessel: Vessel) -> None:
+    assert vessel.identifier.window_secs == WINDOW_SECS
+    assert SHORTEST_WINDOW_SECS == BUMP_SECS
+    stated = parse_vessel(f"{PRESETS['table1']}[identifier]\nwindow_secs = 300\n", "ship.toml")
+    assert stated.identifier.window_secs == 300.0
+    chosen = given("--set", "identifier.window_secs=400")
+    assert with_settings(stated, chosen).identifier.window_secs == 400.0
+    auto = with_settings(stated, {"identifier.window_secs": "auto"})
+    assert auto.identifier.window_secs == WINDOW_SECS
 
 
 @pytest.mark.parametrize("settings", [FilterSettings(kind="quality"), DisturbanceSettings()])
@@ -92,6 +113,8 @@ def test_what_has_not_the_best_gain_is_not_smoothed(kind: str) -> None:
         ("disturbance", "models", ["swell"], "must be a list of some of constant, ramp, wave"),
         ("disturbance", "spectrum", "bessel", "disturbance.spectrum must be one of butterworth"),
         ("disturbance", "yaw_frequency", -1, "disturbance.yaw_frequency must be positive, got -1"),
+        ("identifier", "window_secs", 30, "identifier.window_secs must lie between 60 and 1e+09"),
+        ("identifier", "window", 300, "did you mean 'window_secs'?"),
     ],
 )
 def test_a_value_that_does_not_do_is_named(
@@ -171,5 +194,5 @@ def test_a_setting_that_is_none_is_refused(text: str) -> None:
 
 
 def test_every_field_states_what_it_may_be() -> None:
-    for kind in (FilterSettings, DisturbanceSettings):
+    for kind in (FilterSettings, DisturbanceSettings, IdentifierSettings):
         assert all("kind" in field.metadata for field in fields(kind))

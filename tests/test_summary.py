@@ -48,6 +48,7 @@ def test_the_settings_and_the_wave_are_told(zigzag_log: TrialLog) -> None:
     found = summarise(analyse(zigzag_log, settings=settings))
     assert found["settings"]["filter"]["kind"] == "extended"
     assert found["settings"]["disturbance"]["models"] == ("constant", "wave")
+    assert found["settings"]["identifier"] == {"window_secs": 200.0}
     assert found["wave"]["frequency_rad_per_s"] == 0.6
     assert {"yaw", "yaw_as_rudder", "surge", "yaw_wave", "surge_wave"} == set(found["disturbance"])
     assert summarise(analyse(zigzag_log))["wave"] is None

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.weak_form import weak_form, with_constant
+from analysis.weak_form import weak_form, with_constant, with_slipstream
 from recorders.sensors import suite
 from recorders.simulate import SimulatedTrial, simulate
 from shiplog import Signals, TrialLog, Vessel, resample
@@ -90,3 +90,20 @@ def test_a_constant_is_one_more_regressor(signals: Signals, vessel: Vessel) -> N
     more = with_constant(yaw)
     assert more.equation.names == (*yaw.equation.names, "constant")
     assert np.all(more.regressors[:, -1] == 1)
+
+
+def test_the_slipstream_is_the_rudder_in_proportion_to_the_revolutions(
+    signals: Signals, vessel: Vessel
+) -> None:
+    """To a few per cent: speed and revolutions are means over a bump."""
+    n, v = signals["rpm"], signals["speed"]
+    bare = vessel.coefficients._replace(alpha1=1.0, alpha2=0.0)
+    race = vessel.coefficients._replace(alpha1=0.0, alpha2=1.0, alpha3=0.0)
+    yaw, surge = weak_form(signals, bare)
+    found = with_slipstream(yaw, surge)
+    assert found.equation.names == (*yaw.equation.names, "slipstream")
+    expected = weak_form(signals, race)[0].regressors[:, 4]
+    off = found.regressors[:, -1] - expected
+    assert np.sqrt(np.mean(off**2) / np.mean(expected**2)) < 0.05
+    assert n.std() > 0.05 * n.mean()
+    assert v.std() > 0.02 * v.mean()

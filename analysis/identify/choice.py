@@ -18,8 +18,8 @@ from shiplog.ships.motion import OUTPUTS
 from shiplog.types import FloatArray
 
 from .least_squares import minimise
-from .output_error import OutputError, output_error
-from .prediction import JUDGED, misfit, problem_without
+from .output_error import OutputError, first_spreads, output_error, settled
+from .prediction import JUDGED, misfit
 from .trial import Trial
 
 JUDGED_COLUMNS = [OUTPUTS.index(name) for name in JUDGED]  # all models alike
@@ -50,7 +50,7 @@ def compare(
 
     Raises `UsageError` where there are fewer than two runs to tell them apart by.
     """
-    if len(trials) < 2:
+    if len({trial.name for trial in trials}) < 2:
         raise UsageError(
             "a model is chosen by runs it has not seen: give two logs or more, or name the model"
         )
@@ -59,16 +59,25 @@ def compare(
 
 def _candidate(trials: Sequence[Trial], model: Model, settings: Mapping[str, Any]) -> Candidate:
     try:
-        fit = output_error(trials, model, **settings)
+        fitted = output_error(trials, model, **settings)
     except LogError:
         return Candidate(model, None, np.full((len(trials), len(OUTPUTS)), np.inf))
-    return Candidate(model, fit, np.array([_left_out(fit, i) for i in range(len(trials))]))
+    misfits = [row for run in fitted.problem.runs for row in _left_out(fitted, run)]
+    return Candidate(model, fitted, np.array(misfits))
 
 
-def _left_out(fit: OutputError, i: int) -> FloatArray:
-    """How far off a run is a fit to the others."""
-    rest, start = problem_without(fit, i)
-    spreads = [spread for j, spread in enumerate(fit.spreads) if j != i]
-    minimum = minimise(rest, start, spreads)
-    others = replace(fit, problem=rest, minimum=minimum, spreads=tuple(spreads))
-    return misfit(others, fit.problem.trials[i])
+def _left_out(whole: OutputError, run: Sequence[int]) -> list[FloatArray]:
+    """How far off the trials of a run is a fit to the others, which knows nothing of it.
+
+    Its search begins where the whole fit is; its noise is its own, a swell counts as noise.
+    """
+    kept = [i for i in range(len(whole.problem.trials)) if i not in run]
+    calm = replace(whole.problem, waves=())
+    rest, _ = calm.of_trials(kept, calm.start())
+    start = rest.start()
+    start[: len(rest.free)] = whole.minimum.unknowns[: len(rest.free)]
+    minimum = minimise(rest, start, first_spreads(rest))
+    if not np.isfinite(minimum.cost):
+        return [np.full(len(OUTPUTS), np.inf)] * len(run)
+    others = settled(rest, minimum)
+    return [misfit(others, whole.problem.trials[i]) for i in run]

@@ -1,7 +1,7 @@
 """From logs to a ship's coefficients, what they are worth, and what they say of other logs."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,13 +12,18 @@ from shiplog.types import FloatArray, Log
 from shiplog.vessel import Vessel
 
 from .advice import Ties, ties_of, told_by
+from .augmented import augmented
 from .choice import Candidate, compare
+from .courses import Courses, two_priors
+from .echo import Echo, second_run
 from .output_error import OutputError, output_error, pose
+from .papers_scheme import papers_scheme
 from .problem import residuals
-from .runs import contradictions, run_of, ship_of
+from .runs import contradictions, distinct_runs, ship_of
 from .trial import Trial
 from .uncertainty import Uncertainty, uncertainty
 from .validation import Validation, validate
+from .windows import windows
 
 AUTO = "auto"
 ALPHAS = ("alpha1", "alpha2", "alpha3")
@@ -47,6 +52,8 @@ class IdentifiedShip:
     model: Model
     fit: OutputError
     uncertainty: Uncertainty
+    echo: Echo
+    courses: tuple[Courses, ...]  # of other methods, for comparison
     runs: tuple[RunFit, ...]
     validations: tuple[Validation, ...]
     candidates: tuple[Candidate, ...]  # the best first; empty where the model was named
@@ -100,7 +107,7 @@ def identify(
     considered = [ship_model(name) for name in (LADDER if model == AUTO else (model,))]
     _require_known(considered, stated)
     on_step("read")
-    runs, held_out = [run_of(log) for log in logs], [run_of(log) for log in validation_logs]
+    runs, held_out = distinct_runs(logs, validation_logs)
     ship = ship_of([*runs, *held_out], vessel)
     trials = [trial for run in runs for trial in run.trials]
     length = ship.length if ship else None
@@ -114,11 +121,16 @@ def identify(
         fit = output_error(trials, considered[0], known=settled, length=length)
     on_step("uncertainty")
     found = uncertainty(fit)
+    on_step("echo")
+    echo = second_run(fit, found)
+    found = replace(found, prior_share=np.fmax(found.prior_share, echo.shares))
+    priors = two_priors(found)
+    courses = augmented(fit, priors), windows(fit), papers_scheme(fit, priors)
     on_step("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
     every = [*runs, *held_out]
     warnings = [w for run in every for w in run.warnings]
-    warnings += [*contradictions(every), *_doubts(fit, found, validations)]
+    warnings += [*contradictions(every), *_doubts(fit, found, echo, validations)]
     if fit.problem.scale.secs != 1.0 and length is None:
         warnings.append(
             f"no length is known, {fit.problem.scale.secs * fit.problem.scale.speed:.0f} m is "
@@ -126,7 +138,8 @@ def identify(
             "little; state it in a vessel file"
         )
     return IdentifiedShip(
-        fit.problem.model, fit, found, tuple(_run_fits(fit)), tuple(validations),
+        fit.problem.model, fit, found, echo, tuple(each for each in courses if each is not None),
+        tuple(_run_fits(fit)), tuple(validations),
         tuple(candidates), ties_of(fit), ship, length is not None,
         {n: v for n, v in zip(fit.problem.model.names, fit.parameters.tolist(), strict=True)
          if n not in found.names},
@@ -137,8 +150,15 @@ def identify(
 
 def _require_known(models: Sequence[Model], known: Mapping[str, float]) -> None:
     for name, value in known.items():
-        if not any(name in model.names for model in models):
+        having = [model for model in models if name in model.names]
+        if not having:
             models[0].parameter(name)
+        units = {model.parameter(name).unit for model in having}
+        if len(units) > 1:
+            raise UsageError(
+                f"--known {name} is in {' or '.join(sorted(units))}, as the model has it; "
+                "name the model with --model"
+            )
         if not np.isfinite(value):
             raise UsageError(f"--known {name} must be a finite number, got {value}")
 
@@ -195,33 +215,50 @@ def _run_fits(fit: OutputError) -> Iterator[RunFit]:
         )  # fmt: skip
 
 
+def _unexplained(fit: OutputError) -> Iterator[str]:
+    """The runs of which the fit leaves much, white noise aside."""
+    problem = fit.problem
+    for trial, left, spread in zip(
+        problem.trials, residuals(problem, fit.minimum.unknowns), fit.spreads, strict=True
+    ):
+        for c, output in enumerate(problem.outputs):
+            measured = trial.measured[:, OUTPUTS.index(output)]
+            white = max(float(np.mean(spread.usual[:, c] ** 2)) - fit.noises[c].slow ** 2, 0.0)
+            stays = np.sqrt(max(_rms(left[:, c]) ** 2 - white, 0.0))
+            size = float(np.nanstd(measured)) if np.isfinite(measured).any() else 0.0
+            if stays > UNEXPLAINED * size and stays**2 > white:
+                yield (
+                    f"{trial.name}: the fit leaves {100 * stays / size:.0f} % of the "
+                    f"{output.replace('_', ' ')} unexplained: "
+                    "a contrary rudder, wrong units, another ship, or a model that is not hers"
+                )
+
+
 def _rms(off: FloatArray) -> float:
     known = off[np.isfinite(off)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
 def _doubts(
-    fit: OutputError, found: Uncertainty, validations: Sequence[Validation]
+    fit: OutputError, found: Uncertainty, echo: Echo, validations: Sequence[Validation]
 ) -> Iterator[str]:
     """What makes a fit hard to believe."""
     if not fit.minimum.settled:
         yield "the search has not come to an end: the values are where it stopped"
-    left = residuals(fit.problem, fit.minimum.unknowns)
-    for i, trial in enumerate(fit.problem.trials):
-        rate = trial.measured[:, OUTPUTS.index("yaw_rate")]
-        share = _rms(left[i][:, fit.problem.outputs.index("yaw_rate")]) / float(np.nanstd(rate))
-        if share > UNEXPLAINED:
-            yield (
-                f"{trial.name}: the fit leaves {100 * share:.0f} % of the yaw rate unexplained: "
-                "a contrary rudder, wrong units, another ship, or a model that is not hers"
-            )
-    told = np.isfinite(found.between_runs) & (found.coloured > 0)
-    apart = float(np.median(found.between_runs[told] / found.coloured[told])) if told.any() else 1.0
-    if max(found.enlarged, apart) > CONTRADICTING:
+    if echo.elsewhere:
         yield (
-            f"the logs contradict each other, {max(found.enlarged, apart):.0f} times what their "
-            "noise explains: another ship, loading or depth, or a model that is not hers; "
-            "the intervals allow for it"
+            "from another start the search ends elsewhere, where the fit is "
+            f"{'better' if echo.worse_by < 0 else 'worse'}: the logs hardly tell this model; "
+            "give more manoeuvres, or take a simpler one"
+        )
+    yield from _unexplained(fit)
+    apart = found.agreement.contradiction
+    if apart > CONTRADICTING:
+        odd = f", {found.agreement.odd} the others" if found.agreement.odd else ""
+        yield (
+            f"the logs contradict each other{odd}, {apart:.0f} times what their noise explains: "
+            "another ship, loading or depth, or a model that is not hers; the intervals allow for "
+            "it"
         )
     if set(found.vague) == set(found.names):
         yield "nothing is identifiable from these logs: no value of the model is to be believed"

@@ -31,6 +31,10 @@ class Spread:
     effective: FloatArray  # the std that each counts with, for neighbours that are off together
     usual: FloatArray  # the std it has by itself, by which an outlier is told
 
+    def part(self, start: int, stop: int) -> "Spread":
+        """Of the samples from `start` to before `stop`."""
+        return Spread(self.effective[start:stop], self.usual[start:stop])
+
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
@@ -131,19 +135,45 @@ def linearised(
 ) -> tuple[FloatArray, FloatArray]:
     """The gradient of the cost, (m,), and the data's information matrix, (m, m)."""
     centre, precision = problem.prior
-    gradient, information = precision * (z - centre), np.zeros((problem.size, problem.size))
+    gradient = precision * (z - centre)
     for i, (spread, jacobian) in enumerate(zip(spreads, jacobians, strict=True)):
         at, (off, weight) = problem.places(i), weighed(left[i], spread)
+        gradient[at] -= jacobian.reshape(-1, len(at)).T @ (weight * off).reshape(-1)
+    return gradient, information(problem, left, spreads, jacobians)
+
+
+def information(
+    problem: Problem,
+    left: Sequence[FloatArray],
+    spreads: Sequence[Spread],
+    jacobians: Sequence[FloatArray],
+    power: int = 1,
+) -> FloatArray:
+    """What the data tell of the unknowns, (m, m), outliers counting by a power of their share.
+
+    With 1 the matrix by which the search goes; with 3 the curvature of the loss itself, by which
+    its minimum moves with the data; with 0 Fisher's information of noise without outliers.
+    """
+    found = np.zeros((problem.size, problem.size))
+    for i, (spread, jacobian) in enumerate(zip(spreads, jacobians, strict=True)):
+        at, (_, weight) = problem.places(i), weighed(left[i], spread, power)
         flat = jacobian.reshape(-1, len(at))
-        weighted = flat * weight.reshape(-1, 1)
-        gradient[at] -= weighted.T @ off.reshape(-1)
-        information[np.ix_(at, at)] += weighted.T @ flat
-    return gradient, information
+        found[np.ix_(at, at)] += (flat * weight.reshape(-1, 1)).T @ flat
+    return found
 
 
-def weighed(left: FloatArray, spread: Spread) -> tuple[FloatArray, FloatArray]:
+def weighed(left: FloatArray, spread: Spread, power: int = 1) -> tuple[FloatArray, FloatArray]:
     """A trial's residuals, zero where nothing was measured, and their weights: (n, c) each."""
     known = np.isfinite(left)
     off = np.where(known, left, 0.0)
     share = 1 / np.sqrt(1 + (off / (OUTLYING * spread.usual)) ** 2)
-    return off, np.where(known, share / spread.effective**2, 0.0)
+    return off, np.where(known, share**power / spread.effective**2, 0.0)
+
+
+def eliminated(information: FloatArray, p: int) -> FloatArray:
+    """What a matrix of information tells of the first p unknowns, the others unknown, (p, p)."""
+    own = information[p:, p:]
+    scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
+    across = information[:p, p:] / scale
+    solved = np.linalg.lstsq(own / np.outer(scale, scale), across.T, rcond=None)[0]
+    return np.asarray(information[:p, :p] - across @ solved)

@@ -7,9 +7,8 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
-from .least_squares import Spread
-
-LEAST_SHARE = 0.05  # of the usual noise: no sample is believed to have less
+LEAST_SHARE = 0.02  # of the usual noise: no sample is believed to have less
+FINEST_SHARE = 0.005  # the same when all that stays off was found
 SURE = 4.0  # standard errors: a smaller autocovariance is none
 LAGS = 5  # of which it is taken
 
@@ -19,67 +18,68 @@ class Noise:
     """Of one output: white noise, some of it in proportion to the output, and a slow part.
 
     A sample's variance is `white`^2 + (`relative` y)^2 + `slow`^2; the slow part stays off for
-    `slow_count` samples, so that so many of them count as one.
+    `slow_secs`, so that all the samples in so long count as one.
     """
 
     white: float
     relative: float
     slow: float
-    slow_count: float
+    slow_secs: float
 
-    def spread(self, level: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The effective and the usual std of samples of that level, (n,) each."""
+    def spread(self, level: FloatArray, interval_secs: float) -> tuple[FloatArray, FloatArray]:
+        """The effective and the usual std of samples of that level, (n,) each, so far apart."""
         white = self.white**2 + (self.relative * level) ** 2
-        effective = white + self.slow**2 * max(self.slow_count, 1.0)
-        return np.sqrt(effective), np.sqrt(white + self.slow**2)
+        together = max(self.slow_secs / interval_secs, 1.0)
+        return np.sqrt(white + self.slow**2 * together), np.sqrt(white + self.slow**2)
 
 
-def spreads_of(noises: Sequence[Noise], levels: Sequence[FloatArray]) -> list[Spread]:
-    """Of each trial, whose predicted outputs are `levels`, (n, c) each."""
-    found = []
-    for level in levels:
-        pairs = [noise.spread(level[:, c]) for c, noise in enumerate(noises)]
-        found.append(
-            Spread(np.column_stack([p[0] for p in pairs]), np.column_stack([p[1] for p in pairs]))
-        )
-    return found
+@dataclass(frozen=True, eq=False)
+class Left:
+    """What a fit leaves of one output of a trial, sample by sample as they were measured."""
+
+    off: FloatArray  # (k,)
+    level: FloatArray  # (k,) as predicted
+    interval_secs: float  # from sample to sample, as a rule
+
+    @classmethod
+    def of(cls, residual: FloatArray, level: FloatArray, dt: float) -> "Left":
+        """Of residuals on a clock, (n,), NaN where nothing was measured."""
+        at = np.flatnonzero(np.isfinite(residual))
+        return cls(residual[at], level[at], interval_secs(residual, dt))
+
+
+def interval_secs(values: FloatArray, dt: float) -> float:
+    """How far apart the known values of a column on a clock are as a rule."""
+    steps = np.diff(np.flatnonzero(np.isfinite(values)))
+    return float(np.median(steps)) * dt if len(steps) else dt
 
 
 def noise_of(
-    residuals: Sequence[FloatArray],
-    levels: Sequence[FloatArray],
-    *,
-    proportional: bool,
-    least: float,
+    every: Sequence[Left], *, proportional: bool, least: float, share: float = LEAST_SHARE
 ) -> Noise:
-    """The noise of one output, of its residuals over each trial and its levels, (n,) each.
+    """The noise of one output, of what is left of it in each trial.
 
     What changes from sample to sample is white; what stays is slow. `least` is a std below which
-    no instrument is believed.
+    no instrument is believed, nor is any sample to have less than a `share` of the usual.
     """
-    white, relative = _white(residuals, levels, proportional=proportional)
-    everywhere = np.concatenate(
-        [level[np.isfinite(r)] for r, level in zip(residuals, levels, strict=True)]
-    )
-    floor = max(
-        LEAST_SHARE * float(np.sqrt(np.mean(white**2 + (relative * everywhere) ** 2))), least
-    )
-    white = max(white, floor)
-    stds = [np.sqrt(white**2 + (relative * level) ** 2) for level in levels]
-    slow, count = _slow(residuals, stds)
-    return Noise(white, relative, slow, count)
+    white, relative = _white(every, proportional=proportional)
+    levels = np.concatenate([left.level for left in every])
+    usual = float(np.sqrt(np.mean(white**2 + (relative * levels) ** 2))) if len(levels) else 0.0
+    white = max(white, share * usual, least)
+    stds = [np.sqrt(white**2 + (relative * left.level) ** 2) for left in every]
+    slow, secs = _slow(every, stds)
+    return Noise(white, relative, slow, secs)
 
 
-def _white(
-    residuals: Sequence[FloatArray], levels: Sequence[FloatArray], *, proportional: bool
-) -> tuple[float, float]:
+def _white(every: Sequence[Left], *, proportional: bool) -> tuple[float, float]:
     """Of the differences of neighbours: the noise, and the noise in proportion.
 
     By likelihood, the variances being sums of squares: iterated least squares, never negative.
     """
-    steps = np.concatenate([np.diff(r) for r in residuals])
-    squares = np.concatenate([(y[1:] ** 2 + y[:-1] ** 2) / 2 for y in levels])
-    known = np.isfinite(steps) & np.isfinite(squares)
+    steps = np.concatenate([np.diff(left.off) for left in every])
+    pairs = [(left.level[1:] ** 2 + left.level[:-1] ** 2) / 2 for left in every]
+    squares = np.concatenate(pairs)
+    known = np.isfinite(squares)
     variances, squares = steps[known] ** 2 / 2, squares[known]
     if not len(variances):
         return 0.0, 0.0
@@ -108,31 +108,32 @@ def _line(x: FloatArray | None, y: FloatArray, weight: FloatArray) -> tuple[floa
     return mean_y - slope * mean_x, slope
 
 
-def _slow(residuals: Sequence[FloatArray], stds: Sequence[FloatArray]) -> tuple[float, float]:
-    """The std of the part that stays, and for how many samples it does."""
-    longest = max(len(r) for r in residuals) // 4
-    first = [_autocovariance(residuals, stds, lag) for lag in range(1, min(LAGS, longest) + 1)]
+def _slow(every: Sequence[Left], stds: Sequence[FloatArray]) -> tuple[float, float]:
+    """The std of the part that stays, and for how many seconds it does."""
+    step = max((left.interval_secs for left in every), default=1.0)
+    longest = max((len(left.off) * left.interval_secs for left in every), default=0.0) / 4
+    count = min(LAGS, int(longest / step + 1e-9))
+    first = [_autocovariance(every, stds, lag * step) for lag in range(1, count + 1)]
     if not first:
-        return 0.0, 1.0
+        return 0.0, step
     variance = float(np.mean([c for c, _ in first]))
     error = float(np.sqrt(np.mean([e**2 for _, e in first]) / len(first)))
     if variance < SURE * error:
-        return 0.0, 1.0
-    lag = 1
-    while lag < longest and _autocovariance(residuals, stds, lag)[0] > variance / np.e:
-        lag = max(lag + 1, int(lag * 1.1))
+        return 0.0, step
+    lag = step
+    while lag < longest and _autocovariance(every, stds, lag)[0] > variance / np.e:
+        lag = max(lag + step, lag * 1.1)
     return float(np.sqrt(variance)), 2.0 * lag
 
 
 def _autocovariance(
-    residuals: Sequence[FloatArray], stds: Sequence[FloatArray], lag: int
+    every: Sequence[Left], stds: Sequence[FloatArray], lag_secs: float
 ) -> tuple[float, float]:
     """At a lag, those sure of themselves counting for more; and its error if there is none."""
     total = weights = 0.0
-    for residual, std in zip(residuals, stds, strict=True):
+    for left, std in zip(every, stds, strict=True):
+        lag = max(1, round(lag_secs / left.interval_secs))
         weight = 1 / (std[lag:] * std[:-lag]) ** 2
-        product = residual[lag:] * residual[:-lag]
-        known = np.isfinite(product)
-        total += float(np.sum((weight * product)[known]))
-        weights += float(np.sum(weight[known]))
+        total += float(np.sum(weight * left.off[lag:] * left.off[:-lag]))
+        weights += float(np.sum(weight))
     return (total / weights, weights**-0.5) if weights > 0 else (0.0, 1.0)

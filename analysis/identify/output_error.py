@@ -13,10 +13,11 @@ import numpy as np
 from analysis.weak_form import LEAST_RUDDER
 from shiplog.errors import LogError, UsageError
 from shiplog.ships import Model
+from shiplog.ships.motion import OUTPUTS
 from shiplog.types import FloatArray
 
 from .least_squares import Minimum, Spread, minimise
-from .noise import Noise, noise_of, spreads_of
+from .noise import FINEST_SHARE, LEAST_SHARE, Left, Noise, interval_secs, noise_of
 from .problem import Nuisance, Problem, residuals
 from .start import starts
 from .trial import Trial, usual
@@ -26,6 +27,7 @@ USUAL_LENGTH = 150.0  # m, of a ship whose length nobody gave: its scale only
 LEAST_SPEED, LEAST_RPM = 0.1, 1.0  # m/s, rpm
 UNEXPLAINED = 0.2  # of what stays off: if a wave leaves more, it was none
 ROUNDS = 3
+GIVEN_UP = 1.5  # times what an output was off: noise that lets it grow so explains it away
 LEAST_STD = {  # of what any instrument is off
     "yaw_rate": radians(1e-5), "speed": 1e-4, "sway": 1e-4, "heading": radians(0.02)
 }  # fmt: skip
@@ -82,12 +84,15 @@ def pose(
     if not trials:
         raise UsageError("no trial to identify from; give at least one log")
     _require_steering(trials)
+    _require_turning(trials)
     values = model.starts()
     for name, value in {**(start or {}), **(known or {})}.items():
         values[model.names.index(model.parameter(name).name)] = value
     sought = {model.parameter(name).name for name in free}
     sought |= {p.name for p in model.parameters if not p.known}
     sought -= set(known or {})
+    if not sought:
+        raise UsageError(f"every parameter of {model.name} is known, and nothing is left to seek")
     speed, rpm = usual(trials, "speed"), usual(trials, "rpm")
     _require_way(trials, speed, rpm)
     scale = model.scale(length or USUAL_LENGTH, speed, rpm)
@@ -109,6 +114,18 @@ def _require_steering(trials: Sequence[Trial]) -> None:
         )
 
 
+def _require_turning(trials: Sequence[Trial]) -> None:
+    column = OUTPUTS.index("yaw_rate")
+    if not any(
+        trial.has("yaw_rate") and np.nanstd(trial.measured[:, column]) > 0 for trial in trials
+    ):
+        names = ", ".join(trial.name for trial in trials)
+        raise LogError(
+            f"the yaw rate never changes, and from that nothing can be identified; is the gyro "
+            f"stuck? {names}"
+        )
+
+
 def _require_way(trials: Sequence[Trial], speed: float, rpm: float) -> None:
     if not (speed > LEAST_SPEED and rpm > LEAST_RPM):
         names = ", ".join(trial.name for trial in trials)
@@ -118,53 +135,80 @@ def _require_way(trials: Sequence[Trial], speed: float, rpm: float) -> None:
         )
 
 
-def fit(problem: Problem, *, waves: bool = True) -> OutputError:
-    """The fit, its noise found from what it leaves."""
+def fit(problem: Problem, *, start: FloatArray | None = None, waves: bool = True) -> OutputError:
+    """The fit, its noise found from what it leaves; `start` is another beginning of the search."""
     spreads = first_spreads(problem)
     tried = []
-    for start in starts(problem, spreads):
-        tried.append(minimise(problem, start, spreads))
+    for begin in [start] if start is not None else starts(problem, spreads):
+        tried.append(minimise(problem, begin, spreads))
         if tried[-1].settled:
             break
     minimum = min(tried, key=lambda each: each.cost)
     if not np.isfinite(minimum.cost):
         raise LogError(
             f"the model {problem.model.name} runs away on these trials from every start tried; "
-            f"give --start or another model: {', '.join(t.name for t in problem.trials)}"
+            f"look at their signs and units, or fit another model: "
+            f"{', '.join(dict.fromkeys(t.name for t in problem.trials))}"
         )
-    calm = _settled(problem, minimum)
-    return _with_waves(calm) if waves else calm
+    calm = settled(problem, minimum)
+    return _refined(_with_waves(calm) if waves else calm)
 
 
-def _settled(problem: Problem, minimum: Minimum) -> OutputError:
-    """The fit and its noise, found in turn from a first fit."""
+def settled(problem: Problem, minimum: Minimum, share: float = LEAST_SHARE) -> OutputError:
+    """The fit and its noise, found in turn from a first fit.
+
+    Noise is found from what a fit leaves, and tells the next fit what to leave: where runs
+    contradict each other an output could so be given up to please another. There it ends before.
+    """
+    noises, spreads = noise_left(problem, minimum.unknowns, share)
+    off = _rms_left(problem, minimum)
     for _ in range(ROUNDS):
-        noises, spreads = noise_left(problem, minimum.unknowns)
-        minimum = minimise(problem, minimum.unknowns, spreads, minimum.jacobians)
+        after = minimise(problem, minimum.unknowns, spreads, minimum.jacobians)
+        if (_rms_left(problem, after) > GIVEN_UP * off).any():
+            break
+        minimum = after
+        noises, spreads = noise_left(problem, minimum.unknowns, share)
     return OutputError(problem, minimum, tuple(noises), tuple(spreads))
 
 
+def _refined(found: OutputError) -> OutputError:
+    """The fit with the quietest samples believed as far as they are quiet.
+
+    An instrument whose noise is in proportion says most when it says least; but where something
+    stays off, it is no noise of the instrument's.
+    """
+    fine = settled(found.problem, found.minimum, FINEST_SHARE)
+    stays = any(new.slow > old.slow for new, old in zip(fine.noises, found.noises, strict=True))
+    return found if stays else fine
+
+
+def _rms_left(problem: Problem, minimum: Minimum) -> FloatArray:
+    """(c,) of each output over all trials."""
+    left = np.concatenate(residuals(problem, minimum.unknowns))
+    return np.asarray(np.sqrt(np.nanmean(left**2, axis=0)))
+
+
 def _with_waves(calm: OutputError) -> OutputError:
-    """The fit with a wave in each trial, where that explains all that stays off."""
+    """The fit with a wave in each trial that has one, where they explain all that stays off."""
     problem = calm.problem
-    left = [np.asarray(r) for r in residuals(problem, calm.minimum.unknowns)]
+    left = residuals(problem, calm.minimum.unknowns)
     slow = [noise.slow for noise in calm.noises]
     found = [
         frequency_of(r, spread.usual, problem.trials[i].dt_secs, slow)
         for i, (r, spread) in enumerate(zip(left, calm.spreads, strict=True))
     ]
-    waves = tuple((omega,) for omega in found if omega is not None)
-    if len(waves) < len(found):
+    if not any(found):
         return calm
+    waves = tuple(() if omega is None else (omega,) for omega in found)
     with_waves = replace(problem, waves=waves)
     start = with_waves.start()
     start[: len(problem.free)] = calm.minimum.unknowns[: len(problem.free)]
     for i in range(len(problem.trials)):
         own, old = with_waves.own_slice(i), calm.minimum.unknowns[problem.own_slice(i)]
         start[own.start : own.start + len(old)] = old
-    wavy = _settled(with_waves, minimise(with_waves, start, calm.spreads))
+    wavy = settled(with_waves, minimise(with_waves, start, calm.spreads))
     explained = all(
-        new.slow**2 * new.slow_count <= UNEXPLAINED * old.slow**2 * old.slow_count
+        new.slow**2 * new.slow_secs <= UNEXPLAINED * old.slow**2 * old.slow_secs
         for new, old in zip(wavy.noises, calm.noises, strict=True)
     )
     return wavy if explained else calm
@@ -183,16 +227,28 @@ def first_spreads(problem: Problem) -> list[Spread]:
     ]
 
 
-def noise_left(problem: Problem, z: FloatArray) -> tuple[list[Noise], list[Spread]]:
-    """The noise of each output, and the spread of each trial's residuals."""
-    count = range(len(problem.trials))
-    levels = [problem.predicted(z, i) for i in count]
-    left = [problem.measured(i) - levels[i] for i in count]
+def noise_left(
+    problem: Problem, z: FloatArray, share: float = LEAST_SHARE
+) -> tuple[list[Noise], list[Spread]]:
+    """The noise of each output, and the spread of each trial's residuals; `share` as `noise_of`."""
+    trials = range(len(problem.trials))
+    levels = [problem.predicted(z, i) for i in trials]
+    off = [problem.measured(i) - levels[i] for i in trials]
     noises = [
         noise_of(
-            [r[:, c] for r in left], [y[:, c] for y in levels],
-            proportional=output != "heading", least=LEAST_STD[output],
+            [Left.of(off[i][:, c], levels[i][:, c], problem.trials[i].dt_secs) for i in trials],
+            proportional=output != "heading", least=LEAST_STD[output], share=share,
         )
         for c, output in enumerate(problem.outputs)
     ]  # fmt: skip
-    return noises, spreads_of(noises, levels)
+    return noises, [_spread(problem, i, noises, levels[i]) for i in trials]
+
+
+def _spread(problem: Problem, i: int, noises: Sequence[Noise], level: FloatArray) -> Spread:
+    """Of a trial whose predicted outputs are `level`, (n, c)."""
+    measured, dt = problem.measured(i), problem.trials[i].dt_secs
+    pairs = [
+        noise.spread(level[:, c], interval_secs(measured[:, c], dt))
+        for c, noise in enumerate(noises)
+    ]
+    return Spread(np.column_stack([p[0] for p in pairs]), np.column_stack([p[1] for p in pairs]))

@@ -12,7 +12,6 @@ from shiplog.types import FloatArray, Signals
 
 from .least_squares import minimise
 from .output_error import OutputError, first_spreads
-from .problem import Problem
 from .trial import Trial
 
 JUDGED = ("yaw_rate", "speed", "heading")  # every model predicts them
@@ -81,20 +80,25 @@ def made_good(outputs: FloatArray, dt: float) -> FloatArray:
     return np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
 
 
-def turn(outputs: FloatArray, positions: FloatArray, rudder: FloatArray, dt: float) -> Turn:
+def turn(
+    outputs: FloatArray, positions: FloatArray, rudder: FloatArray, dt: float, *,
+    course: float | None = None,
+) -> Turn:  # fmt: skip
     """The figures of a turning circle that begins with the first sample.
 
-    `outputs` are (n, 4), `positions` (n, 2) in m, `rudder` (n,). Source: IMO MSC.137(76).
+    `outputs` are (n, 4), `positions` (n, 2) in m, `rudder` (n,); `course`, in rad, is the first
+    one where a single sample of the heading is too noisy for it. Source: IMO MSC.137(76).
     """
     over = np.flatnonzero(np.abs(rudder) > HARD_OVER * np.max(np.abs(rudder)))
     side = float(np.sign(np.median(rudder[over])))
     held = over[len(over) // 2 :]
     heading = outputs[:, 3]
-    turned = side * (heading - heading[0])
-    first = np.array([np.cos(heading[0]), np.sin(heading[0])])
+    begun = float(heading[0]) if course is None else course
+    turned = side * (heading - begun)
+    first = np.array([np.cos(begun), np.sin(begun)])
     across = side * np.array([-first[1], first[0]])
     off = positions - positions[0]
-    at_90, at_180 = _reached(turned, pi / 2), _reached(turned, pi)
+    at_90, at_180 = reached(turned, pi / 2), reached(turned, pi)
     index = np.arange(len(turned))
     along, aside = off @ first, off @ across
     speed = np.hypot(outputs[:, 1], np.nan_to_num(outputs[:, 2]))
@@ -109,7 +113,7 @@ def turn(outputs: FloatArray, positions: FloatArray, rudder: FloatArray, dt: flo
     )
 
 
-def _reached(turned: FloatArray, angle: float) -> float:
+def reached(turned: FloatArray, angle: float) -> float:
     """The index, with its fraction, at which an angle is first reached; NaN if it never is."""
     beyond = np.flatnonzero(turned >= angle)
     if not len(beyond) or beyond[0] == 0:
@@ -165,13 +169,3 @@ def _overshoots(heading: FloatArray, executes: Sequence[int], switch: float) -> 
             for start, end in zip(executes, ends, strict=False)
         ]
     )
-
-
-def problem_without(fit: OutputError, left_out: int) -> tuple[Problem, FloatArray]:
-    """A fit's problem without one of its runs, and where its search begins: where the fit is."""
-    problem, z = fit.problem, fit.minimum.unknowns
-    kept = [i for i in range(len(problem.trials)) if i != left_out]
-    waves = tuple(problem.waves[i] for i in kept) if problem.waves else ()
-    rest = replace(problem, trials=tuple(problem.trials[i] for i in kept), waves=waves)
-    own = [z[problem.own_slice(i)] for i in kept]
-    return rest, np.concatenate([z[: len(problem.free)], *own])

@@ -1,7 +1,7 @@
 """What is sought: a model's parameters, and of each trial what it has of its own."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, pi, radians
 from types import MappingProxyType
@@ -89,6 +89,21 @@ class Problem:
 
     def _waves(self, i: int) -> tuple[float, ...]:
         return self.waves[i] if self.waves else ()
+
+    @cached_property
+    def runs(self) -> tuple[tuple[int, ...], ...]:
+        """Which trials are pieces of one log, log by log."""
+        names = [trial.name for trial in self.trials]
+        return tuple(
+            tuple(i for i, each in enumerate(names) if each == name)
+            for name in dict.fromkeys(names)
+        )
+
+    def of_trials(self, kept: Sequence[int], z: FloatArray) -> tuple["Problem", FloatArray]:
+        """The same of some of the trials, and the unknowns `z` as far as they are its own."""
+        waves = tuple(self.waves[i] for i in kept) if self.waves else ()
+        rest = replace(self, trials=tuple(self.trials[i] for i in kept), waves=waves)
+        return rest, np.concatenate([z[: len(self.free)], *(z[self.own_slice(i)] for i in kept)])
 
     @property
     def size(self) -> int:

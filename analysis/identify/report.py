@@ -12,9 +12,11 @@ from shiplog.ships.motion import OUTPUTS
 from shiplog.units import CATALOGUE, factor
 
 from .choice import JUDGED_COLUMNS, Candidate
+from .courses import OFF
 from .identified import IdentifiedShip
 from .validation import Figure, Validation
 
+FITTED = "output error"
 PEOPLES = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}
 ALIKE, MOST_PAIRS = 0.97, 3  # of correlations that are told
 UNIT = {name: CATALOGUE[name].unit for name in OUTPUTS} | {"track": "m"}
@@ -22,7 +24,7 @@ UNIT = {name: CATALOGUE[name].unit for name in OUTPUTS} | {"track": "m"}
 
 def sections(found: IdentifiedShip) -> tuple[Section, ...]:
     """Tables in the units people use, and what is to be said of them."""
-    made = [_coefficients(found), _runs(found)]
+    made = [_coefficients(found), _echoes(found), _runs(found)]
     if found.validations:
         made += [_held_out(found), *(_figures(v) for v in found.validations if v.figures)]
     if found.candidates:
@@ -45,8 +47,9 @@ def _comparison(found: IdentifiedShip) -> Section:
         )
     columns = ("model", "sought", "score [%]", *(f"{OUTPUTS[i]} [%]" for i in JUDGED_COLUMNS))
     remark = (
-        "Each run in turn is predicted by a fit to the others: the rms of what is off over the "
-        "standard deviation of what was measured. The least is taken."
+        "Each run in turn is predicted by a fit to the others, which know nothing of it but where "
+        "it began, its rudder's zero and its gyro's bias: the rms of what is off over the standard "
+        "deviation of what was measured. The least is taken."
     )
     title = f"Models by cross-validation: {found.model.name}"
     return Section(title, columns, tuple(rows), (remark,))
@@ -61,7 +64,7 @@ def _coefficients(found: IdentifiedShip) -> Section:
     told, rows = found.uncertainty, []
     for i, name in enumerate(told.names):
         value, half, bound = told.values[i], 1.96 * told.std[i], 1.96 * told.bound[i]
-        share = f"{100 * told.prior_share[i]:.0f} %"
+        share = _percent(told.prior_share[i])
         unit = found.model.parameter(name).unit
         if name in told.vague:
             rows.append((name, "not identifiable", "", "", share, unit))
@@ -113,6 +116,34 @@ def _by_advice(found: IdentifiedShip) -> dict[str, list[str]]:
     for name, text in found.advice.items():
         grouped.setdefault(text, []).append(name)
     return grouped
+
+
+def _echoes(found: IdentifiedShip) -> Section:
+    """How much of each coefficient is prior, by each method that begins with one."""
+    by_method = _echoes_by_method(found)
+    rows = tuple(
+        (name, *(_percent(shares.get(name, np.nan)) for shares in by_method.values()))
+        for name in found.uncertainty.names
+    )
+    remark = (
+        "How much of a value is what was believed before, by a second run from other beliefs: the "
+        "fit from priors a standard deviation off and a start elsewhere, the other methods from "
+        f"priors to either side, {100 * OFF:.0f} % off or more, over the latter half of the runs. "
+        "100 % is a copy of the prior; beyond it errors grow."
+    )
+    return Section("Echo of what was believed before", ("coefficient", *by_method), rows, (remark,))
+
+
+def _echoes_by_method(found: IdentifiedShip) -> dict[str, dict[str, float]]:
+    told = {FITTED: dict(zip(found.uncertainty.names, found.uncertainty.prior_share, strict=True))}
+    for courses in found.courses:
+        if len(courses.priors) > 1:
+            told[courses.method] = dict(zip(courses.names, courses.usual_echo, strict=True))
+    return told
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if isfinite(share) else ""
 
 
 def _runs(found: IdentifiedShip) -> Section:
@@ -197,10 +228,21 @@ def as_json(found: IdentifiedShip) -> dict[str, Any]:
             name: _coefficient(found, i) for i, name in enumerate(told.names)
         },
         "known": dict(found.known),
+        "echo": {
+            method: {name: float(share) for name, share in shares.items()}
+            for method, shares in _echoes_by_method(found).items()
+        },
         "covariance": {"of": list(told.names), "values": told.covariance.tolist()},
         "correlation": told.correlation.tolist(),
         "condition": told.condition,
         "enlarged": told.enlarged,
+        "agreement": {
+            "logs": list(told.agreement.names),
+            "by_own_noise": list(told.agreement.by_own_noise),
+            "by_noise_of_all": list(told.agreement.by_noise_of_all),
+            "contradiction": told.agreement.contradiction,
+            "odd": told.agreement.odd,
+        },
         "ties": None if found.ties is None else {
             "sum_over_d": found.ties.sum_over_d,
             "std": found.ties.std,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 
@@ -59,6 +60,42 @@ def run_of(log: Log) -> Run:
     )  # fmt: skip
 
 
+def distinct_runs(logs: Sequence[Log], held_out: Sequence[Log]) -> tuple[list[Run], list[Run]]:
+    """Logs to fit and logs to predict as runs, each of a name and of data of its own.
+
+    Raises `UsageError` for data that are given twice: they would be believed twice, or prove
+    themselves.
+    """
+    runs: list[Run] = []
+    for log in (*logs, *held_out):
+        run = run_of(log)
+        for other in runs:
+            if _same(run, other):
+                raise UsageError(
+                    f"the same data twice, leave one of the logs out: {other.name}, {run.name}"
+                )
+        names = {other.name for other in runs}
+        number = next(k for k in count(1) if _numbered(run.name, k) not in names)
+        runs.append(_renamed(run, _numbered(run.name, number)))
+    return runs[: len(logs)], runs[len(logs) :]
+
+
+def _same(run: Run, other: Run) -> bool:
+    return len(run.trials) == len(other.trials) and all(
+        np.array_equal(a.measured, b.measured, equal_nan=True)
+        for a, b in zip(run.trials, other.trials, strict=True)
+    )
+
+
+def _numbered(name: str, number: int) -> str:
+    """The name, of a second log of that name with a number behind it."""
+    return name if number == 1 else f"{name} ({number})"
+
+
+def _renamed(run: Run, name: str) -> Run:
+    return replace(run, name=name, trials=tuple(replace(t, name=name) for t in run.trials))
+
+
 def _doubts(log: Log, found: Survey) -> Iterator[str]:
     also = tuple(name for name in ("heading", "position") if name in found)
     yield from faults(found, (*NEEDED, *also))
@@ -104,8 +141,11 @@ def ship_of(runs: Sequence[Run], given: Vessel | None) -> Vessel | None:
 
 
 def _bare(vessel: Vessel) -> Vessel:
-    """Her model and gear: how a log of hers is filtered may differ."""
-    return replace(vessel, filter=FilterSettings(), disturbance=DisturbanceSettings())
+    """Her model, length and gear: how she is called, sailed and filtered may differ."""
+    return replace(
+        vessel, name="", approach_rpm=1.0, angle_unit="rad",
+        filter=FilterSettings(), disturbance=DisturbanceSettings(),
+    )  # fmt: skip
 
 
 def contradictions(runs: Sequence[Run]) -> Iterator[str]:

@@ -2,7 +2,9 @@
 
 The ship begins as the run began, and then hears of nothing but rudder and revolutions. Figures
 count from the instant at which the rudder leaves its rest by `OFF_REST`, in the measured run and in
-the simulated one alike: other rules change an advance by some per cent.
+the simulated one alike: other rules change an advance by some per cent. Headings count from their
+mean before it. Only zig-zags and circles have figures, and a run shows by its rudder and its
+heading which it is.
 """
 
 from collections.abc import Iterator
@@ -10,22 +12,36 @@ from dataclasses import dataclass, fields
 from math import pi, radians
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.signal import savgol_filter
 
 from shiplog.ships.motion import OUTPUTS
 from shiplog.types import FloatArray
 
 from .output_error import OutputError
-from .prediction import Turn, made_good, predict, turn
+from .prediction import Turn, made_good, predict, reached, turn
 from .runs import Run
 from .trial import Trial
 
 OFF_REST = radians(0.5)
 REST_SECS = 3.0  # of a run, over which the rudder's rest is what it mostly is
+LEAST_RUDDER = 4 * OFF_REST  # what is less is no order
+SPIKE_SECS = 3.0  # of the rudder: what is shorter is none of hers
 CIRCLE = pi / 2  # turned to one side: less is no circle
+SOON = CIRCLE / 2  # turned by then, a circle's rudder is where it stays
 REVERSED = 0.5  # of the greatest rudder, passed on either side: a zig-zag,
-HELD = 0.9  # in which so much of it is the rudder ordered
-SWITCH = radians(1.0)  # a zig-zag's heading is a whole number of these
+HELD = 0.9  # in which so much of it is the rudder ordered, most of the time
+ONE_ANGLE = radians(1.5), 0.1  # as near to it a rudder is the same, in rad or as a share
+LIKE_SECS = 2.0  # beyond twice as long, a rudder's way over has been halted
+USUAL_SWITCH, SWITCH = radians(5.0), radians(1.0)  # a zig-zag's heading is a multiple of one,
+SWITCH_LATE = radians(2.0)  # by less than which she is reversed late,
+SWITCH_OFF = radians(2.0)  # and by less than which all reversals are alike, but for noise
+COURSE_SECS = 30.0  # before the rudder moves, over which the first course is a mean
+SMOOTH = 1 / 6  # of the time a ship takes from side to side, before and after: a heading is smooth
 MOST_OVERSHOOTS = 4
+FIXES_SECS = 5.0, 60.0  # of fixes before the rudder moves, at least and at most, tell a course
+ASTRAY = 0.03  # of their length, off the way sailed: more is no course
 FIGURES = {
     "advance": ("advance", "m"),
     "transfer": ("transfer", "m"),
@@ -78,34 +94,61 @@ def validate(fit: OutputError, run: Run) -> list[Validation]:
 
 
 def _validation(fit: OutputError, trial: Trial, fixes: FloatArray | None) -> Validation:
-    measured = known_throughout(trial)
+    course = 0.0 if fixes is None or trial.has("heading") else first_course(trial, fixes)
+    if course is None:  # the fixes are north and east of a ship that headed nobody knows where
+        course, fixes = 0.0, None
+    measured = known_throughout(trial, course)
     simulated = predict(fit, _headed(trial, measured))
-    track = made_good(simulated, trial.dt_secs)
-    sailed = made_good(measured, trial.dt_secs) if fixes is None else _from_start(fixes)
+    track, sailed = made_good(simulated, trial.dt_secs), made_good(measured, trial.dt_secs)
+    if fixes is not None:
+        sailed = _from_first_fix(fixes, sailed if np.isnan(track).any() else track)
     off = simulated - trial.measured
     predicted = (*fit.problem.model.outputs, "heading")
     rms = {
-        name: _rms(off[:, i])
+        name: rms_of(off[:, i])
         for i, name in enumerate(OUTPUTS)
         if trial.has(name) and name in predicted
     }
-    rms["track"] = _rms(np.hypot(*(track - sailed).T))
+    rms["track"] = rms_of(np.hypot(*(track - sailed).T))
     figures = tuple(_figures(trial, measured, sailed, simulated, track))
     return Validation(trial, simulated, track, sailed, rms, figures)
 
 
-def known_throughout(trial: Trial) -> FloatArray:
-    """What was measured, its holes bridged; a heading nobody measured is the turning summed up."""
-    columns = [_bridged(column) for column in trial.measured.T]
+def known_throughout(trial: Trial, course: float = 0.0) -> FloatArray:
+    """What was measured, its holes filled in.
+
+    A heading nobody measured is the turning summed up, from the `course` she began on.
+    """
+    columns = [_filled_in(column) for column in trial.measured.T]
     if not trial.has("heading"):
         rate = columns[0]
-        columns[3] = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2)) * trial.dt_secs
+        turned = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2)) * trial.dt_secs
+        columns[3] = course + turned
     return np.column_stack(columns)
 
 
-def _bridged(values: FloatArray) -> FloatArray:
+def _filled_in(values: FloatArray) -> FloatArray:
     at = np.flatnonzero(np.isfinite(values))
     return np.interp(np.arange(len(values)), at, values[at]) if len(at) > 1 else 0.0 * values
+
+
+def first_course(trial: Trial, fixes: FloatArray) -> float | None:
+    """The course a ship without heading began on, in rad: that which lays her way on the fixes.
+
+    Only those before the rudder moves are looked at, for in a turn she drifts. None where they are
+    too few, or where no course lays one on the other.
+    """
+    order = first_order(trial.signals["rudder"], trial.dt_secs)
+    least, most = (round(secs / trial.dt_secs) for secs in FIXES_SECS)
+    before = len(trial) if order is None else order + 1
+    known = np.flatnonzero(np.isfinite(fixes[:before]).all(axis=1))[:most]
+    if len(known) <= least:
+        return None
+    sailed = made_good(known_throughout(trial), trial.dt_secs)[known]
+    way, seen = ((each - each.mean(axis=0)) @ [1, 1j] for each in (sailed, fixes[known]))
+    course = float(np.angle(np.vdot(way, seen)))
+    off = rms_of(np.abs(way * np.exp(1j * course) - seen))
+    return course if off < ASTRAY * abs(way[-1] - way[0]) else None
 
 
 def _headed(trial: Trial, measured: FloatArray) -> Trial:
@@ -117,14 +160,29 @@ def _headed(trial: Trial, measured: FloatArray) -> Trial:
     return Trial(trial.name, trial.signals, trial.path, given)
 
 
-def _from_start(fixes: FloatArray) -> FloatArray:
-    known = fixes[np.isfinite(fixes).all(axis=1)]
-    return fixes - known[0] if len(known) else fixes
+def _from_first_fix(fixes: FloatArray, track: FloatArray) -> FloatArray:
+    """The fixes laid on a track at the first of them, which need not be where the run begins."""
+    known = np.flatnonzero(np.isfinite(fixes).all(axis=1))
+    return fixes - fixes[known[0]] + track[known[0]] if len(known) else fixes
 
 
-def _rms(off: FloatArray) -> float:
+def rms_of(off: FloatArray) -> float:
+    """The root of the mean square of what is known; NaN where nothing is."""
     known = off[np.isfinite(off)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+
+
+def first_order(rudder: FloatArray, dt: float) -> int | None:
+    """The last sample before the rudder first leaves its rest; None where it never does."""
+    rest = float(np.median(rudder[: max(1, round(REST_SECS / dt))]))
+    hard = np.flatnonzero(np.abs(rudder - rest) > LEAST_RUDDER)
+    if not len(hard):
+        return None
+    resting = np.flatnonzero(np.abs(rudder[: hard[0] + 1] - rest) <= OFF_REST)
+    return int(resting[-1]) if len(resting) else 0
+
+
+# ---- figures
 
 
 def _figures(
@@ -134,84 +192,176 @@ def _figures(
     simulated: FloatArray,
     track: FloatArray,
 ) -> Iterator[Figure]:
-    rudder, dt = trial.signals["rudder"], trial.dt_secs
+    dt = trial.dt_secs
+    rudder = median_filter(trial.signals["rudder"], 1 + 2 * round(SPIKE_SECS / 2 / dt))
     order = first_order(rudder, dt)
     if order is None or not np.isfinite(simulated).all():
         return
-    rudder = rudder[order:]
-    turned = measured[order:, 3] - measured[order, 3]
-    reverses = _reverses(rudder)
-    if len(reverses) > 1:
-        yield from _zigzag(reverses, measured[order:, 3], simulated[order:, 3], dt)
-    elif np.max(np.abs(turned)) > CIRCLE:
-        pair = [
-            turn(outputs[order:], positions[order:], rudder, dt)
-            for outputs, positions in ((measured, sailed), (simulated, track))
-        ]
-        yield from _circle(*pair)
+    holds = _holds(rudder, order)
+    if _is_zigzag(rudder, order, holds, dt):
+        yield from _zigzag(order, holds, (measured[:, 3], simulated[:, 3]), dt)
+        return
+    until, half = _turn_held(rudder, order, measured[:, 3])
+    if until:
+        yield from _circle(
+            *(
+                _turn(outputs[:until], positions[:until], rudder[:until], order, half, dt)
+                for outputs, positions in ((measured, sailed), (simulated, track))
+            )
+        )
 
 
-def first_order(rudder: FloatArray, dt: float) -> int | None:
-    """The last sample before the rudder first leaves its rest; None where it never does."""
-    rest = float(np.median(rudder[: max(1, round(REST_SECS / dt))]))
-    hard = np.flatnonzero(np.abs(rudder - rest) > 4 * OFF_REST)
-    if not len(hard):
-        return None
-    resting = np.flatnonzero(np.abs(rudder[: hard[0] + 1] - rest) <= OFF_REST)
-    return int(resting[-1]) if len(resting) else 0
+def _smoothed(heading: FloatArray, half: int) -> FloatArray:
+    """By a parabola through so many samples before and after each: an extreme keeps its height."""
+    return savgol_filter(heading, 1 + 2 * max(1, half), 2)
+
+
+def _before(heading: FloatArray, order: int, dt: float) -> float:
+    """The mean of a heading before the rudder moves."""
+    return float(np.mean(heading[max(0, order - round(COURSE_SECS / dt)) : order + 1]))
+
+
+def _near(values: FloatArray, angle: float) -> NDArray[np.bool_]:
+    """Which of some rudders are one angle."""
+    within, share = ONE_ANGLE
+    return np.asarray(np.abs(values - angle) <= max(within, share * abs(angle)))
+
+
+# ---- circles
+
+
+def _turn_held(rudder: FloatArray, order: int, heading: FloatArray) -> tuple[int, int]:
+    """Until which sample the rudder is held over in a circle, and how many make its heading smooth.
+
+    Zeros where it is not held, at one angle and to one side, for `CIRCLE`.
+    """
+    turned = np.abs(heading[order:] - heading[order])
+    if np.max(turned) < CIRCLE:
+        return 0, 0
+    rudder, quarter = rudder[order:], int(np.argmax(turned >= CIRCLE))
+    angle = float(np.median(rudder[quarter // 2 : quarter + 1]))
+    held = _near(rudder, angle)
+    first = int(np.argmax(held))
+    loose = first + np.flatnonzero(~held[first:])
+    until = int(loose[0]) if len(loose) else len(rudder)
+    way_over = rudder[: first + 1] * np.sign(angle)
+    came_back = np.max(np.maximum.accumulate(way_over) - way_over) > LEAST_RUDDER
+    if until <= quarter or turned[first] > SOON or came_back or abs(angle) < LEAST_RUDDER:
+        return 0, 0
+    return order + until, round(SMOOTH * quarter)
+
+
+def _turn(
+    outputs: FloatArray, positions: FloatArray, rudder: FloatArray, order: int, half: int, dt: float
+) -> Turn:
+    heading = _smoothed(outputs[:, 3], half)
+    smooth = np.column_stack((outputs[:, :3], heading))[order:]
+    return turn(smooth, positions[order:], rudder[order:], dt, course=_before(heading, order, dt))
 
 
 def _circle(measured: Turn, simulated: Turn) -> Iterator[Figure]:
+    """The figures that were measured: none of a track that is not known where the turn began."""
     for each in fields(Turn):
         name, unit = FIGURES[each.name]
-        yield Figure(name, unit, getattr(measured, each.name), getattr(simulated, each.name))
+        figure = Figure(name, unit, getattr(measured, each.name), getattr(simulated, each.name))
+        if np.isfinite(figure.measured):
+            yield figure
 
 
-def _reverses(rudder: FloatArray) -> list[int]:
-    """The samples at which the rudder was ordered over to the other side."""
-    greatest = float(np.max(np.abs(rudder)))
-    over = np.flatnonzero(np.abs(rudder) > REVERSED * greatest)
-    sides = np.sign(rudder[over])
-    held = np.flatnonzero(np.abs(rudder) > HELD * greatest)
-    found = [held[held <= over[k]] for k in np.flatnonzero(np.diff(sides) != 0)]
-    return [int(before[-1]) for before in found if len(before)]
+# ---- zig-zags
+
+
+def _holds(rudder: FloatArray, order: int) -> list[tuple[int, int]]:
+    """From which sample to which the rudder is held over to one side, to the other, and so on."""
+    size = np.abs(rudder)
+    over = order + np.flatnonzero(size[order:] > REVERSED * np.max(size[order:]))
+    sides = np.split(over, np.flatnonzero(np.diff(np.sign(rudder[over]))) + 1)
+    return [_hold(size, side) for side in sides]
+
+
+def _hold(size: FloatArray, over: NDArray[np.int64]) -> tuple[int, int]:
+    held = over[size[over] > HELD * np.max(size[over])]
+    angle = np.sort(size[held])[len(held) // 2]
+    return int(held[0]), int(held[np.abs(size[held] - angle) <= OFF_REST][-1])
+
+
+def _is_zigzag(rudder: FloatArray, order: int, holds: list[tuple[int, int]], dt: float) -> bool:
+    """Whether it goes straight from one angle to the same on the other side, twice or more.
+
+    The last hold may be cut short by the run's end.
+    """
+    parts = [np.abs(rudder[first : last + 1]) for first, last in holds]
+    if len(parts) < 3:
+        return False
+    levels = np.array([np.median(part) for part in parts])
+    angle = float(np.max(levels[:-1]) + np.min(levels[:-1])) / 2  # a rudder's zero may be off
+    held = all(
+        np.mean(_near(part, level)) > HELD for part, level in zip(parts, levels, strict=True)
+    )
+    ways = np.diff(np.array([order, *np.ravel(holds)]))[::2] * dt
+    straight = np.max(ways) <= 2 * np.min(ways[1:]) + LIKE_SECS
+    return bool(
+        held and straight and np.all(_near(levels[:-1], angle)) and levels[-1] < angle / HELD
+    )
 
 
 def _zigzag(
-    reverses: list[int], measured: FloatArray, simulated: FloatArray, dt: float
+    order: int, holds: list[tuple[int, int]], headings: tuple[FloatArray, FloatArray], dt: float
 ) -> Iterator[Figure]:
-    """Overshoots beyond the heading at which the rudder is ordered over, and the period."""
-    both = [heading - heading[0] for heading in (measured, simulated)]
-    switch = _switch(both[0], reverses)
-    ends = [*reverses[1:], len(measured)]
-    for number, (start, end) in enumerate(zip(reverses, ends, strict=True)):
-        if number == MOST_OVERSHOOTS:
-            break
-        side = float(np.sign(both[0][start]))
-        beyond = [_beyond(side * heading[start:end], switch) for heading in both]
+    """Initial turning time, overshoots beyond the heading at which she is reversed, and period."""
+    executes = [last for _, last in holds[:-1]]
+    half = round(SMOOTH * float(np.min(np.diff(executes))))
+    smooth = [_smoothed(heading, half) for heading in headings]
+    both = [
+        each - _before(heading, order, dt) for each, heading in zip(smooth, headings, strict=True)
+    ]
+    switch = _switch(both[0][executes], float(np.std(headings[0] - smooth[0])))
+    if switch is None:
+        return
+    sides = np.sign(both[0][executes])
+    reaches = [reached(sides[0] * off[order:], switch) * dt for off in both]
+    yield Figure("initial turning time", "s", *reaches)
+    ends = [*executes[1:], holds[-1][1] + 1]
+    spans = list(zip(sides, executes, ends, strict=True))[:MOST_OVERSHOOTS]
+    for number, (side, start, end) in enumerate(spans):
+        beyond = [_beyond(side * off[start:end], switch) for off in both]
         if all(np.isfinite(beyond)):
             yield Figure(f"overshoot {number + 1}", "rad", *beyond)
-    periods = [_period(heading) * dt for heading in both]
+    periods = [_period(off[order : ends[-1]], switch) * dt for off in both]
     if np.isfinite(periods[0]):
         yield Figure("period", "s", *periods)
 
 
-def _switch(heading: FloatArray, reverses: list[int]) -> float:
-    """The heading at which the rudder was ordered over, a whole number of `SWITCH`."""
-    there = [abs(heading[k]) for k in reverses]
-    return float(np.round(np.median(there) / SWITCH) * SWITCH)
+def _switch(there: FloatArray, noise: float) -> float | None:
+    """The heading at which the rudder was to be reversed; None where there is not one.
+
+    `there` is each heading at which it was. A rudder is late rather than early: the heading meant
+    is the multiple of `USUAL_SWITCH` just passed, or else the nearest of `SWITCH`.
+    """
+    usual = float(np.median(np.abs(there)))
+    switch = float(np.floor((usual + SWITCH) / USUAL_SWITCH) * USUAL_SWITCH)
+    if switch == 0 or usual - switch > SWITCH_LATE:
+        switch = float(np.round(usual / SWITCH) * SWITCH)
+    by_turns = np.all(there[1:] * there[:-1] < 0)
+    alike = np.all(np.abs(np.abs(there) - usual) < SWITCH_OFF + noise)
+    return switch if switch and by_turns and alike else None
 
 
 def _beyond(heading: FloatArray, switch: float) -> float:
     """How far a heading goes on beyond the switch; NaN where it has not come back by the end."""
-    k = int(np.argmax(heading))
-    came_back = k < len(heading) - 1
-    return float(heading[k]) - switch if came_back else np.nan
+    greatest = float(np.max(heading))
+    return greatest - switch if heading[-1] < greatest - OFF_REST else np.nan
 
 
-def _period(heading: FloatArray) -> float:
-    """In samples, between like crossings of the first course; NaN with fewer than two."""
-    signs = np.sign(heading)
-    at = np.flatnonzero((signs[:-1] < 0) & (signs[1:] >= 0) | (signs[:-1] > 0) & (signs[1:] <= 0))
-    away = [int(k) for k in at if np.max(np.abs(heading[: k + 1])) > OFF_REST]
-    return float(np.mean(np.diff(away))) * 2 if len(away) > 1 else np.nan
+def _period(off: FloatArray, switch: float) -> float:
+    """In samples, between like crossings of the first course; NaN with fewer than three in all.
+
+    To cross it is to come from half the switch on one side to as much on the other: noise does not.
+    """
+    far = np.flatnonzero(np.abs(off) > switch / 2)
+    side = np.sign(off[far])
+    at = [
+        far[k] + reached(-side[k] * off[far[k] : far[k + 1] + 1], 0.0)
+        for k in np.flatnonzero(np.diff(side))
+    ]
+    return float(np.mean(np.subtract(at[2:], at[:-2]))) if len(at) > 2 else np.nan

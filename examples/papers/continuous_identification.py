@@ -1,12 +1,12 @@
 """Burylin: continuous identification of a nonlinear vessel model, printed against computed.
 
-The paper's filter and its least squares over a sliding window are written out here as it has them;
-beside them stands what shiplog does, the equations in weak form.
+The paper's filter and its least squares over a sliding window as it has them
+(`analysis.identify.papers_scheme`), and what shiplog does, the equations in weak form.
 
     python examples/papers/continuous_identification.py > docs/papers_continuous_identification.md
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 from math import pi
@@ -16,13 +16,21 @@ import numpy as np
 from printed import AMBER, BLUE, GREEN, GREY, RED, Row, grid, number, page, picture, say, table
 from scipy.integrate import solve_ivp
 
-from analysis.design.discrete import discretise
 from analysis.design.pseudo_input import (
     printed_input_matrix,
     pseudo_input_matrices,
     pseudo_inputs,
 )
 from analysis.identification import identify
+from analysis.identify.papers_scheme import (
+    STRIDE_SECS,
+    Q,
+    R,
+    papers_states,
+    regression,
+    solved,
+    windowed,
+)
 from analysis.sliding import History
 from analysis.weak_form import weak_form
 from recorders.manoeuvres import manoeuvre
@@ -30,25 +38,21 @@ from recorders.sensors import suite
 from recorders.simulate import SimulatedTrial, simulate
 from recorders.voyage import sail
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
-from shiplog.compiled import compiled
 from shiplog.ship import (
     SURGE_COEFFICIENTS,
     YAW_COEFFICIENTS,
     Coefficients,
-    rudder_effect,
-    rudder_effect_rate,
     rudder_effects,
     steady_speed,
     surge_acceleration,
     yaw_acceleration_rate,
-    yaw_stiffness,
 )
 from shiplog.types import FloatArray
 
 DEG = pi / 180
 NAMES = (*YAW_COEFFICIENTS, *SURGE_COEFFICIENTS)
-Q, R, P0, P_SECS = 0.01, 400.0, 10.0, 378.0
-DURATION, DT, WINDOW, STRIDE = 500.0, 0.1, 2000, 20  # s, s, samples, samples
+P0, P_SECS = 10.0, 378.0
+DURATION, DT = 500.0, 0.1  # s
 SEEDS = range(5)
 TABLE2 = ("5.3e-9", "1.3e-6", "0.05", "1.6e-6", "0.014")
 UNITS2 = (
@@ -133,106 +137,14 @@ PRINTED_ROWS = (
 )
 
 
-# ---------------------------------------------------------------- the paper's method, as it has it
-
-
-@compiled
-def motion(
-    c: Coefficients, x: FloatArray, delta: float, rate: float, n: float, n_dot: float
-) -> FloatArray:
-    """A x + B u with the right pseudo-inputs, written out: x = (w, w', w'', v, v')."""
-    ks, ks_dot = rudder_effect(c, x[3], n), rudder_effect_rate(c, x[3], x[4], n, n_dot)
-    jerk = c.a * x[2] + yaw_stiffness(c, x[0]) * x[1]
-    return np.array(
-        [
-            x[1],
-            yaw_acceleration_rate(c, x[0], x[1], x[3], n, delta, rate),
-            jerk + ks_dot * (c.d * delta + c.e * rate) + ks * c.d * rate,
-            surge_acceleration(c, x[0], x[3], n),
-            2 * c.f * x[0] * x[1] + 2 * c.g * x[3] * x[4] + c.h * n_dot,
-        ]
-    )
-
-
-@compiled
-def papers_filter(
-    c: Coefficients,
-    y: FloatArray,
-    delta: FloatArray,
-    n: FloatArray,
-    dt: float,
-    F: FloatArray,
-    Qd: FloatArray,
-    jumps: bool,
-) -> FloatArray:
-    """The states of (6), (m, 5): Q 0.01, R 400, P(0) 10; with `jumps` the rudder's start shows."""
-    x, P = np.zeros(5), P0 * np.eye(5)
-    x[0], x[3], x[4] = y[0, 0], y[0, 1], surge_acceleration(c, y[0, 0], y[0, 1], n[0])
-    states, last = np.empty((len(y), 5)), 0.0
-    for k in range(len(y)):
-        ahead = min(k + 1, len(y) - 1)
-        rate, n_dot = (delta[ahead] - delta[k]) / dt, (n[ahead] - n[k]) / dt
-        if jumps:
-            x[2] += rudder_effect(c, x[3], n[k]) * c.e * (rate - last)
-        last = rate
-        for output, state in ((0, 0), (1, 3)):
-            K = P[:, state] / (P[state, state] + R / dt)
-            x = x + K * (y[k, output] - x[state])
-            P = P - np.outer(K, P[state])
-        states[k] = x
-        k1 = motion(c, x, delta[k], rate, n[k], n_dot)
-        middle, half = delta[k] + rate * dt / 2, n[k] + n_dot * dt / 2
-        k2 = motion(c, x + k1 * dt / 2, middle, rate, half, n_dot)
-        k3 = motion(c, x + k2 * dt / 2, middle, rate, half, n_dot)
-        k4 = motion(c, x + k3 * dt, delta[ahead], rate, n[ahead], n_dot)
-        x = x + (k1 + 2 * k2 + 2 * k3 + k4) * dt / 6
-        P = F @ P @ F.T + Qd
-    return states
-
-
 def estimates(signals: Signals, prior: Coefficients, *, jumps: bool = True) -> FloatArray:
     """The states by the paper's filter, (m, 5), the model in it being `prior`."""
-    F, Qd = discretise(pseudo_input_matrices(prior, 1.0)[0], Q * np.eye(5), DT)
-    y = np.column_stack((signals["yaw_rate"], signals["speed"]))
-    F, Qd = np.ascontiguousarray(F), np.ascontiguousarray(Qd)
-    return papers_filter(prior, y, signals["rudder"], signals["rpm"], DT, F, Qd, jumps)
-
-
-def regression(signals: Signals, c: Coefficients, x: FloatArray) -> Iterator[FloatArray]:
-    """[Omega | H_w] and [Y | H_v] of (7), a row an instant; of `c` only the alphas are used."""
-    w, w_dot, w_ddot, v, v_dot = x.T
-    delta, n = signals["rudder"], signals["rpm"]
-    ks = rudder_effects(c, np.ascontiguousarray(v), n)
-    rate = np.diff(delta, append=delta[-1]) / DT
-    yield np.column_stack((w_dot, w, w * abs(w), w**3, ks * delta, ks * rate, w_ddot))
-    yield np.column_stack((w * w, v * v, n, v_dot))
-
-
-def solved(rows: FloatArray) -> FloatArray:
-    """Least squares by the pseudo-inverse of scaled columns; the last column is the target."""
-    triangle = np.asarray(np.linalg.qr(rows, mode="r"))  # as many numbers as tell the same
-    X, target = triangle[:, :-1], triangle[:, -1]
-    scale = np.sqrt((X * X).sum(axis=0))
-    scale[scale == 0] = 1
-    return np.asarray(np.linalg.pinv(X / scale, rcond=1e-13) @ target / scale)
+    return papers_states(signals, prior, as_printed=not jumps)
 
 
 def identified(signals: Signals, c: Coefficients, x: FloatArray) -> FloatArray:
     """The paper's nine coefficients from all of a run, (9,)."""
     return np.concatenate([solved(rows) for rows in regression(signals, c, x)])
-
-
-def windowed(signals: Signals, c: Coefficients, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """When each window ends, and its coefficients, (k,) and (k, 9); the first windows grow."""
-    ends = np.arange(STRIDE, len(x) + 1, STRIDE)
-    reach, parts = WINDOW // STRIDE, []
-    for rows in regression(signals, c, x):
-        strides = rows[: ends[-1]].reshape(len(ends), STRIDE, -1)
-        triangles = np.asarray(np.linalg.qr(strides, mode="r"))
-        spans = ((max(0, k - reach), k) for k in range(1, len(ends) + 1))
-        parts.append([solved(np.concatenate(triangles[i:k])) for i, k in spans])
-    found = np.concatenate([np.array(part) for part in parts], axis=1)
-    return ends * DT, found
 
 
 # ------------------------------------------------------------------------------------- the run
@@ -311,7 +223,7 @@ def main() -> None:
         " manoeuvre nor the step nor the window's length N: the run is that of our notes"
         " (n = 100 rpm, v₀ = 2 m/s, rudder +20° at 0 s, −20° at 200 s, at 2.5 °/s), the step is"
         " 0.1 s, N as said. “The paper's” below is its filter and its least squares as printed,"
-        " written out in the script; “weak form” is what shiplog does instead."
+        " kept in shiplog for comparison; “weak form” is what shiplog does instead."
     )
     table1()
     formulas()
@@ -610,7 +522,7 @@ def settling() -> None:
 def when(instants: FloatArray) -> str:
     """Median and latest of some instants, in words."""
     said = [
-        "never" if at > TOLD_SECS - 5 * STRIDE * DT else f"{at:.0f} s" if at else "at once"
+        "never" if at > TOLD_SECS - 5 * STRIDE_SECS else f"{at:.0f} s" if at else "at once"
         for at in (float(np.median(instants)), float(instants.max()))
     ]
     return said[0] if said[0] == said[1] else f"{said[0]}; {said[1]}"

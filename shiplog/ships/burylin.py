@@ -57,8 +57,11 @@ def _tied(values: ComplexArray) -> Sequence[complex]:
     return (a, -d, b2, b3, d, t3 * d, *others)
 
 
-def _parameter(name: str, start: float, highest: float = inf, *, known: bool = False) -> Parameter:
-    return Parameter(name, COEFFICIENT_UNITS[name], start, highest=highest, known=known)
+def _parameter(
+    name: str, start: float, highest: float = inf, *, known: bool = False, usual: float = 0.0
+) -> Parameter:
+    unit = COEFFICIENT_UNITS[name]
+    return Parameter(name, unit, start, highest=highest, known=known, usual=usual)
 
 
 _STATE = (
@@ -69,7 +72,7 @@ _STATE = (
 )
 # a ship of 200 m, in general
 _A, _D = _parameter("a", -0.03), _parameter("d", 1.5e-4)
-_NONLINEAR = (_parameter("b2", -0.05), _parameter("b3", 0.0))
+_NONLINEAR = (_parameter("b2", -0.05), _parameter("b3", 0.0, usual=5.0))
 _OTHERS = (
     _parameter("f", -200.0),
     _parameter("g", -3e-4, highest=0.0),

@@ -69,7 +69,7 @@ DRIFT_LAG = Model(
     "drift-lag", "slipstream with drift lag, a sided propeller and surge from sway", DriftLag,
     (
         *YAW, *SURGE,
-        Parameter("c1", "1", -0.4), Parameter("c2", "1", 0.0),
+        Parameter("c1", "1", -0.4), Parameter("c2", "1", 0.0, usual=0.3),
         Parameter("Td", "1", 0.3, 0.02, 5.0, prior_std=0.5),
         Parameter("e0", "1", 0.0, prior_std=0.1),
         Parameter("f1", "1", 0.5, prior_std=1.0),

@@ -28,6 +28,12 @@ class Parameter:
     highest: float = inf
     prior_std: float = inf  # how far from `start` it is believed to be, before any data
     known: bool = False  # kept at `start` unless it is asked for
+    usual: float = 0.0  # its size of ships in general, where `start` is none
+
+    @property
+    def size(self) -> float:
+        """What its size is of ships in general."""
+        return self.usual or abs(self.start) or self.prior_std
 
 
 @dataclass(frozen=True)
@@ -70,6 +76,16 @@ SI = Scale()
 
 def _as_they_are(values: ComplexArray) -> Sequence[complex]:
     return tuple(values)
+
+
+@dataclass(frozen=True, eq=False)
+class Advance:
+    """A run of `count` samples, and how it changes along k directions."""
+
+    outputs: FloatArray  # (count, 4) SI, in the order of OUTPUTS
+    end: FloatArray  # (s,) the state at the last sample, in the units of the equations
+    outputs_by: FloatArray  # (k, count, 4)
+    end_by: FloatArray  # (k, s)
 
 
 @dataclass(frozen=True)
@@ -146,19 +162,32 @@ class Model:
         A direction is a row of `directions`: of the parameters, the initial state and the offset
         of the rudder, in this order, (k, p + s + 1). All else as `simulate`.
         """
+        return self.advance(
+            parameters, initial, path, count, directions, offset=offset, scale=scale
+        ).outputs_by
+
+    def advance(
+        self, parameters: FloatArray, initial: FloatArray, path: Path, count: int,
+        directions: FloatArray, *, offset: float = 0.0, scale: Scale = SI,
+    ) -> "Advance":  # fmt: skip
+        """A run, where it ends, and how both change along one or more `directions`.
+
+        All as `sensitivities`.
+        """
         scaled, p = scale.scaled(path), len(parameters)
-        found = np.empty((len(directions), count, len(OUTPUTS)))
-        for row, along in zip(found, directions * (1j * STEP), strict=True):
-            moved = along[:p], along[p:-1], along[-1]
-            out = self._sail(
-                parameters + moved[0], initial + moved[1], offset + moved[2], scaled, count
-            )
-            row[:] = out.imag / STEP * scale.outputs
-        return found
+        outputs_by = np.empty((len(directions), count, len(OUTPUTS)))
+        ends = np.empty((len(directions), len(initial)), np.complex128)
+        out = np.empty((count, len(OUTPUTS)), np.complex128)
+        for i, along in enumerate(directions * (1j * STEP)):
+            ends[i] = initial + along[p:-1]
+            out = self._sail(parameters + along[:p], ends[i], offset + along[-1], scaled, count)
+            outputs_by[i] = out.imag / STEP * scale.outputs
+        return Advance(out.real * scale.outputs, ends[-1].real.copy(), outputs_by, ends.imag / STEP)
 
     def _sail(
         self, parameters: ComplexArray, initial: ComplexArray, offset: complex, path: Path,
         count: int,
     ) -> ComplexArray:  # fmt: skip
+        """The outputs, (count, 4); `initial` is left where the run ends."""
         coefficients = self.kind(*(complex(value) for value in self.expand(parameters)))
         return self.compiled(coefficients, initial, complex(offset), path, count)

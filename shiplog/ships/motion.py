@@ -99,12 +99,12 @@ def _real_root(x: float) -> float:
 def sail(c: Any, x: ComplexArray, offset: complex, path: Path, samples: int) -> ComplexArray:  # noqa: ANN401
     """The outputs at so many samples, (samples, 4), of a run that begins in the state `x`.
 
-    `offset` is added to the rudder. One Runge-Kutta step of order four for each step of the path;
-    where there are samples between its ends, Hermite's cubic by the rates there. A run that leaves
-    the numbers ends in NaN.
+    `x` is left where the run ends. `offset` is added to the rudder. One Runge-Kutta step of order
+    four for each step of the path; where there are samples between its ends, Hermite's cubic by the
+    rates there. A run that leaves the numbers ends in NaN.
     """
     out = np.full((samples, 4), np.nan + 0j)
-    x, between, after, at_sample = x.copy(), x.copy(), x.copy(), x.copy()
+    between, after, at_sample = x.copy(), x.copy(), x.copy()
     _note(out, 0, observed(c, x))
     for k in range(len(path.secs)):
         h, rate, n = path.secs[k], path.delta_dot[k], path.rpm[k]

@@ -36,6 +36,17 @@ def path_of(signals: Signals) -> Path:
     return Path(secs, begins, slopes, rpm[first], np.where(count > 0, first + count, -1), count)
 
 
+def part_of(path: Path, start: int, stop: int) -> Path:
+    """The steps from `start` to before `stop`, samples counted from the one they begin at."""
+    cut, before = slice(start, stop), path.sample[:start]
+    first = int(before.max(initial=0))
+    sample = np.where(path.sample[cut] >= 0, path.sample[cut] - first, -1)
+    return Path(
+        path.secs[cut], path.delta[cut], path.delta_dot[cut], path.rpm[cut], sample,
+        path.samples[cut],
+    )  # fmt: skip
+
+
 def _joined(delta: FloatArray, rpm: FloatArray, dt: float, knots: set[int]) -> list[int]:
     """Where the steps end, by the number of the sample."""
     slope = np.diff(delta) / dt

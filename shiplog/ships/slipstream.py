@@ -75,7 +75,7 @@ SURGE = (
 )
 SLIPSTREAM = Model(
     "slipstream", "the paper's model with speed scaling, slipstream and drift", Slipstream,
-    (*YAW, *SURGE, Parameter("c1", "1", -0.4), Parameter("c2", "1", 0.0)),
+    (*YAW, *SURGE, Parameter("c1", "1", -0.4), Parameter("c2", "1", 0.0, usual=0.3)),
     (
         StateValue("rho", "yaw_rate"),
         StateValue("rho_dot", prior_std=0.5),

@@ -19,7 +19,10 @@ coefficient near 0.6 (Hooft, "The cross-flow drag on a manoeuvring ship", 1994),
 strong drift (Yoshimura and Masumoto, "Hydrodynamic database and manoeuvring prediction method with
 medium high-speed merchant ships and fishing vessels", 2012), and the usual sizes of thrust, flow
 straightening and rudder drag in the model of the MMG (Yasukawa and Yoshimura, "Introduction of MMG
-standard method for ship maneuvering predictions", 2015).
+standard method for ship maneuvering predictions", 2015). Surge is what zig-zags tell least, and
+there its parts are bounded by what they stand for: xvr by a ship's inertia going sideways, from
+her mass to her mass and that of the water over those ahead, 0.95 to 1.75; xd by the rudder's size,
+which its drag and its force to the side share; g by how steady a run is on which a trial begins.
 """
 
 from typing import NamedTuple
@@ -111,12 +114,12 @@ THREE_DOF = Model(
         Parameter("nd", "1", 1.0, 0.0, 10.0, prior_std=0.5),
         Parameter("m", "1", 0.4, 0.0, 1.5, prior_std=0.3),
         Parameter("w", "1", 0.4, 0.0, 1.0, prior_std=0.15),
-        Parameter("xvr", "1", 1.2, 0.0, 5.0, prior_std=0.6),
+        Parameter("xvr", "1", 1.35, 0.0, 5.0, prior_std=0.35),
         Parameter("x4", "1", 1.5, prior_std=1.0),
-        Parameter("g", "1", 0.0, -0.5, 0.5, prior_std=0.03),
-        Parameter("h", "1", 0.05, 0.0, 1.0, prior_std=0.05),
+        Parameter("g", "1", 0.0, -0.5, 0.5, prior_std=0.02),
+        Parameter("h", "1", 0.05, 0.0, 1.0, prior_std=0.03),
         Parameter("p", "1", 0.7, 0.0, 2.0, prior_std=0.2),
-        Parameter("xd", "1", -0.1, -1.0, 0.0, prior_std=0.05),
+        Parameter("xd", "1", -0.1, -1.0, 0.0, prior_std=0.03),
     ),
     (
         StateValue("rho", "yaw_rate"),

@@ -1,0 +1,100 @@
+"""Trials of a ship that changes on her way: one set of coefficients, then another."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from recorders.manoeuvres import manoeuvre
+from recorders.sensors import Suite, corrupt
+from recorders.voyage import Trajectory
+from shiplog import Channel, TrialLog, Vessel
+from shiplog.compiled import compiled
+from shiplog.ship import Coefficients
+from shiplog.ships.under_way import Acting, Hull, ship_of, step
+from shiplog.types import FloatArray
+from shiplog.units import CATALOGUE
+
+RATE_HZ = 10.0  # of the grid, and the fastest a sensor may be
+START_NS = 1_767_225_600 * 10**9
+
+
+def changed_trial(
+    vessel: Vessel,
+    manoeuvre_name: str,
+    factors: Mapping[str, float],
+    *,
+    at_secs: float,
+    duration_secs: float,
+    sensors: Suite,
+    seed: int = 0,
+    vessel_toml: str | None = None,
+) -> TrialLog:
+    """A trial in which coefficients become `factors` times what they were, at `at_secs`.
+
+    The noise is drawn for itself: it is not that of `simulate` with the same seed.
+    """
+    rng = np.random.default_rng(seed)
+    ordered = manoeuvre(manoeuvre_name, duration_secs, vessel.approach_rpm, rng)
+    before, ship = vessel.paper, ship_of(vessel)
+    rpm = ordered.orders[0].rpm
+    speed = ship.steady_speed(rpm)
+    hull = ship.hull(speed, rpm)
+    changed = {name: factor * getattr(before, name) for name, factor in factors.items()}
+    zigzag = ordered.zigzag
+    rows = _sail(
+        before,
+        before._replace(**changed),
+        hull,
+        ship.begun(speed),
+        at_secs,
+        np.array([(o.time_secs, o.rudder, o.rpm) for o in ordered.orders]),
+        (zigzag.start_secs, zigzag.rudder, zigzag.heading) if zigzag else (np.inf, 0.0, 0.0),
+        vessel.rudder_rate,
+        np.arange(round(duration_secs * RATE_HZ) + 1) / RATE_HZ,
+    )
+    sailed, channels = Trajectory(ship, hull, rows), []
+    for name in (name for name in CATALOGUE if name in sensors):
+        times = np.arange(int(duration_secs * sensors[name].rate_hz) + 1) / sensors[name].rate_hz
+        stamps = START_NS + np.round(times * 1e9).astype(np.int64)
+        values = corrupt(sensors[name], times, sailed.at(times)[name], rng)
+        components = ("north", "east") if name == "position" else ()
+        unit = CATALOGUE[name].unit
+        channels.append(Channel(name, "simulated", unit, stamps, stamps, values, components))
+    return TrialLog("changed.mcap", tuple(channels), {"source": "simulation"}, vessel_toml)
+
+
+@compiled
+def _sail(
+    before: Coefficients,
+    after: Coefficients,
+    hull: Hull,
+    state: FloatArray,
+    change: float,
+    orders: FloatArray,
+    zigzag: tuple[float, float, float],
+    rudder_rate: float,
+    times: FloatArray,
+) -> FloatArray:
+    """Rows of a `Trajectory`, one an instant of `times`; a zig-zag turns the rudder at one."""
+    start, angle, limit = zigzag
+    rows = np.zeros((len(times), 14))
+    work = np.empty((3, len(state)))
+    delta, aim, at, h = 0.0, 0.0, 0, times[1] - times[0]
+    for k in range(len(times)):
+        t = times[k]
+        while at + 1 < len(orders) and orders[at + 1, 0] <= t:
+            at += 1
+        if t < start:
+            aim = orders[at, 1]
+        elif aim == 0.0:
+            aim = angle
+        elif state[3] * np.sign(aim) >= limit:
+            aim = -aim
+        turn = min(max(aim - delta, -rudder_rate * h), rudder_rate * h)
+        acting = Acting(delta, turn / h, orders[at, 2], 0.0, 0.0, 0.0, 0.0)
+        rows[k, 0] = t
+        rows[k, 1:7] = state
+        rows[k, 7:14] = acting
+        state[:] = step(before if t < change else after, hull, state, acting, t, h, work)
+        delta += turn
+    return rows

@@ -1,0 +1,137 @@
+"""The parameters as states: a filter against the joint least squares that it stands for."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from conftest import as_log
+from scipy.optimize import least_squares
+
+from analysis.identify.augmented import _begun, _Belief, _calm, _strides, _taken_in, augmented
+from analysis.identify.courses import two_priors
+from analysis.identify.output_error import OutputError, output_error
+from analysis.identify.problem import Nuisance
+from analysis.identify.trial import Trial, trials_of
+from analysis.identify.uncertainty import Uncertainty, uncertainty
+from recorders.sensors import suite
+from recorders.simulate import simulate
+from shiplog import load_vessel, resample
+from shiplog.ships import ship_model
+
+CHANNELS = ("yaw_rate", "speed", "rudder", "rpm")
+TRUE = load_vessel("table1")[0].coefficients._asdict()
+
+
+@cache
+def a_trial(manoeuvre: str = "zigzag-20-20", seed: int = 3, seconds: float = 400.0) -> Trial:
+    vessel = load_vessel("table1")[0]
+    trial = simulate(vessel, manoeuvre, duration_secs=seconds, seed=seed, sensors=suite("white"))
+    return trials_of(resample(as_log(trial, "t"), channels=CHANNELS), "t")[0]
+
+
+@cache
+def fitted(model: str = "burylin", runs: int = 1) -> tuple[OutputError, Uncertainty]:
+    known = {"T3": 0.5} if model == "burylin-tied" else {}
+    trials = [a_trial(seed=3 + i) for i in range(runs)]
+    fit = output_error(trials, ship_model(model), known=known)
+    return fit, uncertainty(fit)
+
+
+@pytest.mark.parametrize("model", ["burylin", "burylin-tied", "norrbin"])
+def test_a_stride_is_the_joint_least_squares_of_belief_and_samples(model: str) -> None:
+    """By scipy, with finite differences, of prior and samples together."""
+    fit, told = fitted(model)
+    problem = replace(fit.problem, waves=())
+    covariance = np.diag((0.02 * np.abs(told.values)) ** 2)
+    belief = _begun(fit, 0, told.values * 1.01, covariance)
+    path, part = next(_strides(problem.trials[0], 20.0))
+    measured, weight = (column[part] for column in _calm(fit, 0))
+    found = _taken_in(problem, belief, path, measured, weight)
+    p, s = len(told.values), len(problem.model.state)
+    root = np.linalg.cholesky(np.linalg.inv(belief.covariance)).T
+
+    def off(z: np.ndarray) -> np.ndarray:
+        out = problem.model.simulate(
+            problem.parameters(belief.mean + z), (belief.mean + z)[p : p + s], path,
+            len(measured), offset=(belief.mean + z)[p + s], scale=problem.scale,
+        )[:, problem.columns]  # fmt: skip
+        for k, (column, _) in enumerate(problem.biases):
+            out[:, column] += (belief.mean + z)[p + s + 1 + k]
+        samples = ((measured - out) * np.sqrt(weight))[1:]
+        return np.concatenate((samples[np.isfinite(samples)], root @ z))
+
+    sizes = np.sqrt(np.diag(belief.covariance))
+    best = least_squares(off, np.zeros(len(sizes)), x_scale=sizes, xtol=1e-14, ftol=1e-14)
+    mean = belief.mean + best.x
+    stds = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)))[:p]
+    np.testing.assert_allclose(found.mean[:p] / stds, mean[:p] / stds, atol=0.02, rtol=0)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)[:p]), stds, rtol=1e-3)
+
+
+def test_strides_put_together_are_the_whole_run() -> None:
+    fit, told = fitted()
+    trial, model = fit.problem.trials[0], fit.problem.model
+    state = fit.problem.start()[len(told.values) :][:4]
+    whole = model.simulate(fit.parameters, state, trial.path, len(trial))
+    parts = [whole[:1]]
+    for path, part in _strides(trial, 2.0):
+        run = model.advance(fit.parameters, state, path, part.stop - part.start, np.eye(17)[:1])
+        parts.append(run.outputs[1:])
+        state = run.end
+    np.testing.assert_allclose(np.concatenate(parts), whole, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("runs", [1, 2])
+def test_from_priors_a_third_off_it_ends_where_output_error_is(runs: int) -> None:
+    fit, told = fitted(runs=runs)
+    found = augmented(fit, two_priors(told))
+    for values, stds in zip(found.values, found.stds, strict=True):
+        np.testing.assert_array_less(np.abs(values[-1] - told.values), 1.0 * told.std)
+        np.testing.assert_allclose(stds[-1], told.bound, rtol=0.25)
+    assert found.time_secs[-1] == pytest.approx(runs * 400.0, abs=0.3)
+    assert (np.diff(found.time_secs) >= 0).all()
+
+
+def test_it_begins_at_its_priors() -> None:
+    fit, told = fitted()
+    found = augmented(fit, two_priors(told))
+    np.testing.assert_array_equal(found.values[:, 0], found.priors)
+    np.testing.assert_allclose(found.echo[0], 1.0)
+
+
+def test_what_was_never_told_stays_what_it_was() -> None:
+    """b1 and e on a run that is over before the rudder moves."""
+    fit, told = fitted()
+    quiet = replace(fit.problem, trials=(fit.problem.trials[0].part(0, 90),), waves=())
+    short = replace(
+        fit, problem=quiet, spreads=tuple(
+            type(s)(s.effective[:90], s.usual[:90]) for s in fit.spreads
+        ),
+    )  # fmt: skip
+    found = augmented(short, two_priors(told))
+    assert found.echo[-1, told.names.index("e")] > 0.99
+    assert found.echoing[:, told.names.index("b1")].all()
+
+
+def test_nothing_but_states_and_parameters_will_do() -> None:
+    fit = output_error([a_trial()], ship_model("burylin"), nuisance=Nuisance.none())
+    told = uncertainty(fit)
+    found = augmented(fit, two_priors(told))
+    d = told.names.index("d")
+    np.testing.assert_allclose(found.values[:, -1, d], TRUE["d"], rtol=0.005)
+
+
+def test_a_ship_that_runs_away_leaves_no_number() -> None:
+    fit, _ = fitted()
+    problem = fit.problem
+    p = len(problem.free)
+    values = problem.start()[:p]
+    values[problem.free_names.index("a")] = 50.0
+    belief = _begun(fit, 0, values, np.diag(np.abs(values) * 1e-3))
+    measured, weight = _calm(fit, 0)
+    path, part = next(_strides(problem.trials[0], 60.0))
+    with np.errstate(all="ignore"):
+        found = _taken_in(problem, belief, path, measured[part], weight[part])
+    assert isinstance(found, _Belief)
+    assert not np.isfinite(found.mean[:p]).all() or (found.mean[:p] != values).any()
