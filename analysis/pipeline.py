@@ -121,7 +121,7 @@ class Replay:
         ends = self._looked_ahead() if plan.vessel.filter.smooth else None
         holding, (filtering, observing) = InputHold(clock), self._designed()
         tests = [self._residual_test(output) for output in range(len(OUTPUTS))]
-        weak_form = weak_form_of(plan.vessel.coefficients, clock, plan.usual.intervals)
+        weak_form = weak_form_of(plan.vessel.paper, clock, plan.usual.intervals)
         watching = ShipWatch(weak_form, guessed=plan.model_origin == FITTED)
         tracking = Tracker(clock, plan.survey.get("position"))
         watches = holding.add_raw, tracking.add_raw
@@ -172,7 +172,7 @@ class Replay:
 
     def _designed(self) -> tuple[Filter, ForceObserver]:
         """The filter and the observer; of a model that runs away neither may be had."""
-        model, noise, usual = self.plan.vessel.coefficients, self.plan.noise, self.plan.usual
+        model, noise, usual = self.plan.vessel.paper, self.plan.noise, self.plan.usual
         try:
             with np.errstate(over="ignore", invalid="ignore"):
                 filtering = make_filter(model, noise, usual, self.plan.vessel.filter)

@@ -68,12 +68,12 @@ class Planner:
     ) -> None:
         self._log, self._tell = log, tell
         self._warnings: list[str] = []
-        stated = _stated_model(log, vessel, settings)
+        vessel, origin = _stated_model(log, vessel, settings)
         survey, clock = self._surveyed()
-        given = stated[0] if stated else with_settings(Vessel("", BARE), settings)
-        usual, self.yaw, self.surge = self._gauged(survey, clock, given)
+        usual, self.yaw, self.surge = self._gauged(survey, clock, vessel)
         tell("model", 0.0)
-        vessel, origin = stated or (with_settings(self._first_model(usual), settings), FITTED)
+        if vessel.coefficients is None:
+            vessel, origin = self._with_first_model(vessel, usual), FITTED
         self._warnings += idle(vessel)
         noise = self._noise(vessel, survey, clock, usual)
         observed = self._observed(vessel, usual, noise)
@@ -104,7 +104,7 @@ class Planner:
         For these one must know how far apart samples stand on the clock, which is only told by
         then. It is nearly always what the survey lets expect; where not, they are made once more.
         """
-        alphas, window_secs = vessel.coefficients, vessel.identifier.window_secs
+        alphas, window_secs = vessel.coefficients or BARE, vessel.identifier.window_secs
         doubts = RudderWatch(found), GyroWatch(found)
         holding, gauger = InputHold(clock), Gauger(alphas)
         expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in OUTPUTS]
@@ -126,9 +126,17 @@ class Planner:
         self._warnings += equations.said()
         return usual, equations.yaw, equations.surge
 
-    def _first_model(self, usual: Gauge) -> Vessel:
-        vessel = fit_first_model(self.yaw, self.surge, usual, self._log.name)
-        model = vessel.coefficients
+    def _with_first_model(self, known: Vessel, usual: Gauge) -> Vessel:
+        """What is known of a ship, with a model fitted to this log."""
+        first = fit_first_model(self.yaw, self.surge, usual, self._log.name)
+        vessel, model = replace(known, coefficients=first.coefficients), first.paper
+        if known.model is None:
+            vessel = replace(vessel, name=first.name, approach_rpm=first.approach_rpm)
+        else:
+            self._warnings.append(
+                f"the vessel file has {known.model.name} alone, and filters are built on the "
+                "paper's model: a first one is fitted to this log"
+            )
         if not (model.a < 0 and model.g <= 0 and model.h >= 0):
             self._warnings.append(
                 "the model fitted to this log is no ship's: too little moves in it to tell"
@@ -137,7 +145,7 @@ class Planner:
 
     def _noise(self, vessel: Vessel, found: Survey, clock: Clock, usual: Gauge) -> Noise:
         settings = _averaged(vessel.filter, found, clock.dt_secs)
-        noise = noise_of(usual, vessel.coefficients, settings)
+        noise = noise_of(usual, vessel.paper, settings)
         if settings.wave and noise.wave is None:
             self._warnings.append(
                 "no wave stands out of the yaw rate's residual: none is told from the ship's "
@@ -157,7 +165,7 @@ class Planner:
             return wanted
         frequency = wanted.wave_frequency or vessel.filter.wave_frequency
         if frequency is None:
-            wave = noise.wave or wave_in(usual, vessel.coefficients, noise, vessel.filter)
+            wave = noise.wave or wave_in(usual, vessel.paper, noise, vessel.filter)
             frequency = wave.frequency if wave is not None and wave.stands_out else None
         if frequency is None:
             frequency = USUAL_SEA
@@ -233,15 +241,14 @@ def weak_form_of(model: Coefficients, clock: Clock, intervals: FloatArray) -> We
 
 def _stated_model(
     log: Log, given: Vessel | None, settings: Mapping[str, object]
-) -> tuple[Vessel, str] | None:
-    """The vessel that is known beforehand, with the settings given in place of its own."""
+) -> tuple[Vessel, str]:
+    """What is known of the vessel, the settings given in place of her own, and where it is from."""
     if given is not None:
         return with_settings(given, settings), "given"
     if log.vessel_toml is not None:
         carried = parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}")
         return with_settings(carried, settings), "carried by the log"
-    with_settings(Vessel("", BARE), settings)  # what is wrong with them is said before any work
-    return None
+    return with_settings(Vessel("", None), settings), FITTED
 
 
 def _require_outputs(log: Log, usual: Gauge) -> None:

@@ -79,7 +79,7 @@ def _measured(analysis: Analysis) -> Iterator[Channel]:
 
 
 def _assumed(analysis: Analysis) -> Iterator[Channel]:
-    for name, value in analysis.vessel.coefficients._asdict().items():
+    for name, value in analysis.vessel.paper._asdict().items():
         yield _single(analysis, name, "model", value)
     noise = analysis.noise
     for i, name in enumerate(OUTPUTS):

@@ -41,7 +41,7 @@ def summarise(findings: Findings) -> Summary:
             "origin": findings.model_origin,
             "coefficients": {
                 name: {"value": value, "unit": COEFFICIENT_UNITS[name]}
-                for name, value in findings.vessel.coefficients._asdict().items()
+                for name, value in findings.vessel.paper._asdict().items()
             },
         },
         "filter": {

@@ -164,7 +164,7 @@ def _observed(findings: Findings) -> str:
 
 
 def _coefficient_section(findings: Findings) -> Section:
-    model, rows = findings.vessel.coefficients._asdict(), []
+    model, rows = findings.vessel.paper._asdict(), []
     for found in (findings.yaw, findings.surge):
         for name, coefficient in found.coefficients.items():
             value, std = f"{coefficient.value:.4g}", f"{coefficient.std:.2g}"

@@ -9,7 +9,8 @@ from recorders.sensors import Suite, corrupt
 from recorders.voyage import Trajectory
 from shiplog import Channel, TrialLog, Vessel
 from shiplog.compiled import compiled
-from shiplog.ship import Coefficients, Forcing, State, steady_speed, step
+from shiplog.ship import Coefficients
+from shiplog.ships.under_way import Acting, Hull, ship_of, step
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
 
@@ -34,20 +35,24 @@ def changed_trial(
     """
     rng = np.random.default_rng(seed)
     ordered = manoeuvre(manoeuvre_name, duration_secs, vessel.approach_rpm, rng)
-    before = vessel.coefficients
+    before, ship = vessel.paper, ship_of(vessel)
+    rpm = ordered.orders[0].rpm
+    speed = ship.steady_speed(rpm)
+    hull = ship.hull(speed, rpm)
     changed = {name: factor * getattr(before, name) for name, factor in factors.items()}
     zigzag = ordered.zigzag
     rows = _sail(
         before,
         before._replace(**changed),
+        hull,
+        ship.begun(speed),
         at_secs,
-        steady_speed(before, ordered.orders[0].rpm),
         np.array([(o.time_secs, o.rudder, o.rpm) for o in ordered.orders]),
         (zigzag.start_secs, zigzag.rudder, zigzag.heading) if zigzag else (np.inf, 0.0, 0.0),
         vessel.rudder_rate,
         np.arange(round(duration_secs * RATE_HZ) + 1) / RATE_HZ,
     )
-    sailed, channels = Trajectory(before, rows), []
+    sailed, channels = Trajectory(ship, hull, rows), []
     for name in (name for name in CATALOGUE if name in sensors):
         times = np.arange(int(duration_secs * sensors[name].rate_hz) + 1) / sensors[name].rate_hz
         stamps = START_NS + np.round(times * 1e9).astype(np.int64)
@@ -62,8 +67,9 @@ def changed_trial(
 def _sail(
     before: Coefficients,
     after: Coefficients,
+    hull: Hull,
+    state: FloatArray,
     change: float,
-    speed: float,
     orders: FloatArray,
     zigzag: tuple[float, float, float],
     rudder_rate: float,
@@ -72,7 +78,7 @@ def _sail(
     """Rows of a `Trajectory`, one an instant of `times`; a zig-zag turns the rudder at one."""
     start, angle, limit = zigzag
     rows = np.zeros((len(times), 14))
-    state = State(0.0, 0.0, speed, 0.0, 0.0, 0.0)
+    work = np.empty((3, len(state)))
     delta, aim, at, h = 0.0, 0.0, 0, times[1] - times[0]
     for k in range(len(times)):
         t = times[k]
@@ -82,13 +88,13 @@ def _sail(
             aim = orders[at, 1]
         elif aim == 0.0:
             aim = angle
-        elif state.heading * np.sign(aim) >= limit:
+        elif state[3] * np.sign(aim) >= limit:
             aim = -aim
         turn = min(max(aim - delta, -rudder_rate * h), rudder_rate * h)
-        forcing = Forcing(delta, turn / h, orders[at, 2], 0.0, 0.0, 0.0, 0.0)
+        acting = Acting(delta, turn / h, orders[at, 2], 0.0, 0.0, 0.0, 0.0)
         rows[k, 0] = t
         rows[k, 1:7] = state
-        rows[k, 7:14] = forcing
-        state = step(before if t < change else after, state, forcing, t, h)
+        rows[k, 7:14] = acting
+        state[:] = step(before if t < change else after, hull, state, acting, t, h, work)
         delta += turn
     return rows

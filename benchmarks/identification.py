@@ -86,7 +86,7 @@ class Study:
 
 def truth() -> dict[str, float]:
     """The coefficients of the paper's ship, and T3 = e / d."""
-    c = load_vessel("table1")[0].coefficients
+    c = load_vessel("table1")[0].paper
     return {**c._asdict(), "T3": c.e / c.d}
 
 
@@ -237,7 +237,7 @@ def main() -> None:
     arguments = parser.parse_args()
     print(INTRODUCTION)
     known_ship(arguments.seeds)
-    methods(known_trial, load_vessel("table1")[0].coefficients)
+    methods(known_trial, load_vessel("table1")[0].paper)
     if KVLCC2.is_dir():
         tanker(arguments.figures)
     speed(lambda seconds, noise: known_trial(MANOEUVRES[0], FIRST_SEED, seconds, noise))

@@ -43,6 +43,7 @@ _PERFECT = {
     "rpm": Sensor(),
     **_NAVIGATION,
 }
+_ON_REQUEST = {"sway": Sensor()}  # few ships have it: only where a setting of it is given
 SUITES = ("none", "white", "paper")
 
 
@@ -51,8 +52,9 @@ def suite(
 ) -> Suite:
     """A suite by name, with single settings changed: `{"yaw_rate.bias": 1e-4}`.
 
-    `paper` is Burylin's law: w (1 + 0.02 nu) + 5e-5 sin(t/10) and v + 0.2 nu + 0.05 sin(t/10),
-    nu uniform on [-1, 1]; the yaw rate is in the angle unit in which his table is read.
+    A setting of `sway` adds a sensor of it. `paper` is Burylin's law: w (1 + 0.02 nu) + 5e-5
+    sin(t/10) and v + 0.2 nu + 0.05 sin(t/10), nu uniform on [-1, 1]; the yaw rate is in the angle
+    unit in which his table is read.
     Raises `UsageError` for a suite, a sensor or a setting nobody knows, or a value out of range.
     """
     if name not in SUITES:
@@ -70,6 +72,8 @@ def suite(
         }
     for key, value in (settings or {}).items():
         channel, _, setting = key.partition(".")
+        if channel in _ON_REQUEST:
+            sensors.setdefault(channel, _ON_REQUEST[channel])
         _check_known(channel, setting, sensors)
         sensors[channel] = replace(sensors[channel], **{setting: value})
         _check_range(channel, sensors[channel])

@@ -48,9 +48,12 @@ class SimulatedTrial:
         """What really happened, as a log of source `truth`."""
         times = np.arange(int(self.duration_secs * rate_hz) + 1) / rate_hz
         stamps = _stamps(times)
+        ship, hull = self.trajectory.ship, self.trajectory.hull
+        units = _UNITS | {"yaw_disturbance": ship.moment(hull)[1]}
         channels = [
-            _channel(name, "truth", stamps, stamps, values)
+            _channel(name, "truth", stamps, stamps, values, units.get(name))
             for name, values in self.trajectory.at(times).items()
+            if name != "sway" or name in ship.model.outputs
         ]
         return TrialLog("truth", tuple(channels), self.metadata, self.vessel_toml)
 
@@ -134,18 +137,19 @@ def _stamps(times_secs: FloatArray) -> TimeArray:
     return START_NS + np.round(times_secs * 1e6).astype(np.int64) * 1000
 
 
-_UNITS = {
-    "yaw_acceleration": "rad/s²",
-    "yaw_disturbance": "rad/s³",
-    "surge_disturbance": "m/s²",
-}
+_UNITS = {"yaw_acceleration": "rad/s²", "surge_disturbance": "m/s²"}
 
 
 def _channel(
-    name: str, source: str, measured: TimeArray, received: TimeArray, values: FloatArray
+    name: str,
+    source: str,
+    measured: TimeArray,
+    received: TimeArray,
+    values: FloatArray,
+    unit: str | None = None,
 ) -> Channel:
-    unit = CATALOGUE[name].unit if name in CATALOGUE else _UNITS[name]
     components = ("north", "east") if name == "position" else ()
+    unit = unit or CATALOGUE[name].unit
     return Channel(name, source, unit, measured, received, values, components)
 
 

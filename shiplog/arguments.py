@@ -50,6 +50,7 @@ def _add_record(verbs: Any) -> None:  # noqa: ANN401 - argparse keeps that type 
 sensors, each setting in SI:
   --sensor yaw_rate.bias=1e-4 --sensor speed.rate_hz=2 --sensor rudder.dropout=0.02
   --sensor yaw_rate.spikes=0.001 --sensor yaw_rate.spike_size=0.05
+  --sensor sway.white=0.05 measures the sway as well, which a model may have
   rate_hz, jitter_secs, delay_secs, white, uniform, uniform_relative, wave, wave_tau_secs,
   bias, spikes (share of samples off), spike_size (by so much), dropout (share of samples lost),
   dropout_secs""",
@@ -181,7 +182,7 @@ def _add_identify(verbs: Any) -> None:  # noqa: ANN401
         help="a preset or a vessel.toml: length, α's and steering gear, instead of the logs' own",
     )
     identify.add_argument(
-        "-o", "--output", metavar="FILE", help="the vessel.toml (burylin and burylin-tied only)"
+        "-o", "--output", metavar="FILE", help="the vessel.toml, to simulate and to replay with"
     )
     identify.add_argument(
         "--review",

@@ -165,13 +165,12 @@ def _show_review(path: str | Path, *, view: bool) -> None:
 
 def _run_identify(arguments: argparse.Namespace) -> int:
     _require_ours("analysis")
-    from analysis.identify.identified import WRITABLE, identify
+    from analysis.identify.identified import identify
     from analysis.identify.report import as_json, sections
     from analysis.identify.runs import require_distinct
-    from analysis.identify.written import require_writable, vessel_toml
+    from analysis.identify.written import vessel_toml
 
     from .log_file import open_log
-    from .ships import LADDER
     from .vessel import load_vessel
 
     fitted, held_out = (
@@ -185,7 +184,6 @@ def _run_identify(arguments: argparse.Namespace) -> int:
     _require_suffix(".rrd", review)
     if arguments.output:
         _require_suffix(".toml", arguments.output)
-        require_writable(arguments.model)
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     with _progress("analysis") as tell:
         logs, validation_logs = (
@@ -197,11 +195,10 @@ def _run_identify(arguments: argparse.Namespace) -> int:
             validation_logs=validation_logs,
             known=known(arguments.known),
             vessel=vessel,
-            among=WRITABLE if arguments.output else LADDER,
             on_step=tell,
         )
+        text = vessel_toml(found, tell) if arguments.output else ""
     if arguments.output:
-        text = vessel_toml(found)
         with replacing(arguments.output) as part:
             part.write_text(text, encoding="utf-8")
     if arguments.json:

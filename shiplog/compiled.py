@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TypeVar, cast
 
 import numba
+from numba import types
 from numba.extending import overload
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -81,13 +82,15 @@ def compiled_within(function: F) -> F:
 def case_of(generic: Callable[..., object], kind: type) -> Callable[[F], F]:
     """Make a function what compiled code calls as `generic` when its first argument is a `kind`.
 
-    `kind` is a NamedTuple. Numba would have to compile anew in each process what takes a function
-    as an argument; a type it knows again.
+    `kind` is a NamedTuple, float or complex. Numba would have to compile anew in each process what
+    takes a function as an argument; a type it knows again.
     """
+    number = {float: types.Float, complex: types.Complex}.get(kind)
 
     def registered(function: F) -> F:
         def choose(first: object, *_: object) -> F | None:
-            return function if getattr(first, "instance_class", None) is kind else None
+            named = getattr(first, "instance_class", None) is kind
+            return function if named or (number and isinstance(first, number)) else None
 
         overload(generic, strict=False)(choose)
         return function

@@ -1,7 +1,9 @@
-"""The ship's equations of motion, shared by simulation and estimation.
+"""The paper's equations of motion, which filters and observers are built on.
 
-The model is Burylin's, "Continuous identification of a nonlinear vessel movement model with an
-estimator", eqs (1)-(4): a second-order nonlinear Nomoto model of yaw, coupled with surge.
+`shiplog.ships.burylin` has them beside other models, for simulation and for identification; they
+give the same to the last bit. The model is Burylin's, "Continuous identification of a nonlinear
+vessel movement model with an estimator", eqs (1)-(4): a second-order nonlinear Nomoto model of yaw,
+coupled with surge.
 
     w'' = a w' + b1 w + b2 w|w| + b3 w^3 + ks (d delta + e delta')
     v'  = f w^2 + g v^2 + h n
@@ -13,7 +15,7 @@ alpha1 is in s/m, its alpha2 in 1/rpm and its alpha3 in s/m. The model is one of
 g v^2 has no sign, so that astern it drives her on.
 """
 
-from math import cos, exp, sin, sqrt
+from math import exp, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -100,69 +102,6 @@ def yaw_stiffness(c: Coefficients, w: float) -> float:
 def surge_acceleration(c: Coefficients, w: float, v: float, n: float) -> float:
     """v' of eq. (4), m/s^2."""
     return c.f * w * w + c.g * v * v + c.h * n
-
-
-class State(NamedTuple):
-    """Where the ship is and how it moves."""
-
-    w: float  # rad/s
-    w_dot: float  # rad/s^2
-    v: float  # m/s, ahead
-    heading: float  # rad
-    north: float  # m
-    east: float  # m
-
-
-class Forcing(NamedTuple):
-    """What acts on the ship from one instant on, until something changes."""
-
-    delta: float  # rad, at that instant
-    delta_dot: float  # rad/s
-    n: float  # rpm
-    moment: float  # rad/s^3: a yaw moment, as it stands in the equation for w''
-    wave: float  # rad/s^3, amplitude of a sinusoidal one
-    wave_frequency: float  # rad/s
-    force: float  # m/s^2: a surge force, as it stands in the equation for v'
-
-
-@compiled
-def motion(c: Coefficients, s: State, u: Forcing, t: float, after: float) -> State:
-    """The rate of change of the state, `after` seconds from the instant `t` of the forcing."""
-    delta = u.delta + u.delta_dot * after
-    moment = u.moment + u.wave * sin(u.wave_frequency * (t + after))
-    return State(
-        s.w_dot,
-        yaw_acceleration_rate(c, s.w, s.w_dot, s.v, u.n, delta, u.delta_dot) + moment,
-        surge_acceleration(c, s.w, s.v, u.n) + u.force,
-        s.w,
-        s.v * cos(s.heading),
-        s.v * sin(s.heading),
-    )
-
-
-@compiled
-def step(c: Coefficients, s: State, u: Forcing, t: float, h: float) -> State:
-    """One Runge-Kutta step of order four from `t` to `t + h`, no knot of the rudder between."""
-    k1 = motion(c, s, u, t, 0.0)
-    k2 = motion(c, _moved(s, k1, h / 2), u, t, h / 2)
-    k3 = motion(c, _moved(s, k2, h / 2), u, t, h / 2)
-    k4 = motion(c, _moved(s, k3, h), u, t, h)
-    s = _moved(s, k1, h / 6)
-    s = _moved(s, k2, h / 3)
-    s = _moved(s, k3, h / 3)
-    return _moved(s, k4, h / 6)
-
-
-@compiled
-def _moved(s: State, rate: State, h: float) -> State:
-    return State(
-        s.w + h * rate.w,
-        s.w_dot + h * rate.w_dot,
-        s.v + h * rate.v,
-        s.heading + h * rate.heading,
-        s.north + h * rate.north,
-        s.east + h * rate.east,
-    )
 
 
 def steady_speed(c: Coefficients, n: float) -> float:

@@ -4,11 +4,12 @@ import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import inf, pi
+from math import inf, nan, pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import UsageError, VesselError
+from .model_section import ModelSection, model_section
 from .settings import (
     DisturbanceSettings,
     FilterSettings,
@@ -31,7 +32,7 @@ class Vessel:
     """A ship: its model's coefficients, its steering gear, and how its logs are filtered."""
 
     name: str
-    coefficients: "Coefficients"
+    coefficients: "Coefficients | None"  # the paper's; None where the file has a `[model]` alone
     length: float | None = None  # m, between perpendiculars
     approach_rpm: float = 80.0
     rudder_max: float = 35 * pi / 180  # rad
@@ -40,6 +41,17 @@ class Vessel:
     disturbance: DisturbanceSettings = field(default_factory=DisturbanceSettings)
     identifier: IdentifierSettings = field(default_factory=IdentifierSettings)
     angle_unit: str = "rad"  # of its file; inside all angles are radians
+    model: ModelSection | None = None  # that she is sailed by, if not by the paper's
+
+    @property
+    def paper(self) -> "Coefficients":
+        """The paper's coefficients; raises `VesselError` where the file has none."""
+        if self.coefficients is None:
+            raise VesselError(
+                f"the vessel file has a [model] alone, and what is asked for is built on the "
+                f"paper's; give [yaw], [surge] and [rudder], too: {self.name}"
+            )
+        return self.coefficients
 
 
 _PAPER = """\
@@ -102,6 +114,7 @@ _KEYS: dict[str, dict[str, tuple[float, float]]] = {
     "surge": dict.fromkeys(("f", "g", "h"), (-inf, inf)),
 }
 _SETTINGS = ("filter", "disturbance", "identifier")
+_ALPHAS = ("alpha1", "alpha2", "alpha3")
 _TEXTS = ("name", "angle_unit")
 _POSITIVE = {"T1", "T2", "approach_rpm", "length", "max", "rate"}
 
@@ -140,13 +153,17 @@ def parse_vessel(text: str, where: str) -> Vessel:
     except tomllib.TOMLDecodeError as error:
         raise VesselError(f"not a TOML file ({error}); mend that line: {where}") from error
     faults: list[str] = []
+    own = table.pop("model", None)
     sections = {key: _section(key, table.pop(key, {}), faults) for key in _SETTINGS}
     filtering = filter_settings(sections["filter"], faults)
     observing = disturbance_settings(sections["disturbance"], faults)
     identifying = identifier_settings(sections["identifier"], faults)
     numbers = _numbers(table, faults)
-    form = _yaw_form(numbers["yaw"], faults)
-    _require(numbers, form, faults)
+    length = numbers[""].get("length", nan if "length" in table else None)  # one fault is enough
+    model = None if own is None else model_section(own, length, faults)
+    is_papers = own is None or _names_papers(table)
+    if is_papers:
+        _require(numbers, _yaw_form(numbers["yaw"], faults), faults)
     faults += [f"{key} must be a text" for key in _TEXTS if not isinstance(table.get(key, ""), str)]
     angle_unit = table.get("angle_unit", "rad")
     if angle_unit not in ("deg", "rad"):
@@ -159,8 +176,17 @@ def parse_vessel(text: str, where: str) -> Vessel:
     if faults:
         count = f"{len(faults)} faults" if len(faults) > 1 else "one fault"
         raise VesselError(f"{count} in the vessel file: {'; '.join(faults)}: {where}")
-    vessel = _vessel(str(table.get("name", Path(where).stem)), angle_unit, numbers)
-    return replace(vessel, filter=filtering, disturbance=observing, identifier=identifying)
+    per_rad = 180 / pi if angle_unit == "deg" else 1.0
+    coefficients = _coefficients(numbers, per_rad) if is_papers else None
+    vessel = _vessel(str(table.get("name", Path(where).stem)), coefficients, numbers, per_rad)
+    return replace(
+        vessel,
+        filter=filtering,
+        disturbance=observing,
+        identifier=identifying,
+        angle_unit=angle_unit,
+        model=model,
+    )
 
 
 def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
@@ -223,7 +249,8 @@ def _number(
 ) -> None:
     label = f"{section}.{key}" if section else key
     if key not in _KEYS[section]:
-        known = [*_KEYS[section], *(() if section else (*_TEXTS, *filter(None, _KEYS), *_SETTINGS))]
+        others = (*_TEXTS, *filter(None, _KEYS), *_SETTINGS, "model")
+        known = [*_KEYS[section], *(() if section else others)]
         faults.append(f"unknown key {label!r}{did_you_mean(key, known).replace(';', ',')}")
         return
     low, high = _KEYS[section][key]
@@ -232,6 +259,13 @@ def _number(
         faults.append(fault)
     else:
         into[key] = float(value)  # type: ignore[arg-type]
+
+
+def _names_papers(table: Mapping[str, Any]) -> bool:
+    """Whether a file means to give the paper's model, whole or not; steering gear is none of it."""
+    rudder = table.get("rudder", {})
+    alphas = isinstance(rudder, dict) and any(key in rudder for key in _ALPHAS)
+    return "yaw" in table or "surge" in table or alphas
 
 
 def _yaw_form(yaw: Mapping[str, float], faults: list[str]) -> tuple[str, ...]:
@@ -252,7 +286,7 @@ def _require(
     named = " ".join(faults)
     for section, keys in (
         ("yaw", form),
-        ("rudder", ("alpha1", "alpha2", "alpha3")),
+        ("rudder", _ALPHAS),
         ("surge", ("f", "g", "h")),
     ):
         missing = [k for k in keys if k not in numbers[section] and f"{section}.{k} " not in named]
@@ -260,18 +294,17 @@ def _require(
             faults.append(f"[{section}] lacks {', '.join(missing)}")
 
 
-def _vessel(name: str, angle_unit: str, numbers: Mapping[str, Mapping[str, float]]) -> Vessel:
+def _coefficients(numbers: Mapping[str, Mapping[str, float]], per_rad: float) -> "Coefficients":
     from .ship import Coefficients  # noqa: PLC0415 - numba, see above
 
-    per_rad = 180 / pi if angle_unit == "deg" else 1.0
-    yaw, rudder, surge, top = (numbers[s] for s in ("yaw", "rudder", "surge", ""))
+    yaw, rudder, surge = (numbers[s] for s in ("yaw", "rudder", "surge"))
     if "T1" in yaw:
         d = 1 / (yaw["T1"] * yaw["T2"])
         a, b1, e = -(yaw["T1"] + yaw["T2"]) * d, -d, yaw["T3"] * d
         b2, b3 = -yaw["c2"] * d, -yaw["c3"] * d
     else:
         a, b1, b2, b3, d, e = (yaw[key] for key in _PRODUCTS)
-    coefficients = Coefficients(
+    return Coefficients(
         a=a,
         b1=b1,
         b2=b2 * per_rad,
@@ -285,7 +318,15 @@ def _vessel(name: str, angle_unit: str, numbers: Mapping[str, Mapping[str, float
         alpha2=rudder["alpha2"],
         alpha3=rudder["alpha3"],
     )
-    defaults = Vessel(name, coefficients)
+
+
+def _vessel(
+    name: str,
+    coefficients: "Coefficients | None",
+    numbers: Mapping[str, Mapping[str, float]],
+    per_rad: float,
+) -> Vessel:
+    rudder, top, defaults = numbers["rudder"], numbers[""], Vessel(name, coefficients)
     return Vessel(
         name,
         coefficients,
@@ -293,5 +334,4 @@ def _vessel(name: str, angle_unit: str, numbers: Mapping[str, Mapping[str, float
         approach_rpm=top.get("approach_rpm", defaults.approach_rpm),
         rudder_max=rudder["max"] / per_rad if "max" in rudder else defaults.rudder_max,
         rudder_rate=rudder["rate"] / per_rad if "rate" in rudder else defaults.rudder_rate,
-        angle_unit=angle_unit,
     )

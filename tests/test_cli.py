@@ -10,7 +10,7 @@ import pytest
 
 from recorders.record import record
 from recorders.simulate import SimulatedTrial
-from shiplog import Channel, LogWriter, TrialLog, read, write
+from shiplog import Channel, LogWriter, TrialLog, load_vessel, read, write
 from shiplog.cli import DATA_LOST, FAILURE, FINE, USAGE, main
 
 PROJECT = Path(__file__).parents[1]
@@ -534,11 +534,33 @@ def test_a_ship_is_identified_validated_written_sailed_and_replayed(
     assert "identified (given)" in capsys.readouterr().out
 
 
+def test_a_ship_of_another_model_is_identified_written_sailed_and_replayed(
+    two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", *two_runs, "--model", "norrbin", "-o", "found.toml"]) == FINE
+    assert 'name = "norrbin"' in Path("found.toml").read_text(encoding="utf-8")
+    sway = "--sensor sway.white=0.05 --gust 2@50+50"
+    simulate = (
+        f"record simulate zigzag-10-10 --vessel found.toml --duration 200 {sway} -o again.mcap"
+    )
+    assert main(simulate.split()) == FINE
+    assert main(["replay", "again.mcap", "-o", "r.rrd"]) == FINE
+    assert "identified (carried by the log)" in capsys.readouterr().out
+    alone = Path("found.toml").read_text(encoding="utf-8").partition("[yaw]")[0]
+    Path("alone.toml").write_text(alone, encoding="utf-8")
+    assert main(["replay", "again.mcap", "--vessel", "alone.toml", "-o", "r.rrd"]) == FINE
+    said = capsys.readouterr()
+    assert "a first model, fitted to this log" in said.out
+    assert "has norrbin alone" in said.err
+
+
 def test_the_best_model_is_chosen_on_the_command_line(
     two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     capsys.readouterr()
-    assert main(["identify", *two_runs, "--model", "auto", "--json", "-"]) == FINE
+    assert (
+        main(["identify", *two_runs, "--model", "auto", "--json", "-", "-o", "best.toml"]) == FINE
+    )
     said = capsys.readouterr()
     found = json.loads(said.out)
     assert found["model"]["name"] in ("burylin", "burylin-tied")
@@ -546,6 +568,7 @@ def test_the_best_model_is_chosen_on_the_command_line(
         each["score"] for each in found["models"]
     )
     assert "Models by cross-validation" in said.err
+    assert load_vessel("best.toml")[0].model is None  # the paper's needs no [model]
 
 
 @pytest.mark.parametrize(
@@ -557,7 +580,6 @@ def test_the_best_model_is_chosen_on_the_command_line(
         (USAGE, "Z --known T4=1", "no parameter 'T4'; it has a, b1"),
         (USAGE, "Z --model burylon", "did you mean 'burylin'?"),
         (USAGE, "Z --model auto", "give two logs or more, or name the model"),
-        (USAGE, "Z --model slipstream -o x.toml", "identify burylin or burylin-tied for it"),
         (USAGE, "Z -o x.txt", "is a .toml file"),
         (USAGE, "Z --json Z", "the same file is named twice"),
         (FAILURE, "Z none.mcap", "no such file: none.mcap"),

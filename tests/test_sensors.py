@@ -136,6 +136,15 @@ def test_a_setting_that_makes_no_sense_is_refused(settings: dict[str, float], sa
         suite("paper", settings)
 
 
+def test_a_sway_is_measured_where_it_is_asked_for() -> None:
+    assert "sway" not in suite("paper")
+    assert suite("paper", {"sway.white": 0.05, "sway.rate_hz": 2.0})["sway"] == Sensor(
+        rate_hz=2.0, white=0.05
+    )
+    with pytest.raises(UsageError, match="a sensor has no 'noise'"):
+        suite("paper", {"sway.noise": 1.0})
+
+
 def test_an_unknown_suite_is_refused() -> None:
     with pytest.raises(UsageError, match="did you mean 'paper'"):
         suite("papers")

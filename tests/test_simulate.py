@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ladder import vessel_of
 
 from recorders.record import record
 from recorders.sensors import suite
@@ -141,3 +142,19 @@ def test_a_ship_that_runs_away_is_refused_by_name(vessel: Vessel) -> None:
     wild = replace(vessel, name="wild", coefficients=vessel.coefficients._replace(b3=1e4, a=0.5))
     with pytest.raises(UsageError, match="wild runs away"):
         simulate(wild, "turning-circle", duration_secs=500.0)
+
+
+def test_a_ship_with_a_sway_tells_it_where_she_is_asked(vessel: Vessel) -> None:
+    asked = suite("none", {"sway.white": 0.0})
+    rich, plain = (
+        simulate(ship, "zigzag-20-20", duration_secs=60.0, sensors=asked)
+        for ship in (vessel_of("three-dof"), vessel)
+    )
+    sway = {trial: {c.name: c for c in trial.channels}["sway"].values for trial in (rich, plain)}
+    assert np.ptp(sway[rich]) > 0.1
+    assert np.array_equal(sway[rich], rich.truth()["sway"].values)
+    assert not sway[plain].any()
+    assert "sway" not in plain.truth()
+    units = [trial.truth()["yaw_disturbance"].unit for trial in (rich, plain)]
+    assert units == ["rad/s²", "rad/s³"]
+    assert "sway" not in {c.name for c in simulate(vessel, "paper", duration_secs=9.0).channels}

@@ -4,13 +4,15 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
+from ladder import AHEAD, RPM, SHIPS, SPEED, approach, rates_in_si, vessel_of
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
 from recorders.manoeuvres import Manoeuvre, manoeuvre
 from recorders.voyage import Gust, Trajectory, Unrest, WaveMoment, sail
-from shiplog import Vessel, load_vessel
+from shiplog import UsageError, Vessel, load_vessel
 from shiplog.ship import rudder_effect, steady_speed
+from shiplog.ships import ship_model
 
 DEG = np.pi / 180
 
@@ -264,3 +266,111 @@ def test_the_zigzags_rudder_turns_where_the_heading_is_reached_in_unrest(vessel:
     headings = trajectory.rows[turns[1:], 4] / DEG
     assert headings == pytest.approx([20, -20, 20][: len(headings)], abs=1e-9)
     assert len(headings) >= 2
+
+
+# ---- every model of the ladder
+
+
+def rudder_at(t: float, vessel: Vessel) -> tuple[float, float]:
+    """Of a turning circle: it leaves its rest at 10 s."""
+    moving = 10 < t < 10 + 35 * DEG / vessel.rudder_rate
+    return min(max(t - 10, 0) * vessel.rudder_rate, 35 * DEG), moving * vessel.rudder_rate
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_an_independent_integrator_agrees_with_every_model(name: str) -> None:
+    vessel = replace(vessel_of(name), rudder_rate=2.3456 * DEG)
+    gust, wave = Gust(radians(3), 33.33, 40.0), WaveMoment(radians(1), 9.0)
+    circle = manoeuvre("turning-circle", 300.0, RPM)
+    trajectory = sail(vessel, circle, 300.0, gusts=(gust,), wave=wave)
+
+    def rates(t: float, x: np.ndarray) -> np.ndarray:
+        blown = gust.rudder if 33.33 <= t < 73.33 else 0.0
+        worth = blown + wave.rudder * np.sin(2 * np.pi * t / 9)
+        return rates_in_si(name, x, rudder_at(t, vessel), RPM, worth=worth)
+
+    x = trajectory.ship.begun(approach(name))
+    knots = [0.0, 10.0, 10 + 35 * DEG / vessel.rudder_rate, 33.33, 73.33, 300.0]
+    for start, end in pairwise(knots):
+        span = (start + 1e-12, end - 1e-12)
+        x = solve_ivp(rates, span, x, rtol=1e-11, atol=1e-13, method="DOP853").y[:, -1]
+    truth = {key: value[0] for key, value in trajectory.at(np.array([300.0])).items()}
+    final = rates_in_si(name, x, rudder_at(300.0, vessel), RPM)
+    over_ground = (final[-2] + 1j * final[-1]) * np.exp(-1j * x[-3])
+    assert truth["yaw_rate"] == pytest.approx(x[0] * SPEED / 180, rel=1e-6)
+    assert truth["speed"] == pytest.approx(over_ground.real, rel=1e-6)
+    assert truth["sway"] == pytest.approx(over_ground.imag, rel=1e-6, abs=1e-12)
+    assert truth["heading"] == pytest.approx(x[-3], rel=1e-6)
+    assert truth["position"] == pytest.approx(x[-2:], rel=1e-6)
+    assert trajectory.at(np.zeros(1))["speed"][0] == pytest.approx(approach(name))
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_a_gust_turns_every_ship_as_its_rudder_would(name: str) -> None:
+    vessel = vessel_of(name)
+    ahead = straight(vessel, 600.0)
+    order = replace(ahead.orders[0], time_secs=50.0, rudder=0.1 * DEG)
+    times = np.array([590.0])  # the rudder's way there is forgotten
+    calm, blown, steered = (
+        sailed.at(times)
+        for sailed in (
+            sail(vessel, ahead, 600.0),
+            sail(vessel, ahead, 600.0, gusts=(Gust(0.1 * DEG, 50.0),)),
+            sail(vessel, replace(ahead, orders=(*ahead.orders, order)), 600.0),
+        )
+    )
+    for channel in ("yaw_rate", "sway"):
+        by_gust, by_rudder = (s[channel] - calm[channel] for s in (blown, steered))
+        assert by_gust == pytest.approx(by_rudder, rel=2e-2)
+    assert blown["yaw_disturbance"][0] > 0
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_the_zigzags_rudder_of_every_model_turns_where_the_heading_is_reached(name: str) -> None:
+    trajectory = sailed(vessel_of(name), "zigzag-20-20", 400.0)
+    rate = trajectory.rows[:, -6]
+    turns = np.flatnonzero((rate[1:] != 0) & (rate[:-1] == 0)) + 1
+    headings = trajectory.rows[turns[1:], -10] / DEG
+    assert headings == pytest.approx([20, -20, 20, -20, 20, -20][: len(headings)], abs=1e-9)
+    assert len(headings) >= 3
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_the_yaw_acceleration_is_the_slope_of_the_yaw_rate(name: str) -> None:
+    trajectory = sailed(vessel_of(name), "zigzag-20-20", 200.0)
+    fine = np.arange(80.0, 84.0, 0.003)
+    truth = trajectory.at(fine)
+    slope = np.gradient(truth["yaw_rate"], fine, edge_order=2)
+    assert np.max(np.abs(slope - truth["yaw_acceleration"])[1:-1]) < 1e-7
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_an_unrest_pushes_the_speed_of_every_model_by_its_force(name: str) -> None:
+    vessel = vessel_of(name)
+    asked, rng = Unrest(force=0.02), np.random.default_rng(4)
+    pushed = sail(vessel, straight(vessel, 10.0), 10.0, unrest=asked, rng=rng)
+    edges = np.array([5.0, 5.1])
+    speeds, force = pushed.at(edges)["speed"], pushed.at(np.array([5.05]))["surge_disturbance"]
+    ahead = AHEAD[name]
+    x = pushed.rows[np.searchsorted(pushed.rows[:, 0], 5.0 - 1e-9), 1:-7]
+    free = SPEED * rates_in_si(name, x, (0.0, 0.0), RPM)[ahead]
+    assert (speeds[1] - speeds[0]) / 0.1 == pytest.approx(force[0] + free, rel=2e-2)
+
+
+def test_a_ship_without_a_steady_speed_is_refused() -> None:
+    vessel = vessel_of("nomoto")
+    assert vessel.model is not None
+    a, k, f, _, h = vessel.model.parameters
+    free = replace(vessel, model=replace(vessel.model, parameters=(a, k, f, 0.0, h)))
+    with pytest.raises(UsageError, match="a nomoto finds no steady speed at 90 rpm"):
+        sailed(free, "zigzag-20-20")
+
+
+def test_a_ship_of_any_model_that_runs_away_is_refused() -> None:
+    vessel = vessel_of("slipstream")
+    assert vessel.model is not None
+    parameters = list(vessel.model.parameters)
+    parameters[ship_model("slipstream").names.index("b2")] = 500.0
+    wild = replace(vessel, model=replace(vessel.model, parameters=tuple(parameters)))
+    with pytest.raises(UsageError, match="a slipstream runs away in turning-circle"):
+        sailed(wild, "turning-circle")

@@ -26,7 +26,6 @@ from .validation import Validation, rms_of, validate
 from .windows import windows
 
 AUTO = "auto"
-WRITABLE = ("burylin", "burylin-tied")  # models that a vessel file can hold
 ALPHAS = ("alpha1", "alpha2", "alpha3")
 UNEXPLAINED = 0.2  # of what was measured, in the rms: a fit that leaves more says little
 CONTRADICTING = 3.0  # times what noise explains: runs that differ so much are not one ship's
@@ -89,15 +88,14 @@ def identify(
     validation_logs: Sequence[Log] = (),
     known: Mapping[str, float] | None = None,
     vessel: Vessel | None = None,
-    among: Sequence[str] = LADDER,
     on_step: Tell = lambda _: None,
 ) -> IdentifiedShip:
     """Fit a model of `shiplog.ships` to logs of one ship, all at once.
 
-    `model` is a name of `LADDER`, or "auto": all are compared, and of those `among` which to choose
-    the one is taken that predicts each run best from the others. Without a name it is the paper's
-    model, tied where T3 is known. `known` parameters are not sought. Length, the rudder's alphas
-    and the steering gear are those of `vessel`, or of the vessel file the logs carry.
+    `model` is a name of `LADDER`, or "auto": all are compared, and the one is taken that predicts
+    each run best from the others. Without a name it is the paper's model, tied where T3 is known.
+    `known` parameters are not sought. Length, the rudder's alphas and the steering gear are those
+    of `vessel`, or of the vessel file the logs carry.
 
     Raises `LogError` where the logs cannot identify anything or are of different ships, and
     `UsageError` for names nobody knows.
@@ -116,7 +114,7 @@ def identify(
     candidates: list[Candidate] = []
     if model == AUTO:
         candidates = _compared(trials, considered, stated, ship, length, on_step)
-        fit = _best(candidates, among)
+        fit = _best(candidates)
     else:
         on_step(f"fit {model}")
         settled = _settled(considered[0], stated, ship)
@@ -133,7 +131,6 @@ def identify(
     every = [*runs, *held_out]
     warnings = [w for run in every for w in run.warnings]
     warnings += [*contradictions(every), *_doubts(fit, found, echo, validations)]
-    warnings += _passed_over(fit.problem.model, candidates)
     if fit.problem.scale.secs != 1.0 and length is None:
         warnings.append(
             f"no length is known, {fit.problem.scale.secs * fit.problem.scale.speed:.0f} m is "
@@ -174,7 +171,7 @@ def _require_known(models: Sequence[Model], known: Mapping[str, float]) -> None:
 def _settled(model: Model, known: Mapping[str, float], ship: Vessel | None) -> dict[str, float]:
     """What is known of a model's parameters: what was said, and the alphas of the vessel file."""
     settled = {name: known[name] for name in model.names if name in known}
-    if ship is not None:
+    if ship is not None and ship.coefficients is not None:
         alphas = {n: getattr(ship.coefficients, n) for n in ALPHAS if n in model.names}
         settled = alphas | settled
     return settled
@@ -196,25 +193,11 @@ def _compared(
     return sorted(found, key=lambda candidate: (candidate.fit is None, candidate.score))
 
 
-def _best(candidates: Sequence[Candidate], among: Sequence[str]) -> OutputError:
+def _best(candidates: Sequence[Candidate]) -> OutputError:
     for candidate in candidates:
-        if candidate.fit is not None and candidate.model.name in among:
+        if candidate.fit is not None:
             return candidate.fit
-    raise LogError(
-        f"{', '.join(among)}: each runs away on these logs; look at their signs and units, "
-        "or fit another model"
-    )
-
-
-def _passed_over(chosen: Model, candidates: Sequence[Candidate]) -> Iterator[str]:
-    """What predicts better than the model chosen, and was no choice."""
-    scores = {candidate.model.name: candidate.score for candidate in candidates}
-    if candidates and candidates[0].model.name != chosen.name:
-        best = candidates[0].model.name
-        yield (
-            f"{best} predicts these logs better, off by {100 * scores[best]:.0f} % where "
-            f"{chosen.name} is by {100 * scores[chosen.name]:.0f} %, but no vessel file holds it"
-        )
+    raise LogError("every model runs away on these logs; look at their signs and units")
 
 
 def _run_fits(fit: OutputError) -> Iterator[RunFit]:

@@ -1,92 +1,161 @@
-"""An identified ship as a vessel file, for `record simulate` and `replay`."""
+"""An identified ship as a vessel file, for `record simulate` and `replay`.
 
-from collections.abc import Iterator
+What is sailed is the model that was identified. What is filtered by is the paper's, which filters
+and observers are built on: where another was identified, that one is fitted beside it.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
 from math import degrees
 
 import numpy as np
 
-from shiplog.errors import LogError, UsageError
-from shiplog.ship import COEFFICIENT_UNITS, YAW_COEFFICIENTS, Coefficients
+from shiplog.errors import LogError
+from shiplog.model_section import PAPERS
+from shiplog.ship import COEFFICIENT_UNITS, YAW_COEFFICIENTS, Coefficients, rudder_effect
+from shiplog.ships import Model, ship_model
+from shiplog.vessel import Vessel
 
-from .identified import AUTO, WRITABLE, IdentifiedShip
+from .identified import ALPHAS, IdentifiedShip, Tell
+from .output_error import USUAL_LENGTH, OutputError, output_error
 from .trial import usual
+from .uncertainty import ECHO, VAGUE, Uncertainty, uncertainty
 
 SECTIONS = {"yaw": YAW_COEFFICIENTS, "surge": ("f", "g", "h")}
+SURGE = ("f", "f1", "f2", "g", "h", "p", "xvr", "x4", "xd")  # of any model; the others turn her
+
+WITH_PAPERS = ("", "# What `replay` filters by: the paper's model, fitted to the same logs.")
+WITHOUT_PAPERS = (
+    "",
+    "# The paper's model, by which `replay` filters, cannot be identified from these logs:",
+    "# `replay` fits a first one to each log.",
+)
 
 
-def require_writable(model: str | None) -> None:
-    """Refuse a model that a vessel file cannot hold, before any work."""
-    if model not in (*WRITABLE, AUTO, None):
-        raise UsageError(
-            f"a vessel file holds the paper's model, which simulation and filters are built on, "
-            f"and not {model}; identify {' or '.join(WRITABLE)} for it, or leave out -o"
-        )
-
-
-def vessel_toml(found: IdentifiedShip) -> str:
+def vessel_toml(found: IdentifiedShip, on_step: Tell = lambda _: None) -> str:
     """The text of the vessel file, each value with its 95 % interval or a caution.
 
-    Raises `LogError` where the model is none a vessel file can hold, or where the logs tell nothing
-    of the yaw or nothing of the surge.
+    Raises `LogError` where nobody knows anything of the yaw or of the surge: the logs tell nothing
+    of it, and not all of it is believed before any.
     """
-    if found.model.name not in WRITABLE:
+    for part in _untold(found.model, found.uncertainty):
         raise LogError(
-            f"a vessel file holds the paper's model, and not {found.model.name}; "
-            f"identify {' or '.join(WRITABLE)} for it"
+            f"nothing of the {part} is identifiable from these logs, and a vessel file "
+            "would hold numbers nobody knows; give a log of a zig-zag as well"
         )
-    for section, names in SECTIONS.items():
-        if not set(names) & {*found.told, *_tied(found)}:
-            raise LogError(
-                f"nothing of the {section} is identifiable from these logs, and a vessel file "
-                "would hold numbers nobody knows; give a log of a zig-zag as well"
-            )
-    return "\n".join(_lines(found)) + "\n"
+    if found.model.name in PAPERS:
+        own = [*_head(found), *_paper(found.fit, found.uncertainty)]
+        return _text([*own, *_rudder(found.vessel, found.fit)])
+    own = [*_head(found), *_model(found)]
+    on_step("fit the paper's model beside it")
+    paper = _beside(found)
+    if paper is None:
+        return _text([*own, *WITHOUT_PAPERS, *_rudder(found.vessel)])
+    return _text([*own, *WITH_PAPERS, *_paper(*paper), *_rudder(found.vessel, paper[0])])
 
 
-def _tied(found: IdentifiedShip) -> tuple[str, ...]:
-    """Coefficients that follow from others the logs tell."""
-    return ("b1", "e") if "d" in found.told and found.model.name == "burylin-tied" else ()
+def _text(lines: Iterable[str]) -> str:
+    return "\n".join(lines) + "\n"
 
 
-def _lines(found: IdentifiedShip) -> Iterator[str]:
+def _untold(model: Model, found: Uncertainty) -> Iterator[str]:
+    """Whether nothing is known of her yaw, of her surge.
+
+    By the noise alone: a model that is not the ship has wider intervals, and may be near enough.
+    """
+    told = (found.coloured <= VAGUE * np.abs(found.values)) & (found.prior_share <= ECHO)
+    for part in ("yaw", "surge"):
+        own = np.array([(name in SURGE) == (part == "surge") for name in found.names], bool)
+        priors = [model.parameter(name).prior_std for name in np.array(found.names)[own]]
+        if not (told[own].any() or np.isfinite(priors).all()):
+            yield part
+
+
+def _beside(found: IdentifiedShip) -> tuple[OutputError, Uncertainty] | None:
+    """The paper's model fitted to the same logs; None where it runs away or is no ship's.
+
+    It is not hers, so that no value of it need be told: it is as near as filters come. But its
+    second order has nothing to hold on to in a ship of the first: a pole that the rudder never
+    shows may lie anywhere, and a rudder that acts to the contrary side with it.
+    """
+    trials = found.fit.problem.trials
+    fits = [c.fit for c in found.candidates if c.model.name == "burylin" and c.fit is not None]
+    known = found.vessel.coefficients if found.vessel is not None else None
+    try:
+        fit = fits[0] if fits else output_error(
+            trials, ship_model("burylin"),
+            known={name: getattr(known, name) for name in ALPHAS} if known is not None else {},
+        )  # fmt: skip
+    except LogError:
+        return None
+    told, c = uncertainty(fit), _coefficients(fit)
+    works = rudder_effect(c, usual(trials, "speed"), usual(trials, "rpm")) * c.d > 0 > c.a
+    return (fit, told) if works else None
+
+
+def _head(found: IdentifiedShip) -> Iterator[str]:
     ship, trials = found.vessel, found.fit.problem.trials
     logs = ", ".join(dict.fromkeys(trial.name for trial in trials))
-    values = found.model.expand(found.fit.parameters.astype(np.complex128))
-    c = Coefficients(*(float(np.real(value)) for value in values))
     name = f"{ship.name if ship else 'ship'}, identified"
     yield f"# {found.model.title}, identified from {logs}"
     yield f"name = {_quoted(name)}"
     if ship is not None and ship.length is not None:
         yield f"length = {ship.length!r}"
+    elif found.model.dimensionless:
+        yield f"length = {USUAL_LENGTH!r}  # m, ASSUMED, for nobody gave it: the scale of [model]"
     yield f"approach_rpm = {round(usual(trials, 'rpm'), 3)!r}"
     yield 'angle_unit = "rad"'
-    remarks = _remarks(found)
+
+
+def _model(found: IdentifiedShip) -> Iterator[str]:
+    scale, remark = found.fit.problem.scale, _remarks(found.uncertainty)
+    yield "\n# what `record simulate` sails"
+    yield "[model]"
+    yield f"name = {_quoted(found.model.name)}"
+    yield f"speed = {scale.speed!r}  # m/s: with the length and rpm, the units of the equations"
+    yield f"rpm = {scale.rpm!r}"
+    for name, value in found.coefficients.items():
+        yield f"{name} = {value!r}  # {remark(name)}"
+
+
+def _paper(fit: OutputError, told: Uncertainty) -> Iterator[str]:
+    c, remark = _coefficients(fit), _remarks(told, tied=fit.problem.model.name == "burylin-tied")
     for section, names in SECTIONS.items():
         yield f"\n[{section}]"
         for key in names:
-            yield f"{key} = {getattr(c, key)!r}  # {COEFFICIENT_UNITS[key]}{remarks[key]}"
+            yield f"{key} = {getattr(c, key)!r}  # {COEFFICIENT_UNITS[key]}, {remark(key)}"
+
+
+def _rudder(ship: Vessel | None, paper: OutputError | None = None) -> Iterator[str]:
     yield "\n[rudder]"
-    for key in ("alpha1", "alpha2", "alpha3"):
-        yield f"{key} = {getattr(c, key)!r}  # {COEFFICIENT_UNITS[key]}, not identified"
+    alphas = {} if paper is None else {key: getattr(_coefficients(paper), key) for key in ALPHAS}
+    for key, value in alphas.items():
+        yield f"{key} = {value!r}  # {COEFFICIENT_UNITS[key]}, not identified"
     if ship is not None:
         yield f"max = {ship.rudder_max!r}  # rad, {degrees(ship.rudder_max):.4g}°"
         yield f"rate = {ship.rudder_rate!r}  # rad/s"
 
 
-def _remarks(found: IdentifiedShip) -> dict[str, str]:
-    """By coefficient of the equations: how sure it is."""
-    half = dict(zip(found.uncertainty.names, 1.96 * found.uncertainty.std, strict=True))
-    remarks = {}
-    for name in Coefficients._fields:
-        if name in found.told:
-            remarks[name] = f", ± {half[name]:.2g} (95 %)"
-        elif name in found.uncertainty.vague:
-            remarks[name] = ", NOT IDENTIFIABLE from these logs: a value that fits them, no more"
-        elif name in ("b1", "e") and found.model.name == "burylin-tied":
-            remarks[name] = ", tied: b1 = -d" if name == "b1" else ", tied: e = T3 d"
-        else:
-            remarks[name] = ", stated as known"
-    return remarks
+def _coefficients(fit: OutputError) -> Coefficients:
+    found: Coefficients = fit.problem.model.coefficients(fit.parameters)
+    return found
+
+
+def _remarks(found: Uncertainty, *, tied: bool = False) -> Callable[[str], str]:
+    """How sure a parameter of a fit is, by its name."""
+    half = dict(zip(found.names, 1.96 * found.std, strict=True))
+    echo = dict(zip(found.names, found.prior_share > ECHO, strict=True))
+
+    def remark(name: str) -> str:
+        if name in found.vague:
+            known = "believed before, for the most" if echo[name] else "a value that fits them"
+            return f"NOT IDENTIFIABLE from these logs: {known}"
+        if name in half:
+            return f"± {half[name]:.2g} (95 %)"
+        if tied and name in ("b1", "e"):
+            return "tied: b1 = -d" if name == "b1" else "tied: e = T3 d"
+        return "stated as known"
+
+    return remark
 
 
 def _quoted(text: str) -> str:

@@ -42,7 +42,7 @@ def _motion(c: Coefficients, x: ComplexArray, u: Forcing) -> tuple[complex, ...]
 
 @observations(Coefficients)
 def _observed(c: Coefficients, x: ComplexArray) -> tuple[complex, complex, complex, complex]:  # noqa: ARG001
-    return x[0], x[2], 0j, x[3]
+    return x[0], x[2], 0 * x[0], x[3]
 
 
 @compiled

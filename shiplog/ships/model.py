@@ -129,6 +129,11 @@ class Model:
         """The units of its equations for a ship of that length, in m, at that speed and rpm."""
         return Scale(length / speed, speed, rpm) if self.dimensionless else SI
 
+    def coefficients(self, parameters: Sequence[float] | FloatArray) -> Any:  # noqa: ANN401 - a `kind`
+        """The equations' coefficients, real, of the parameters."""
+        values = self.expand(np.array(parameters, np.complex128))
+        return self.kind(*(float(np.real(value)) for value in values))
+
     def simulate(
         self, parameters: FloatArray, initial: FloatArray, path: Path, count: int,
         *, offset: float = 0.0, scale: Scale = SI,

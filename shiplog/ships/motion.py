@@ -1,12 +1,12 @@
 """A ship's motion under a recorded rudder: one compiled loop for all models, with sensitivities.
 
 A model states its equations for a type of its own (`equations`, `observations`), written so that
-they hold for complex numbers too. A derivative is then had by moving a parameter along the
-imaginary axis by next to nothing (Squire and Trapp, "Using complex variables to estimate
-derivatives of real functions", 1998): exact to the last digit, with no step to choose and nothing
-to derive by hand. So |x| is `magnitude(x)`, e^x `exponential(x)`, the square root `root(x)`, and
-powers are products: numba's power of a complex number goes by its logarithm, and loses what is
-next to nothing.
+they hold for real numbers, with which a ship is sailed, and for complex ones too. A derivative is
+then had by moving a parameter along the imaginary axis by next to nothing (Squire and Trapp, "Using
+complex variables to estimate derivatives of real functions", 1998): exact to the last digit, with
+no step to choose and nothing to derive by hand. So |x| is `magnitude(x)`, e^x `exponential(x)`, the
+square root `root(x)`, and powers are products: numba's power of a complex number goes by its
+logarithm, and loses what is next to nothing.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ OUTPUTS = ("yaw_rate", "speed", "sway", "heading")  # what `observed` gives, in 
 class Forcing(NamedTuple):
     """What a ship is given at an instant."""
 
-    delta: complex  # rad
+    delta: complex  # rad, as all here: real where the state is
     delta_dot: complex  # rad/s
     n: float  # rpm
 
@@ -70,17 +70,29 @@ def magnitude(x: complex) -> complex:
     return x if x.real >= 0 else -x
 
 
-@compiled_within
 def exponential(x: complex) -> complex:
     """The same of e^x, at a fraction of the cost of a complex one."""
     return complex(exp(x.real), exp(x.real) * x.imag)
 
 
-@compiled_within
 def root(x: complex) -> complex:
     """The same of the square root."""
     size = sqrt(x.real)
     return complex(size, x.imag / (2 * size))
+
+
+case_of(exponential, complex)(exponential)
+case_of(root, complex)(root)
+
+
+@case_of(exponential, float)
+def _real_exponential(x: float) -> float:
+    return exp(x)
+
+
+@case_of(root, float)
+def _real_root(x: float) -> float:
+    return sqrt(x)
 
 
 @compiled_within

@@ -42,7 +42,7 @@ def _motion(c: Norrbin, x: ComplexArray, u: Forcing) -> tuple[complex, ...]:
 
 @observations(Norrbin)
 def _observed(c: Norrbin, x: ComplexArray) -> tuple[complex, complex, complex, complex]:  # noqa: ARG001
-    return x[0], x[1], 0j, x[2]
+    return x[0], x[1], 0 * x[0], x[2]
 
 
 @compiled

@@ -1,0 +1,229 @@
+"""A ship under way: what moves her, what pushes her off her way, and where she goes.
+
+One Runge-Kutta step of order four for every model, in real numbers: the paper's ship moves as
+`shiplog.ship` has her, to the last bit. A yaw moment is told as the rudder that turns her as much
+on the straight run of her approach, and changes what that rudder changes there, but for her loss of
+speed, the same to either side. So it pushes a ship with a sway to the side, too, as a rudder does.
+"""
+
+from dataclasses import dataclass
+from math import cos, sin
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shiplog.compiled import compiled, compiled_within
+from shiplog.ship import Coefficients
+from shiplog.ship import steady_speed as papers_steady_speed
+from shiplog.types import FloatArray
+from shiplog.vessel import Vessel
+
+from . import ship_model
+from .model import SI, Model, Scale
+from .motion import Forcing, motion, observed
+
+SLOWEST, FASTEST = 1e-6, 1e3  # of a steady run, in a model's unit of speed
+HALVINGS = 100
+
+Kind = tuple[float, ...]  # a model's `kind`, real
+
+
+class Acting(NamedTuple):
+    """What acts on the ship from one instant on, until something changes."""
+
+    delta: float  # rad, at that instant
+    delta_dot: float  # rad/s
+    n: float  # rpm
+    moment: float  # rad: a yaw moment, as the rudder that turns her as much,
+    wave: float  # rad, amplitude of a sinusoidal one
+    wave_frequency: float  # rad/s
+    force: float  # m/s^2: a surge force, as it stands in the equation of the speed
+
+
+class Hull(NamedTuple):
+    """What compiled code must know of a ship beside her coefficients."""
+
+    secs: float  # the units of her equations
+    speed: float  # m/s
+    rpm: float
+    ahead: int  # where in her state the speed stands
+    per_rudder: FloatArray  # (s,) what a moment of one rad of rudder adds to its rates
+
+
+@dataclass(frozen=True, eq=False)
+class Ship:
+    """A model with its coefficients and the units of its equations.
+
+    Her state is the model's, and after it the metres made good north and east, (s + 2,).
+    """
+
+    model: Model
+    coefficients: Kind
+    scale: Scale
+
+    def begun(self, speed: float) -> FloatArray:
+        """The state of a ship that goes north at a speed, in m/s."""
+        x = np.zeros(len(self.model.state) + 2)
+        x[self._at("speed")] = speed / self.scale.speed
+        return x
+
+    def hull(self, speed: float, rpm: float) -> Hull:
+        """The hull of a ship whose approach is at that speed, in m/s, and rpm."""
+        count, ahead = len(self.model.state), self._at("speed")
+        hull = Hull(self.scale.secs, self.scale.speed, self.scale.rpm, ahead, np.zeros(count))
+        starboard, port = (
+            rates_of(self.coefficients, hull, self.begun(speed), straight(rpm, delta), 0.0, 0.0)
+            for delta in (1.0, -1.0)
+        )
+        return hull._replace(per_rudder=(starboard - port)[:count] / 2)
+
+    def moment(self, hull: Hull) -> tuple[float, str]:
+        """A moment of one rad of rudder as her equation of yaw has it, and its unit.
+
+        In an equation of the second order that is rad/s³, in one of the first rad/s².
+        """
+        names, yaw = [value.name for value in self.model.state], self.yaw
+        acceleration = f"{names[yaw]}_dot"
+        if acceleration not in names:
+            return float(hull.per_rudder[yaw] / self.scale.secs), "rad/s²"
+        return float(hull.per_rudder[names.index(acceleration)] / self.scale.secs**2), "rad/s³"
+
+    def steady_speed(self, rpm: float) -> float:
+        """The speed ahead, m/s, at which a straight run at so many revolutions settles; 0 if none.
+
+        The paper's in closed form; of another model where nothing changes the speed, by bisection.
+        """
+        if isinstance(self.coefficients, Coefficients):
+            return papers_steady_speed(self.coefficients, rpm)
+        hull, ahead = self.hull(self.scale.speed, rpm), self._at("speed")
+
+        def gains(nu: float) -> bool:
+            x = self.begun(nu * self.scale.speed)
+            return bool(rates_of(self.coefficients, hull, x, straight(rpm), 0.0, 0.0)[ahead] > 0)
+
+        low, high = SLOWEST, FASTEST
+        if not gains(low) or gains(high):
+            return 0.0
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if gains(middle) else (low, middle)
+        return high * self.scale.speed
+
+    @property
+    def yaw(self) -> int:
+        """Where in her state the yaw rate stands."""
+        return self._at("yaw_rate")
+
+    def _at(self, channel: str) -> int:
+        return [value.channel for value in self.model.state].index(channel)
+
+
+def ship_of(vessel: Vessel) -> Ship:
+    """The ship of a vessel file: of its `[model]` if it has one, else the paper's."""
+    own = vessel.model
+    if own is None:
+        return Ship(ship_model("burylin"), vessel.paper, SI)
+    model = ship_model(own.name)
+    scale = model.scale(own.length, own.speed, own.rpm)
+    return Ship(model, model.coefficients(own.parameters), scale)
+
+
+def straight(rpm: float, delta: float = 0.0) -> Acting:
+    """Nothing that acts but the revolutions and a rudder that rests."""
+    return Acting(float(delta), 0.0, float(rpm), 0.0, 0.0, 0.0, 0.0)
+
+
+@compiled
+def rates_of(
+    c: Kind,
+    hull: Hull,
+    x: FloatArray,
+    u: Acting,
+    t: float,
+    after: float,
+) -> FloatArray:
+    """How the state changes, per s, `after` seconds from the instant `t` of what acts, (s + 2,)."""
+    rates = np.empty_like(x)
+    find_rates(c, hull, x, u, t, after, rates)
+    return rates
+
+
+@compiled_within
+def find_rates(
+    c: Kind,
+    hull: Hull,
+    x: FloatArray,
+    u: Acting,
+    t: float,
+    after: float,
+    rates: FloatArray,
+) -> None:
+    """Put them into `rates`."""
+    delta = u.delta + u.delta_dot * after
+    moment = u.moment + u.wave * sin(u.wave_frequency * (t + after))
+    own = motion(c, x, Forcing(delta, u.delta_dot * hull.secs, u.n / hull.rpm))
+    secs, per_rudder = hull.secs, hull.per_rudder
+    for i in range(len(own)):
+        rates[i] = own[i] / secs + per_rudder[i] * moment
+    rates[hull.ahead] += u.force / hull.speed
+    _, ahead, sway, heading = seen(c, x)
+    rates[len(own)] = hull.speed * (ahead * cos(heading) - sway * sin(heading))
+    rates[len(own) + 1] = hull.speed * (ahead * sin(heading) + sway * cos(heading))
+
+
+@compiled_within
+def step(
+    c: Kind,
+    hull: Hull,
+    x: FloatArray,
+    u: Acting,
+    t: float,
+    h: float,
+    work: FloatArray,
+) -> FloatArray:
+    """The state after `h` seconds from `t`, no knot of the rudder between.
+
+    `work` is (3, s + 2): what is returned is its first row, and holds until the next step.
+    """
+    after: FloatArray = work[0]
+    between, rates = work[1], work[2]
+    find_rates(c, hull, x, u, t, 0.0, rates)
+    after[:] = x
+    for i in range(len(x)):
+        after[i] += h / 6 * rates[i]
+        between[i] = x[i] + h / 2 * rates[i]
+    find_rates(c, hull, between, u, t, h / 2, rates)
+    for i in range(len(x)):
+        after[i] += h / 3 * rates[i]
+        between[i] = x[i] + h / 2 * rates[i]
+    find_rates(c, hull, between, u, t, h / 2, rates)
+    for i in range(len(x)):
+        after[i] += h / 3 * rates[i]
+        between[i] = x[i] + h * rates[i]
+    find_rates(c, hull, between, u, t, h, rates)
+    for i in range(len(x)):
+        after[i] += h / 6 * rates[i]
+    return after
+
+
+@compiled_within
+def seen(c: Kind, x: FloatArray) -> tuple[float, float, float, float]:
+    """What is observed of a state, in the units of the equations, real."""
+    values: tuple[Any, Any, Any, Any] = observed(c, x)  # of a real state real
+    return values
+
+
+@compiled_within
+def told(
+    c: Kind,
+    hull: Hull,
+    x: FloatArray,
+    rates: FloatArray,
+    yaw: int,
+) -> tuple[float, float, float, float, float, float, float]:
+    """Yaw rate and acceleration, speed ahead, sway, heading, north and east, SI."""
+    rho, ahead, sway, heading = seen(c, x)
+    acceleration = rates[yaw] / hull.secs
+    north, east = x[-2], x[-1]
+    ahead, sway = ahead * hull.speed, sway * hull.speed
+    return rho / hull.secs, acceleration, ahead, sway, heading, north, east
