@@ -68,9 +68,9 @@ diameter; the best figures published on them are 2 % and 3 to 6 %."""
 OVERSHOT = """
 Beyond 10° and 20°; goal of the first ones: 2°. MARIN's fit and the one from both were made from
 these zig-zags among others; HSVA's has seen neither. Under the recorded rudder the ships differ by
-the model alone. Steered by her own heading, the simulated ship is given the approach and the
-execute of the test, whose rudder began to go back at 10.11° and at 20.85°; her rudder's zero is
-taken to be right."""
+the model and by the rudder's zero, which no other run tells: she is unstable on a straight course,
+and half a degree of it moves an overshoot by degrees. Steered by her own heading, the simulated ship is given the approach and the
+execute of the test, whose rudder began to go back at 10.11° and at 20.85°; she corrects herself."""
 
 
 def tanker(figures: Path) -> None:

@@ -30,7 +30,7 @@ ALPHAS = ("alpha1", "alpha2", "alpha3")
 UNEXPLAINED = 0.2  # of what was measured, in the rms: a fit that leaves more says little
 CONTRADICTING = 3.0  # times what noise explains: runs that differ so much are not one ship's
 
-Tell = Callable[[str], None]
+Tell = Callable[..., None]  # of the step, and of the share of it that is done
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def identify(
     validation_logs: Sequence[Log] = (),
     known: Mapping[str, float] | None = None,
     vessel: Vessel | None = None,
-    on_step: Tell = lambda _: None,
+    on_step: Tell = lambda *_: None,
 ) -> IdentifiedShip:
     """Fit a model of `shiplog.ships` to logs of one ship, all at once.
 
@@ -187,8 +187,8 @@ def _compared(
 ) -> list[Candidate]:
     pose(trials, models[0], length=length)  # what nothing can be identified from is said at once
     found: list[Candidate] = []
-    for model in models:
-        on_step(f"cross-validate {model.name}")
+    for i, model in enumerate(models):
+        on_step(f"cross-validate {model.name}", i / len(models))
         found += compare(trials, [model], known=_settled(model, known, ship), length=length)
     return sorted(found, key=lambda candidate: (candidate.fit is None, candidate.score))
 
