@@ -237,7 +237,12 @@ def main() -> None:
     arguments = parser.parse_args()
     print(INTRODUCTION)
     known_ship(arguments.seeds)
-    methods(known_trial, load_vessel("table1")[0].paper)
+    free = ship_model("burylin")
+    methods(
+        known_trial,
+        lambda manoeuvre: true_bound(manoeuvre, FIRST_SEED, free, {}, "paper"),
+        load_vessel("table1")[0].coefficients,
+    )
     if KVLCC2.is_dir():
         tanker(arguments.figures)
     speed(lambda seconds, noise: known_trial(MANOEUVRES[0], FIRST_SEED, seconds, noise))

@@ -69,8 +69,9 @@ OVERSHOT = """
 Beyond 10° and 20°; goal of the first ones: 2°. MARIN's fit and the one from both were made from
 these zig-zags among others; HSVA's has seen neither. Under the recorded rudder the ships differ by
 the model and by the rudder's zero, which no other run tells: she is unstable on a straight course,
-and half a degree of it moves an overshoot by degrees. Steered by her own heading, the simulated ship is given the approach and the
-execute of the test, whose rudder began to go back at 10.11° and at 20.85°; she corrects herself."""
+and half a degree of it moves an overshoot by degrees. Steered by her own heading she corrects
+herself: the simulated ship is given the approach and the execute of the test, whose rudder began
+to go back at 10.11° and at 20.85°."""
 
 
 def tanker(figures: Path) -> None:
