@@ -241,7 +241,7 @@ def main() -> None:
     methods(
         known_trial,
         lambda manoeuvre: true_bound(manoeuvre, FIRST_SEED, free, {}, "paper"),
-        load_vessel("table1")[0].coefficients,
+        load_vessel("table1")[0].paper,
     )
     if KVLCC2.is_dir():
         tanker(arguments.figures)
