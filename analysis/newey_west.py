@@ -129,3 +129,12 @@ def _squares(influence: FloatArray, residual: FloatArray, n: np.int64, overlap: 
         run += influence[t] - (influence[t - overlap] if t >= overlap else 0.0)
         squares += run**2
     return squares
+
+
+def few_rows(b: FloatArray | float) -> FloatArray:
+    """What errors are to be enlarged by where rows overlap over a share `b` of them all.
+
+    The 95 % point of Kiefer and Vogelsang (2005) over the Gaussian's.
+    """
+    b = np.minimum(b, 1.0)
+    return np.asarray((1.96 + b * (2.9694 + b * (0.4160 - b * 0.5324))) / 1.96)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from shiplog.types import FloatArray
 
-from .newey_west import add_runs, no_runs, variances, window_variances
+from .newey_west import add_runs, few_rows, no_runs, variances, window_variances
 from .triangles import Solutions, solve_one
 from .two_stack import no_rows, push, rotate_all
 from .weak_form import Equation, Rows
@@ -198,15 +198,9 @@ def _judge(
     conditions = np.where(tells, found.conditions, np.inf)
     sure = (found.inflations > 0) & (found.inflations <= WORST_INFLATION)
     enlarged = np.full(len(known), np.nan)
-    few = _few_rows(equation.overlap / known[tells])
+    few = few_rows(equation.overlap / known[tells])
     enlarged[tells] = few * np.sqrt(independent[tells] / freedom[tells])
     return conditions, sure & (conditions <= worst_condition), enlarged
-
-
-def _few_rows(b: FloatArray) -> FloatArray:
-    """The 95 % point of Kiefer and Vogelsang over the Gaussian's, b the overlap over the rows."""
-    b = np.minimum(b, 1.0)
-    return np.asarray((1.96 + b * (2.9694 + b * (0.4160 - b * 0.5324))) / 1.96)
 
 
 def _known(rows: Rows) -> tuple[FloatArray, NDArray[np.bool_]]:

@@ -6,6 +6,8 @@ import numpy as np
 
 from analysis.identify.courses import Courses, begins_secs, run_secs, two_priors, with_breaks
 
+ANYWHERE = np.full(5, -np.inf), np.full(5, np.inf)
+
 
 def courses(high: list[float], low: list[float]) -> Courses:
     values = np.array([high, low])[:, :, None]
@@ -46,14 +48,14 @@ def test_without_a_prior_nothing_is_an_echo() -> None:
 
 def test_priors_lie_to_either_side_and_further_off_where_little_is_told() -> None:
     told = SimpleNamespace(values=np.array([2.0, -1.0, 1.0]), std=np.array([0.01, 0.2, 50.0]))
-    high, low = two_priors(told)  # type: ignore[arg-type]
+    high, low = two_priors(told, ANYWHERE)  # type: ignore[arg-type]
     np.testing.assert_allclose((high + low) / 2, told.values)
     np.testing.assert_allclose(np.abs(high - low) / 2, [0.6, 0.6, 1.0])
 
 
 def test_a_value_of_zero_has_priors_that_differ() -> None:
     told = SimpleNamespace(values=np.array([0.0]), std=np.array([0.1]))
-    high, low = two_priors(told)  # type: ignore[arg-type]
+    high, low = two_priors(told, ANYWHERE)  # type: ignore[arg-type]
     assert high[0] != low[0]
 
 
@@ -74,3 +76,10 @@ def test_between_runs_there_is_a_break() -> None:
     assert values.shape == (4, 3)
     assert np.isnan(values[2]).all()
     np.testing.assert_array_equal(with_breaks([np.arange(2.0), np.array([5.0])]), [0, 1, 1, 5])
+
+
+def test_priors_stay_within_the_limits_of_their_parameters() -> None:
+    told = SimpleNamespace(values=np.array([0.5, 2.0]), std=np.array([9.0, 9.0]))
+    bounds = np.array([0.02, -np.inf, -np.inf]), np.array([np.inf, 2.5, np.inf])
+    high, low = two_priors(told, bounds)  # type: ignore[arg-type]
+    np.testing.assert_allclose(np.sort([high, low], axis=0), [[0.02, 0.0], [1.0, 2.5]])

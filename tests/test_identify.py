@@ -333,3 +333,53 @@ def test_a_coefficient_that_is_nearly_none_is_told_to_be_so() -> None:
     i = told.names.index("b1")
     assert "b1" not in told.vague
     assert abs(told.values[i]) < 2.5 * told.std[i] < 2e-5
+
+
+@pytest.mark.parametrize("missing", ["sway", "heading"])
+def test_what_one_run_lacks_is_told_by_the_others(missing: str) -> None:
+    log = a_log(seed=1)
+    speed = log["speed"]
+    sway = replace(speed, name="sway", values=np.zeros(len(speed)))
+    whole = replace(a_log(), channels=(*a_log().channels, replace(sway, name="sway")))
+    found = identify([whole, without(log, missing)], "slipstream")
+    assert missing in found.fit.problem.outputs
+    assert np.isfinite(found.fit.parameters).all()
+
+
+def test_drift_lag_without_a_sway_has_courses_and_no_traceback() -> None:
+    found = identify([a_log()], "drift-lag")
+    assert "Td" in found.uncertainty.vague
+    assert np.isfinite(found.courses[0].values[0, 0]).all()
+
+
+def test_a_piece_without_a_speed_is_fitted_with_the_others() -> None:
+    log = with_gaps(a_log(seed=1, noise="white"), "speed", (200, 401))
+    found = identify([with_gaps(log, "rudder", (190, 210))], "slipstream")
+    assert len(found.fit.problem.trials) == 2
+    assert np.isfinite(found.fit.parameters).all()
+
+
+def test_a_held_out_run_that_begins_with_the_engine_stopped_is_no_traceback() -> None:
+    log = a_log(seed=2, noise="white")
+    rpm = log["rpm"]
+    values = np.where(rpm.measured_ns - rpm.measured_ns[0] < 30e9, 0.0, rpm.values)
+    stopped = replace(
+        log, channels=tuple(replace(c, values=values) if c is rpm else c for c in log.channels)
+    )
+    assert identify([a_log()], validation_logs=[stopped]).validations
+
+
+def test_one_log_whose_halves_differ_is_not_called_many() -> None:
+    found = identify([a_log(seconds=600.0)], "nomoto")
+    said = [w for w in found.warnings if "contradict" in w]
+    assert all(w.startswith("the halves of zigzag-20-20-0.mcap contradict") for w in said)
+
+
+def test_how_a_window_is_chosen_is_no_matter_of_the_ship() -> None:
+    windowed = TOML + "\n[identifier]\nwindow_secs = 300.0\n"
+    assert identify([a_log(), a_log(seed=1, toml=windowed)]).vessel is not None
+
+
+def test_what_is_known_must_lie_within_the_models_limits() -> None:
+    with pytest.raises(UsageError, match=r"a3 must be a finite number from -inf to 0, got 0\.5"):
+        identify([a_log()], "norrbin", known={"a3": 0.5})

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -164,3 +165,15 @@ def test_an_unwritable_path_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(ShiplogError):
         write_review(ship(), tmp_path / "no" / "such" / "folder.rrd")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_piece_of_a_log_is_drawn_where_it_was() -> None:
+    log = a_log("zigzag-20-20", 0)
+    rudder = log["rudder"]
+    at = (rudder.measured_ns - rudder.measured_ns[0]) * 1e-9
+    values = np.where((at >= 180) & (at < 220), np.nan, rudder.values)
+    channels = tuple(replace(c, values=values) if c is rudder else c for c in log.channels)
+    sheets = list(run_sheets(identify([replace(log, channels=channels)], "burylin")))
+    measured, simulated = sheets[1].outputs[0].series
+    assert measured.time_secs[0] == pytest.approx(simulated.time_secs[0], abs=0.2)
+    assert measured.time_secs[-1] == pytest.approx(simulated.time_secs[-1], abs=0.2)

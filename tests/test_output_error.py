@@ -234,3 +234,16 @@ def test_ten_seconds_are_too_short_and_gaps_part_a_trial() -> None:
     pieces = trials_of(Signals(s.start_ns, s.dt_secs, values), "gap.mcap")
     assert [len(piece) for piece in pieces] == [2000, len(s) - 2300]
     assert all(np.isfinite(piece.signals["rudder"]).all() for piece in pieces)
+
+
+def test_a_sparse_run_does_not_hide_what_stays_off_in_another() -> None:
+    rng = np.random.default_rng(0)
+    slow = np.zeros(6000)
+    for k in range(1, len(slow)):
+        slow[k] = 0.99 * slow[k - 1] + 0.1 * np.sqrt(1 - 0.99**2) * rng.standard_normal()
+    dense = Left(slow + 0.01 * rng.standard_normal(6000), np.zeros(6000), 0.1)
+    sparse = Left(0.1 * rng.standard_normal(2), np.zeros(2), 600.0)
+    alone = noise_of([dense], proportional=False, least=1e-9)
+    beside = noise_of([dense, sparse], proportional=False, least=1e-9)
+    assert beside.slow == pytest.approx(alone.slow, rel=0.05)
+    assert beside.slow_secs == pytest.approx(alone.slow_secs, rel=0.3)

@@ -49,7 +49,7 @@ def test_with_the_truth_for_a_prior_it_finds_the_truth_whatever_it_is_worth() ->
 
 def test_from_two_priors_it_comes_apart_where_the_fit_does_not() -> None:
     fit, told = fitted()
-    found = papers_scheme(fit, two_priors(told))
+    found = papers_scheme(fit, two_priors(told, fit.problem.bounds))
     assert found is not None
     echo = dict(zip(found.names, found.usual_echo, strict=True))
     assert echo["d"] > 0.5
@@ -59,7 +59,7 @@ def test_from_two_priors_it_comes_apart_where_the_fit_does_not() -> None:
 
 def test_it_knows_the_papers_model_alone() -> None:
     fit, told = fitted("norrbin")
-    assert papers_scheme(fit, two_priors(told)) is None
+    assert papers_scheme(fit, two_priors(told, fit.problem.bounds)) is None
     assert windows(fit) is None
 
 

@@ -131,6 +131,8 @@ def _taken_in(
         step, covariance = _corrected(belief, mean, H * root[:, None], off[known] * root)
         mean = _within(problem, mean + step)
     end = _run(problem, mean, path, len(measured), moved)
+    if not np.isfinite(end.state).all():  # the ship has run away, and there is no more to believe
+        return _Belief(np.full_like(mean, np.nan), np.full_like(covariance, np.nan))
     ahead = mean.copy()
     states = slice(len(problem.free), len(problem.free) + len(problem.model.state))
     ahead[states] = end.state

@@ -65,16 +65,19 @@ def _median(values: FloatArray) -> float:
     return float(np.median(known)) if len(known) else np.nan
 
 
-def two_priors(told: Uncertainty) -> FloatArray:
-    """(2, p) to either side of the values of a fit, by turns high and low.
+def two_priors(told: Uncertainty, bounds: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """(2, p) to either side of the values of a fit, by turns high and low, within bounds.
 
-    They are off by `OFF` of the value, by more where that is no more than its uncertainty.
+    They are off by `OFF` of the value, by more where that is no more than its uncertainty. The
+    bounds, of a problem, may be of more unknowns.
     """
     size = np.abs(told.values)
     reach = np.clip(3 * told.std, OFF * size, MOST_OFF * size)
     reach = np.where(reach > 0, reach, np.minimum(3 * told.std, 1.0))
     sides = np.where(np.arange(len(size)) % 2, -1.0, 1.0)
-    return np.array([told.values + sides * reach, told.values - sides * reach])
+    either = np.array([told.values + sides * reach, told.values - sides * reach])
+    lowest, highest = (bound[: len(size)] for bound in bounds)
+    return np.asarray(np.clip(either, lowest, highest))
 
 
 def with_breaks(parts: Sequence[FloatArray]) -> FloatArray:

@@ -36,9 +36,8 @@ def second_run(fit: OutputError, told: Uncertainty) -> Echo:
     """Fit once more, each prior moved by its standard deviation, each start by much."""
     problem, p = fit.problem, len(told.names)
     moved = _with_other_priors(problem)
-    lowest, highest = moved.bounds
     start = fit.minimum.unknowns.copy()
-    start[:p] = np.clip(two_priors(told)[0], lowest[:p], highest[:p])
+    start[:p] = two_priors(told, moved.bounds)[0]
     again = minimise(moved, start, fit.spreads)
     there = minimise(moved, fit.minimum.unknowns, fit.spreads, fit.minimum.jacobians)
     worse_by = again.cost - there.cost if np.isfinite(again.cost) else np.inf

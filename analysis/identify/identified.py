@@ -124,7 +124,7 @@ def identify(
     on_step("echo")
     echo = second_run(fit, found)
     found = replace(found, prior_share=np.fmax(found.prior_share, echo.shares))
-    priors = two_priors(found)
+    priors = two_priors(found, fit.problem.bounds)
     courses = augmented(fit, priors), windows(fit), papers_scheme(fit, priors)
     on_step("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
@@ -164,8 +164,15 @@ def _require_known(models: Sequence[Model], known: Mapping[str, float]) -> None:
                 f"--known {name} is in {' or '.join(sorted(units))}, as the model has it; "
                 "name the model with --model"
             )
-        if not np.isfinite(value):
-            raise UsageError(f"--known {name} must be a finite number, got {value}")
+        lowest, highest = (
+            pick(getattr(model.parameter(name), limit) for model in having)
+            for pick, limit in ((max, "lowest"), (min, "highest"))
+        )
+        if not (np.isfinite(value) and lowest <= value <= highest):
+            raise UsageError(
+                f"--known {name} must be a finite number from {lowest:g} to {highest:g}, "
+                f"got {value:g}"
+            )
 
 
 def _settled(model: Model, known: Mapping[str, float], ship: Vessel | None) -> dict[str, float]:
@@ -254,9 +261,11 @@ def _doubts(
     yield from _unexplained(fit)
     apart = found.agreement.contradiction
     if apart > CONTRADICTING:
+        alone = len(fit.problem.runs) == 1
+        who = f"the halves of {fit.problem.trials[0].name}" if alone else "the logs"
         odd = f", {found.agreement.odd} the others" if found.agreement.odd else ""
         yield (
-            f"the logs contradict each other{odd}, {apart:.0f} times what their noise explains: "
+            f"{who} contradict each other{odd}, {apart:.0f} times what their noise explains: "
             "another ship, loading or depth, or a model that is not hers; the intervals allow for "
             "it"
         )

@@ -110,7 +110,9 @@ def _line(x: FloatArray | None, y: FloatArray, weight: FloatArray) -> tuple[floa
 
 def _slow(every: Sequence[Left], stds: Sequence[FloatArray]) -> tuple[float, float]:
     """The std of the part that stays, and for how many seconds it does."""
-    step = max((left.interval_secs for left in every), default=1.0)
+    pairs = [(left, std) for left, std in zip(every, stds, strict=True) if len(left.off) > 1]
+    every, stds = [left for left, _ in pairs], [std for _, std in pairs]
+    step = min((left.interval_secs for left in every), default=1.0)
     longest = max((len(left.off) * left.interval_secs for left in every), default=0.0) / 4
     count = min(LAGS, int(longest / step + 1e-9))
     first = [_autocovariance(every, stds, lag * step) for lag in range(1, count + 1)]
@@ -132,7 +134,9 @@ def _autocovariance(
     """At a lag, those sure of themselves counting for more; and its error if there is none."""
     total = weights = 0.0
     for left, std in zip(every, stds, strict=True):
-        lag = max(1, round(lag_secs / left.interval_secs))
+        lag = round(lag_secs / left.interval_secs)
+        if lag < 1:  # its samples are further apart
+            continue
         weight = 1 / (std[lag:] * std[:-lag]) ** 2
         total += float(np.sum(weight * left.off[lag:] * left.off[:-lag]))
         weights += float(np.sum(weight))

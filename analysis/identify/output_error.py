@@ -183,7 +183,8 @@ def _refined(found: OutputError) -> OutputError:
 def _rms_left(problem: Problem, minimum: Minimum) -> FloatArray:
     """(c,) of each output over all trials."""
     left = np.concatenate(residuals(problem, minimum.unknowns))
-    return np.asarray(np.sqrt(np.nanmean(left**2, axis=0)))
+    known = np.isfinite(left).sum(axis=0)
+    return np.asarray(np.sqrt(np.nansum(left**2, axis=0) / np.maximum(known, 1)))
 
 
 def _with_waves(calm: OutputError) -> OutputError:

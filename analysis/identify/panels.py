@@ -102,7 +102,7 @@ def _sheet(
 
 def _output(origin: str, trial: Trial, simulated: FloatArray, name: str) -> Panel:
     column, unit, scale = OUTPUTS.index(name), *_peoples(name)
-    at, values = measured_line(trial.measured[:, column] * scale, trial.dt_secs)
+    at, values = _samples(trial, trial.measured[:, column] * scale)
     measured = Series("measured", at, (Line("measured", values, GREY, 2.5),), spiky=True)
     line = Line("simulated", simulated[:, column] * scale, COLOURS[name], 1.5)
     drawn = Series("simulated", trial.signals.time_secs, (line,))
@@ -110,6 +110,12 @@ def _output(origin: str, trial: Trial, simulated: FloatArray, name: str) -> Pane
         f"{origin}/{name}", f"{name.replace('_', ' ')} [{unit}]",
         (thinned(measured), thinned(drawn)), limits(values, line.values),
     )  # fmt: skip
+
+
+def _samples(trial: Trial, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The times and the values of what was measured; a piece of a log begins within it."""
+    at, known = measured_line(values, trial.dt_secs)
+    return at + trial.signals.time_secs[0], known
 
 
 def _peoples(name: str) -> tuple[str, float]:
@@ -136,7 +142,7 @@ def _normalised(
 
 
 def _residual(origin: str, trial: Trial, name: str, normalised: FloatArray) -> Panel:
-    at, values = measured_line(normalised, trial.dt_secs)
+    at, values = _samples(trial, normalised)
     drawn = Series("normalised", at, (Line("residual", values, COLOURS[name]),), spiky=True)
     ends = trial.signals.time_secs[[0, -1]]
     return Panel(

@@ -47,8 +47,8 @@ def papers_scheme(fit: OutputError, priors: FloatArray) -> Courses | None:
 
 def _coefficients(fit: OutputError, prior: FloatArray) -> Coefficients:
     """The paper's coefficients with these values of the parameters that were sought."""
-    values = fit.problem.parameters(prior).astype(np.complex128)
-    return Coefficients(*(complex(value).real for value in fit.problem.model.expand(values)))
+    found: Coefficients = fit.problem.model.coefficients(fit.problem.parameters(prior))
+    return found
 
 
 def _courses(

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from shiplog.ships import Model, Scale
+from shiplog.ships import Model, Scale, StateValue
 from shiplog.ships.motion import OUTPUTS
 from shiplog.types import FloatArray
 
@@ -130,7 +130,23 @@ class Problem:
                 known = trial.measured[:, OUTPUTS.index(value.channel)]
                 known = known[np.isfinite(known)][:first]
                 state[i] = np.median(known) / self.scale.of_channel(value.channel)
+            elif np.isinf(value.prior_std):
+                state[i] = self._elsewhere(value)[0]
         return state
+
+    def _elsewhere(self, value: StateValue) -> tuple[float, float]:
+        """Of a state nothing measures in one trial: its mean in the others, and by what it differs.
+
+        In the units of the equations.
+        """
+        if value.channel not in OUTPUTS:
+            return 0.0, 1.0
+        column = OUTPUTS.index(value.channel)
+        known = np.concatenate([trial.measured[:, column] for trial in self.trials])
+        known = known[np.isfinite(known)] / self.scale.of_channel(value.channel)
+        if not len(known):
+            return (1.0 if value.channel == "speed" else 0.0), 1.0
+        return float(np.mean(known)), float(np.std(known))
 
     @cached_property
     def prior(self) -> tuple[FloatArray, FloatArray]:
@@ -140,7 +156,10 @@ class Problem:
         for i, trial in enumerate(self.trials):
             for value in self.model.state:
                 measured = value.channel in self.outputs and trial.has(value.channel or "")
-                stds.append(inf if measured else value.prior_std)
+                alone = (
+                    value.prior_std if np.isfinite(value.prior_std) else self._elsewhere(value)[1]
+                )
+                stds.append(inf if measured else alone)
             stds += [self.nuisance.rudder_std] * self._offsets + [std for _, std in self.biases]
             for _ in self._waves(i):
                 stds += [WAVE_CYCLES * 2 * pi / (len(trial) * trial.dt_secs)]

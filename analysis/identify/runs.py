@@ -10,7 +10,7 @@ from shiplog.clock import resample
 from shiplog.errors import LogError, UsageError
 from shiplog.quality import faults
 from shiplog.rudder_sign import rudder_sign_warning
-from shiplog.settings import DisturbanceSettings, FilterSettings
+from shiplog.settings import DisturbanceSettings, FilterSettings, IdentifierSettings
 from shiplog.survey import Survey, survey_log
 from shiplog.types import FloatArray, Log
 from shiplog.vessel import Vessel, parse_vessel
@@ -145,12 +145,16 @@ def _bare(vessel: Vessel) -> Vessel:
     return replace(
         vessel, name="", approach_rpm=1.0, angle_unit="rad",
         filter=FilterSettings(), disturbance=DisturbanceSettings(),
+        identifier=IdentifierSettings(),
     )  # fmt: skip
 
 
 def contradictions(runs: Sequence[Run]) -> Iterator[str]:
     """What makes runs look like those of different ships."""
-    paces = {run.name: usual(run.trials, "speed") / usual(run.trials, "rpm") for run in runs}
+    under_way = [run for run in runs if usual(run.trials, "rpm") > 0]
+    paces = {run.name: usual(run.trials, "speed") / usual(run.trials, "rpm") for run in under_way}
+    if len(paces) < 2:
+        return
     fast, slow = max(paces, key=lambda n: paces[n]), min(paces, key=lambda n: paces[n])
     if paces[fast] > UNLIKE * paces[slow]:
         yield (

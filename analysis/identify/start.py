@@ -42,8 +42,7 @@ def _moved(problem: Problem, start: FloatArray, values: dict[str, float]) -> Flo
 
 def _by_weak_form(problem: Problem) -> dict[str, float]:
     """The paper's coefficients, as far as the rows of all trials tell them; 0 for b2, b3 if not."""
-    values = problem.model.expand(problem.values.astype(np.complex128))
-    model = Coefficients(*(complex(value).real for value in values))
+    model = problem.model.coefficients(problem.values)
     pairs = [
         weak_form(trial.signals, model)
         for trial in problem.trials

@@ -87,7 +87,7 @@ def _bridged(values: FloatArray, dt: float) -> FloatArray:
 def usual(trials: Sequence[Trial], channel: str) -> float:
     """The greatest of what the trials began with, over their first ten seconds: of speed or rpm."""
     firsts = [
-        np.nanmedian(np.abs(trial.signals[channel][: max(2, round(10 / trial.dt_secs))]))
-        for trial in trials
+        np.abs(trial.signals[channel][: max(2, round(10 / trial.dt_secs))]) for trial in trials
     ]
-    return float(np.nanmax(firsts))
+    known = [np.nanmedian(first) for first in firsts if np.isfinite(first).any()]
+    return float(max(known, default=np.nan))

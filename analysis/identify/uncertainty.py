@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t
 
+from analysis.newey_west import few_rows
 from shiplog.types import FloatArray
 
 from .agreement import Agreement, agreement_of
@@ -141,13 +142,10 @@ def _sandwich(fit: OutputError, left: Sequence[FloatArray], inverse: FloatArray)
         starts = np.vstack((np.zeros((window, sums.shape[1])), sums))
         runs = ends - starts
         at = problem.places(i)
-        middle[np.ix_(at, at)] += few(window / len(scores)) ** 2 * (runs.T @ runs) / window
+        middle[np.ix_(at, at)] += (
+            float(few_rows(window / len(scores))) ** 2 * (runs.T @ runs) / window
+        )
     return np.asarray(inverse @ middle @ inverse)
-
-
-def few(b: float) -> float:
-    """The 95 % point of Kiefer and Vogelsang (2005) over the Gaussian's, windows b of the whole."""
-    return (1.96 + b * (2.9694 + b * (0.4160 - b * 0.5324))) / 1.96
 
 
 def _left_out(fit: OutputError) -> FloatArray:

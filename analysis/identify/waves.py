@@ -31,8 +31,10 @@ def frequency_of(
         return None
     best, found = 1.0, None
     for c in range(residuals.shape[1]):
-        power = _periodogram(residuals[:, c], usual[:, c], grid * dt)
         known = np.isfinite(residuals[:, c])
+        if known.sum() < 2:
+            continue
+        power = _periodogram(residuals[:, c], usual[:, c], grid * dt)
         whole = slow[c] ** 2 * float(np.sum(usual[known, c] ** -2.0)) if slow else 0.0
         peak = int(np.argmax(power))
         share = power[peak] / max(SURE, MOST * whole)

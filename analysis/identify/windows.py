@@ -26,10 +26,12 @@ def windows(fit: OutputError) -> Courses | None:
     usable = [t for t in problem.trials if all(t.has(c) for c in CHANNELS if c in OUTPUTS)]
     if problem.model.kind is not Coefficients or not usable:
         return None
-    values = problem.model.expand(fit.parameters.astype(np.complex128))
-    model = Coefficients(*(complex(value).real for value in values))
-    begins = dict(zip(map(id, problem.trials), begins_secs(problem.trials), strict=True))
-    parts = [_history(trial, model, begins[id(trial)], names) for trial in usable]
+    model = problem.model.coefficients(fit.parameters)
+    parts = [
+        _history(trial, model, begins, names)
+        for trial, begins in zip(problem.trials, begins_secs(problem.trials), strict=True)
+        if trial in usable
+    ]
     times, found, stds = (with_breaks(each) for each in zip(*parts, strict=True))
     return Courses(METHOD, names, times, found[None], stds[None], np.full((1, len(names)), np.nan))
 

@@ -188,6 +188,13 @@ class Model:
         self, parameters: ComplexArray, initial: ComplexArray, offset: complex, path: Path,
         count: int,
     ) -> ComplexArray:  # fmt: skip
-        """The outputs, (count, 4); `initial` is left where the run ends."""
+        """The outputs, (count, 4); `initial` is left where the run ends.
+
+        Where an equation divides by nothing, as by the speed of a ship that stands, there are none.
+        """
         coefficients = self.kind(*(complex(value) for value in self.expand(parameters)))
-        return self.compiled(coefficients, initial, complex(offset), path, count)
+        try:
+            return self.compiled(coefficients, initial, complex(offset), path, count)
+        except ZeroDivisionError:  # numba's, of complex numbers
+            initial[:] = np.nan
+            return np.full((count, len(OUTPUTS)), np.nan + 0j)

@@ -99,9 +99,9 @@ def _real_root(x: float) -> float:
 def sail(c: Any, x: ComplexArray, offset: complex, path: Path, samples: int) -> ComplexArray:  # noqa: ANN401
     """The outputs at so many samples, (samples, 4), of a run that begins in the state `x`.
 
-    `x` is left where the run ends. `offset` is added to the rudder. One Runge-Kutta step of order
-    four for each step of the path; where there are samples between its ends, Hermite's cubic by the
-    rates there. A run that leaves the numbers ends in NaN.
+    `x` is left where the run ends, NaN where it ran away. `offset` is added to the rudder. One
+    Runge-Kutta step of order four for each step of the path; where there are samples between its
+    ends, Hermite's cubic by the rates there. A run that leaves the numbers ends in NaN.
     """
     out = np.full((samples, 4), np.nan + 0j)
     between, after, at_sample = x.copy(), x.copy(), x.copy()
@@ -119,6 +119,7 @@ def sail(c: Any, x: ComplexArray, offset: complex, path: Path, samples: int) -> 
         _add(after, x, motion(c, between, halfway), h / 3, between, h)
         _add(after, x, motion(c, between, at_end), h / 6, between, 0.0)
         if not abs(after[0].real) < 1e6:  # it has run away; NaN too
+            x[:] = np.nan
             break
         count = path.samples[k]
         if count > 1:
