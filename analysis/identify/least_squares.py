@@ -87,7 +87,9 @@ def minimise(
 
 
 def _jacobians(problem: Problem, z: FloatArray) -> list[FloatArray]:
-    return [problem.jacobian(z, i) for i in range(len(problem.trials))]
+    """Of each trial, zero where nothing was measured: there a ship may even stand."""
+    found = [problem.jacobian(z, i) for i in range(len(problem.trials))]
+    return [np.where(problem.known(i)[:, :, None], each, 0.0) for i, each in enumerate(found)]
 
 
 def _step(
