@@ -74,6 +74,12 @@ class Planner:
         tell("model", 0.0)
         if vessel.coefficients is None:
             vessel, origin = self._with_first_model(vessel, usual), FITTED
+        elif vessel.model is not None:
+            self._warnings.append(
+                f"filters are built on the paper's model: this is a replay by [yaw] and [surge] of "
+                f"the vessel file, not by its {vessel.model.name}; what differs between the two "
+                "counts as disturbance"
+            )
         self._warnings += idle(vessel)
         noise = self._noise(vessel, survey, clock, usual)
         observed = self._observed(vessel, usual, noise)

@@ -119,13 +119,13 @@ def test_the_ties_are_advised_where_they_hold_and_not_where_they_do_not() -> Non
     ties = identify([a_log(noise="white"), a_log("zigzag-10-10", 3, noise="white")]).ties
     assert ties is not None
     assert not ties.contradicted
-    assert "the data allow them" in ties.advice
+    assert "the data allow them" in ties.advice(tied=False)
     loose = parse_vessel(TOML, "x")
     loose = replace(loose, coefficients=loose.coefficients._replace(b1=-2.6e-4))
     trial = simulate(loose, "zigzag-20-20", duration_secs=500.0, sensors=suite("white"))
     against = identify([as_log(trial)], "burylin-tied", vessel=VESSEL).ties
     assert against is not None
-    assert "speak against" in against.advice
+    assert "speak against" in against.advice(tied=False)
     assert identify([a_log()], "nomoto").ties is None
 
 

@@ -46,9 +46,8 @@ class Ties:
         """Whether the data speak against it."""
         return abs(self.sum_over_d) > CONTRADICTED * self.std
 
-    @property
-    def advice(self) -> str:
-        """In words: for the tie, or against it."""
+    def advice(self, *, tied: bool) -> str:
+        """In words: for the tie, or against it; `tied` where it is made already."""
         off = f"(b1 + d)/d = {self.sum_over_d:.2g} ± {1.96 * self.std:.2g} in the free form"
         if 1.96 * self.std > UNDECIDED:
             return f"Ties b1 = −d, e = T3·d: the data cannot tell, {off}; tied, they are believed."
@@ -59,9 +58,10 @@ class Ties:
                 f"Ties b1 = −d, e = T3·d: not contradicted ({off}), but b1 may be zero, where they "
                 "are singular; leave it free, or add a manoeuvre that tells b1."
             )
+        more = "" if tied else "; --model burylin-tied tells b1 and e more surely"
         return (
-            f"Ties b1 = −d, e = T3·d: the data allow them, {off}; "
-            "--model burylin-tied tells b1 and e more surely, if the ship's gear is as the α's say."
+            f"Ties b1 = −d, e = T3·d: the data allow them, {off}{more}, "
+            "if the ship's gear is as the α's say."
         )
 
 

@@ -97,11 +97,12 @@ def _remarks(found: IdentifiedShip) -> Iterator[str]:
         )
     if found.uncertainty.enlarged > 1:
         yield (
-            f"The runs differ more than their noise explains: intervals are enlarged "
+            f"{'The halves' if len(found.fit.problem.runs) == 1 else 'The runs'} differ more than "
+            "their noise explains: intervals are enlarged "
             f"{found.uncertainty.enlarged:.1f} times."
         )
     if found.ties is not None:
-        yield found.ties.advice
+        yield found.ties.advice(tied=found.model.name == "burylin-tied")
 
 
 def _alike(found: IdentifiedShip) -> str:
@@ -248,7 +249,7 @@ def as_json(found: IdentifiedShip) -> dict[str, Any]:
             "sum_over_d": found.ties.sum_over_d,
             "std": found.ties.std,
             "contradicted": found.ties.contradicted,
-            "advice": found.ties.advice,
+            "advice": found.ties.advice(tied=found.model.name == "burylin-tied"),
         },
         "fit": [
             {

@@ -4,8 +4,8 @@ What is sailed is the model that was identified. What is filtered by is the pape
 and observers are built on: where another was identified, that one is fitted beside it.
 """
 
-from collections.abc import Callable, Iterable, Iterator
-from math import degrees
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from math import pi
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from .trial import usual
 from .uncertainty import ECHO, VAGUE, Uncertainty, uncertainty
 
 SECTIONS = {"yaw": YAW_COEFFICIENTS, "surge": ("f", "g", "h")}
+ANGLES = {"b2": 1, "b3": 2, "f": 2}  # how often an angle stands in their denominators
+PER_UNIT = {"rad": 1.0, "deg": 180 / pi}  # of such a unit to the radian
 SURGE = ("f", "f1", "f2", "g", "h", "p", "xvr", "x4", "xd")  # of any model; the others turn her
 
 WITH_PAPERS = ("", "# What `replay` filters by: the paper's model, fitted to the same logs.")
@@ -43,14 +45,21 @@ def vessel_toml(found: IdentifiedShip, on_step: Tell = lambda _: None) -> str:
             "would hold numbers nobody knows; give a log of a zig-zag as well"
         )
     if found.model.name in PAPERS:
-        own = [*_head(found), *_paper(found.fit, found.uncertainty)]
+        own = [*_head(found), *_paper(found.fit, found.uncertainty, _angle_unit(found.vessel))]
         return _text([*own, *_rudder(found.vessel, found.fit)])
     own = [*_head(found), *_model(found)]
     on_step("fit the paper's model beside it")
     paper = _beside(found)
     if paper is None:
         return _text([*own, *WITHOUT_PAPERS, *_rudder(found.vessel)])
-    return _text([*own, *WITH_PAPERS, *_paper(*paper), *_rudder(found.vessel, paper[0])])
+    return _text(
+        [
+            *own,
+            *WITH_PAPERS,
+            *_paper(*paper, _angle_unit(found.vessel)),
+            *_rudder(found.vessel, paper[0]),
+        ]
+    )
 
 
 def _text(lines: Iterable[str]) -> str:
@@ -103,7 +112,12 @@ def _head(found: IdentifiedShip) -> Iterator[str]:
     elif found.model.dimensionless:
         yield f"length = {USUAL_LENGTH!r}  # m, ASSUMED, for nobody gave it: the scale of [model]"
     yield f"approach_rpm = {round(usual(trials, 'rpm'), 3)!r}"
-    yield 'angle_unit = "rad"'
+    yield f'angle_unit = "{_angle_unit(ship)}"'
+
+
+def _angle_unit(ship: Vessel | None) -> str:
+    """Her own file's: the paper's noise, too, is told in it."""
+    return ship.angle_unit if ship is not None else "deg"
 
 
 def _model(found: IdentifiedShip) -> Iterator[str]:
@@ -117,12 +131,16 @@ def _model(found: IdentifiedShip) -> Iterator[str]:
         yield f"{name} = {value!r}  # {remark(name)}"
 
 
-def _paper(fit: OutputError, told: Uncertainty) -> Iterator[str]:
-    c, remark = _coefficients(fit), _remarks(told, tied=fit.problem.model.name == "burylin-tied")
+def _paper(fit: OutputError, told: Uncertainty, unit: str) -> Iterator[str]:
+    per = {key: PER_UNIT[unit] ** power for key, power in ANGLES.items()}
+    c = _coefficients(fit)
+    remark = _remarks(told, per, tied=fit.problem.model.name == "burylin-tied")
     for section, names in SECTIONS.items():
         yield f"\n[{section}]"
         for key in names:
-            yield f"{key} = {getattr(c, key)!r}  # {COEFFICIENT_UNITS[key]}, {remark(key)}"
+            value = getattr(c, key) / per.get(key, 1.0)
+            in_file = COEFFICIENT_UNITS[key].replace("rad", unit)
+            yield f"{key} = {value!r}  # {in_file}, {remark(key)}"
 
 
 def _rudder(ship: Vessel | None, paper: OutputError | None = None) -> Iterator[str]:
@@ -131,8 +149,9 @@ def _rudder(ship: Vessel | None, paper: OutputError | None = None) -> Iterator[s
     for key, value in alphas.items():
         yield f"{key} = {value!r}  # {COEFFICIENT_UNITS[key]}, not identified"
     if ship is not None:
-        yield f"max = {ship.rudder_max!r}  # rad, {degrees(ship.rudder_max):.4g}°"
-        yield f"rate = {ship.rudder_rate!r}  # rad/s"
+        per = PER_UNIT[ship.angle_unit]
+        yield f"max = {ship.rudder_max * per!r}  # {ship.angle_unit}"
+        yield f"rate = {ship.rudder_rate * per!r}  # {ship.angle_unit}/s"
 
 
 def _coefficients(fit: OutputError) -> Coefficients:
@@ -140,8 +159,10 @@ def _coefficients(fit: OutputError) -> Coefficients:
     return found
 
 
-def _remarks(found: Uncertainty, *, tied: bool = False) -> Callable[[str], str]:
-    """How sure a parameter of a fit is, by its name."""
+def _remarks(
+    found: Uncertainty, per: Mapping[str, float] | None = None, *, tied: bool = False
+) -> Callable[[str], str]:
+    """How sure a parameter of a fit is, by its name; `per` what each is divided by."""
     half = dict(zip(found.names, 1.96 * found.std, strict=True))
     echo = dict(zip(found.names, found.prior_share > ECHO, strict=True))
 
@@ -150,7 +171,7 @@ def _remarks(found: Uncertainty, *, tied: bool = False) -> Callable[[str], str]:
             known = "believed before, for the most" if echo[name] else "a value that fits them"
             return f"NOT IDENTIFIABLE from these logs: {known}"
         if name in half:
-            return f"± {half[name]:.2g} (95 %)"
+            return f"± {half[name] / (per or {}).get(name, 1.0):.2g} (95 %)"
         if tied and name in ("b1", "e"):
             return "tied: b1 = -d" if name == "b1" else "tied: e = T3 d"
         return "stated as known"
