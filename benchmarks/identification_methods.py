@@ -94,7 +94,7 @@ def _integral(trial: Trial, truth: Coefficients) -> FloatArray:
 
 
 def _nine(fit: OutputError) -> FloatArray:
-    return np.real(fit.problem.model.expand(fit.parameters.astype(np.complex128)))[:9]
+    return np.array(fit.problem.model.coefficients(fit.parameters)[:9])
 
 
 def _errors(trial: Trial, truth: Coefficients, found: FloatArray) -> Found:

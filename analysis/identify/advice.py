@@ -83,8 +83,7 @@ def ties_of(fit: OutputError) -> Ties | None:
 
 def _in_free_form(fit: OutputError) -> OutputError:
     problem, free = fit.problem, ship_model("burylin")
-    values = np.real(problem.model.expand(fit.parameters.astype(np.complex128)))
-    start = dict(zip(free.names, values.tolist(), strict=True))
+    start = problem.model.coefficients(fit.parameters)._asdict()
     known = {name: start[name] for name in ("alpha1", "alpha2", "alpha3")}
     start = {name: value for name, value in start.items() if name not in known}
     return output_error(
