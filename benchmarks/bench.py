@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.filters.noise import Noise
+from analysis.filters.noise_model import Noise
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
 
 from .logs import NAMES

@@ -4,15 +4,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from recorders.manoeuvres import manoeuvre
-from recorders.sensors import Suite, corrupt
-from recorders.voyage import Trajectory
+from recorders.simulated.manoeuvres import manoeuvre
+from recorders.simulated.sensors import Suite, corrupt
+from recorders.simulated.trajectory import Trajectory
 from shiplog import Channel, TrialLog, Vessel
 from shiplog.compiled import compiled
-from shiplog.ship import Coefficients
-from shiplog.ships.under_way import Acting, Hull, ship_of, step
+from shiplog.ships.paper import Coefficients
+from shiplog.ships.under_way import Acting, Hull, step
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
+from shiplog.vessel.ship import ship_of
 
 RATE_HZ = 10.0  # of the grid, and the fastest a sensor may be
 START_NS = 1_767_225_600 * 10**9

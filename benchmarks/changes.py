@@ -13,11 +13,11 @@ from itertools import product
 
 import numpy as np
 
-from analysis.changes import Change, ShipWatch
-from analysis.first_model import BARE
-from analysis.weak_form import CHANNELS, WeakForm
-from recorders.sensors import suite
-from recorders.simulate import simulate
+from analysis.regression.changes import Change, ShipWatch
+from analysis.regression.first_model import BARE
+from analysis.regression.weak_form import CHANNELS, WeakForm
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, load_vessel, resample
 
 from .changed_ship import changed_trial

@@ -11,8 +11,8 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from shiplog import LogWriter, TrialLog, read
-from shiplog.schema import encode, schema_for
-from shiplog.writer import channel_metadata
+from shiplog.mcap.schema import encode, schema_for
+from shiplog.mcap.writer import channel_metadata
 
 from .bench import Bench
 from .logs import require_room, write_repeated

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from analysis.filters.kinds import filter_states
+from analysis.filters.factory import filter_states
 
 from .bench import NOISE, VESSEL, Bench, said_share
 from .measure import Line, SkippedError, timed

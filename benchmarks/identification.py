@@ -15,12 +15,12 @@ from time import process_time
 
 import numpy as np
 
-from analysis.identify.least_squares import Spread, eliminated, information
-from analysis.identify.output_error import LEAST_STD, output_error, pose
-from analysis.identify.trial import Trial, trials_of
-from analysis.identify.uncertainty import uncertainty
-from recorders.sensors import Sensor, suite
-from recorders.simulate import simulate
+from analysis.identification.least_squares import Spread, eliminated, information
+from analysis.identification.output_error import LEAST_STD, output_error, pose
+from analysis.identification.segment import Trial, trials_of
+from analysis.identification.uncertainty import uncertainty
+from recorders.simulated.sensors import Sensor, suite
+from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, load_vessel, resample
 from shiplog.ships import Model, ship_model
 from shiplog.types import FloatArray

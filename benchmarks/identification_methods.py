@@ -4,14 +4,14 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from analysis.identification import Coefficient, identify
-from analysis.identify.augmented import augmented
-from analysis.identify.output_error import OutputError, output_error
-from analysis.identify.papers_scheme import NINE, papers_states, regression, solved
-from analysis.identify.trial import Trial
-from analysis.weak_form import weak_form
-from shiplog.ship import Coefficients
+from analysis.identification.comparison.paper_scheme import NINE, papers_states, regression, solved
+from analysis.identification.comparison.parameter_ekf import augmented
+from analysis.identification.output_error import OutputError, output_error
+from analysis.identification.segment import Trial
+from analysis.regression.coefficients import Coefficient, identify
+from analysis.regression.weak_form import weak_form
 from shiplog.ships import ship_model
+from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
 
 SEEDS = range(1000, 1008)

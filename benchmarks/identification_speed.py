@@ -7,11 +7,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from analysis.identify.least_squares import OUTLYING
-from analysis.identify.output_error import OutputError, first_spreads, fit, output_error, pose
-from analysis.identify.problem import Nuisance
-from analysis.identify.start import starts
-from analysis.identify.trial import Trial
+from analysis.identification.initial_guess import starts
+from analysis.identification.least_squares import OUTLYING
+from analysis.identification.output_error import OutputError, first_spreads, fit, output_error, pose
+from analysis.identification.problem import Nuisance
+from analysis.identification.segment import Trial
 from shiplog.ships import ship_model
 from shiplog.types import FloatArray
 

@@ -4,10 +4,10 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-from recorders.sensors import suite
-from recorders.simulate import simulate
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import simulate
 from shiplog import Channel, LogWriter, TrialLog, load_vessel
-from shiplog.ship import INPUTS, OUTPUTS
+from shiplog.ships.paper import INPUTS, OUTPUTS
 
 from .measure import SkippedError
 

@@ -22,9 +22,9 @@ import rerun as rr
 from mcap.reader import make_reader
 from scipy.linalg import expm
 
-from analysis.filters.noise import Noise
+from analysis.filters.noise_model import Noise
 from shiplog import Signals
-from shiplog.ship import Coefficients
+from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
 
 from .bench import VESSEL

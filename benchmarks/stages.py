@@ -8,7 +8,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shiplog.cli import main
+from shiplog.cli.main import main
 
 if TYPE_CHECKING:
     from types import FrameType

@@ -11,13 +11,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
-from analysis.identify.identified import IdentifiedShip, identify
-from analysis.identify.prediction import zigzag_overshoots
-from analysis.identify.runs import run_of
-from analysis.identify.validation import Validation, validate
+from analysis.identification.identify import IdentifiedShip, identify
+from analysis.identification.prediction import zigzag_overshoots
+from analysis.identification.runs import run_of
+from analysis.identification.validation import Validation, validate
 from shiplog import TrialLog, Vessel, load_vessel
-from shiplog.foreign import read_table
-from shiplog.layout import load_layout
+from shiplog.tables.foreign import read_table
+from shiplog.tables.layout import load_layout
 from shiplog.types import FloatArray
 
 PROJECT = Path(__file__).resolve().parents[1]

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from analysis.filters.noise import Noise
+from analysis.filters.noise_model import Noise
 from shiplog import Signals
-from shiplog.ship import Coefficients
+from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
 
 C = np.eye(5)[[0, 3]]  # of w, w', w'', v, v' the yaw rate and the speed are measured
@@ -16,7 +16,7 @@ I = np.eye(5)
 
 
 class Filtered(NamedTuple):
-    """A row a sample, the fields as those of `analysis.filters.passage.Estimates`."""
+    """A row a sample, the fields as those of `analysis.filters.base.Estimates`."""
 
     states: FloatArray
     stds: FloatArray

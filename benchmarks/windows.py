@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from analysis.two_stack import slide
+from analysis.regression.window_qr import slide
 from shiplog.types import FloatArray
 
 from .bench import Bench

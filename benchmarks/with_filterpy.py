@@ -3,9 +3,9 @@
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
-from analysis.filters.noise import Noise
+from analysis.filters.noise_model import Noise
 from shiplog import Signals
-from shiplog.ship import Coefficients
+from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
 
 from .textbook import C, Filtered, Input, design, inputs, kink, runge_kutta

@@ -18,18 +18,18 @@ from scipy.stats import chi2
 
 from analysis.design.discrete import discretise
 from analysis.design.shaping import wave_filter
-from analysis.filters.passage import STATES
-from analysis.pipeline import Analysis, analyse
-from analysis.wave_fit import Wave
-from recorders.sensors import suite
-from recorders.simulate import SimulatedTrial, simulate
-from recorders.voyage import Gust, Unrest, WaveMoment
+from analysis.filters.base import STATES
+from analysis.filters.wave_fit import Wave
+from analysis.replay.replay import Analysis, analyse
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import SimulatedTrial, simulate
+from recorders.simulated.trajectory import Gust, Unrest, WaveMoment
 from shiplog import Channel, TrialLog, Vessel, load_vessel, read
-from shiplog.foreign import read_table
-from shiplog.layout import load_layout
-from shiplog.settings import FilterSettings
-from shiplog.ship import rudder_effect
+from shiplog.ships.paper import rudder_effect
+from shiplog.tables.foreign import read_table
+from shiplog.tables.layout import load_layout
 from shiplog.types import FloatArray
+from shiplog.vessel.settings import FilterSettings
 
 PROJECT = Path(__file__).resolve().parents[1]
 KVLCC2 = PROJECT.parent / "shared" / "data" / "kvlcc2"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from shiplog.errors import ShiplogError
 from shiplog.files import cannot_write, is_device
-from shiplog.writer import LogWriter
+from shiplog.mcap.writer import LogWriter
 
 from .source import Source
 

@@ -4,10 +4,10 @@ from math import radians
 from pathlib import Path
 
 from recorders.record import record
-from recorders.sensors import suite
-from recorders.simulate import simulate
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import simulate
 from shiplog import load_vessel, write
-from shiplog.vessel import PRESETS
+from shiplog.vessel.vessel import PRESETS
 
 HERE = Path(__file__).parent
 TRUTH_HZ = 2.0

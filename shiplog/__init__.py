@@ -5,15 +5,15 @@
 >>> log["yaw_rate"].values
 """
 
-__version__ = "0.1.0"
+from shiplog.mcap.reader import read
+from shiplog.mcap.stream import LogFile, open_log
+from shiplog.mcap.writer import LogWriter, write
+from shiplog.vessel.vessel import Vessel, load_vessel
 
-from .clock import resample
 from .errors import LayoutError, LogError, ShiplogError, UsageError, VesselError
-from .log_file import LogFile, open_log
-from .reader import read
+from .resampling import resample
 from .types import Channel, Signals, TrialLog
-from .vessel import Vessel, load_vessel
-from .writer import LogWriter, write
+from .version import __version__
 
 __all__ = [
     "Channel",
@@ -27,6 +27,7 @@ __all__ = [
     "UsageError",
     "Vessel",
     "VesselError",
+    "__version__",
     "load_vessel",
     "open_log",
     "read",

@@ -1,5 +1,5 @@
 """`python -m shiplog`."""
 
-from .cli import main
+from shiplog.cli.main import main
 
 raise SystemExit(main())

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import PROJECT
 from rerun.chunk import RrdReader
 
-from analysis.filters.kinds import filter_states
-from analysis.pipeline import analyse
-from analysis.rerun_view import write_review
+from analysis.filters.factory import filter_states
+from analysis.replay.replay import analyse
+from analysis.view.replay_review import write_review
 from benchmarks import filters, identification, identification_speed, logs, measure, replays
 from benchmarks.bench import NOISE, VESSEL, head
 from benchmarks.logs import NAMES, day_of_trial, write_repeated
@@ -22,7 +23,6 @@ from benchmarks.windows import require_same as require_same_windows
 from shiplog import Signals, TrialLog, read, resample
 from shiplog.ships import ship_model
 
-PROJECT = Path(__file__).parents[1]
 SMALL = ["--short", "--hours", "0.1", "--growth", "0.02,0.05", "--info-hours", "0.15"]
 MODEL = VESSEL.coefficients
 GUIDES = ("/bounds", "/over", "/model")  # straight lines: two points, whatever the log

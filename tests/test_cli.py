@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import KVLCC2, LAYOUTS, PROJECT
 
 from recorders.record import record
-from recorders.simulate import SimulatedTrial
+from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Channel, LogWriter, TrialLog, load_vessel, read, write
-from shiplog.cli import DATA_LOST, FAILURE, FINE, USAGE, main
-
-PROJECT = Path(__file__).parents[1]
-LAYOUTS = PROJECT / "sample_data" / "layouts"
+from shiplog.cli.main import DATA_LOST, FAILURE, FINE, USAGE, main
 
 
 @pytest.fixture(autouse=True)
@@ -179,7 +177,6 @@ def test_a_damaged_log_replays_but_says_that_data_were_lost(
     assert "damaged" in capsys.readouterr().err
 
 
-KVLCC2 = PROJECT.parent / "shared" / "data" / "kvlcc2"
 RUNS = sorted(KVLCC2.glob("*/*.dat"))
 
 
@@ -447,7 +444,7 @@ def test_without_a_verb_the_help_is_shown(capsys: pytest.CaptureFixture[str]) ->
 
 def test_heavy_libraries_wait_for_the_verb_that_needs_them(recorded: Path) -> None:
     code = (
-        "import sys; from shiplog.cli import main\n"
+        "import sys; from shiplog.cli.main import main\n"
         "try: main(sys.argv[1:])\n"
         "except SystemExit: pass\n"
         "print({'rerun', 'control', 'pandas', 'numba', 'scipy'} & set(sys.modules))"

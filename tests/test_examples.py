@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from places import PROJECT
 
-PROJECT = Path(__file__).parents[1]
 PAPERS = sorted(
     path for path in (PROJECT / "examples" / "papers").glob("*.py") if path.stem != "printed"
 )

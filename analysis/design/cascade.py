@@ -9,7 +9,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .arguments import count, matrix, number, square, symmetric
+from .matrices import count, matrix, number, square, symmetric
 from .riccati import error_covariance, kalman_gain
 
 

@@ -14,11 +14,11 @@ from scipy.sparse.csgraph import connected_components
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .arguments import finite
-from .augmented import Exosystem, Influence, Plant, System, augmented
-from .clash import Clash, clashes, clashing
+from .augmentation import Exosystem, Influence, Plant, System, augmented
+from .distinguishability import Clash, clashes, clashing
+from .luenberger import SPECTRA
+from .matrices import finite
 from .observability import ComplexArray
-from .observer import SPECTRA
 from .placement import place_multilevel, self_conjugate
 from .riccati import kalman_gain
 

@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .arguments import matrix, square
+from .matrices import matrix, square
 from .observability import ComplexArray
 
 UNSEEN = 1e-10  # a direction less visible than this is not seen, all of A and C being at most one

@@ -14,7 +14,7 @@ from scipy.linalg import schur, solve_sylvester
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .arguments import count, finite, matrix, square, symmetric
+from .matrices import count, finite, matrix, square, symmetric
 from .observability import ComplexArray, spelled
 from .riccati import Gain, Words, optimal_gain, poles_of
 

@@ -10,7 +10,7 @@ from scipy.linalg import LinAlgError, solve_continuous_are, solve_continuous_lya
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .arguments import matrix, square, symmetric
+from .matrices import matrix, square, symmetric
 from .observability import AXIS, ComplexArray, spelled, unseen_modes
 
 PRECISE = 1e-9  # a scaled residual beyond it is no solution

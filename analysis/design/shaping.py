@@ -11,7 +11,7 @@ from scipy.signal import tf2ss
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .arguments import finite, matrix, number, square
+from .matrices import finite, matrix, number, square
 from .observability import ComplexArray
 
 TOUCHES = 1e-6  # relative: as near as two computed roots are where the spectrum touches zero

@@ -9,18 +9,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.design.luenberger import discrete_correction
 from analysis.design.observability import ComplexArray
-from analysis.design.observer import discrete_correction
 from analysis.design.quality import quality_filter
 from analysis.design.riccati import kalman_gain
 from analysis.design.shaping import augment_with_shaping, wave_filter
-from analysis.gauge import Gauge
+from analysis.signals.signal_stats import Gauge
 from shiplog.compiled import compiled
-from shiplog.settings import FilterSettings
-from shiplog.ship import Coefficients, yaw_stiffness
+from shiplog.ships.paper import Coefficients, yaw_stiffness
 from shiplog.types import FloatArray
+from shiplog.vessel.settings import FilterSettings
 
-from .noise import Noise
+from .noise_model import Noise
 
 FORGETTING = 0.2  # of a wave's frequency: how fast its error decays, where poles are stated
 

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.design.discrete import discretise
-from analysis.design.pseudo_input import pseudo_input_matrices
-from analysis.gauge import Gauge
+from analysis.design.pseudo_input_system import pseudo_input_matrices
+from analysis.signals.signal_stats import Gauge
 from shiplog.compiled import compiled
-from shiplog.settings import FilterSettings
-from shiplog.ship import (
+from shiplog.ships.paper import (
     INPUTS,
     OUTPUTS,
     Coefficients,
@@ -22,10 +21,11 @@ from shiplog.ship import (
     yaw_stiffness,
 )
 from shiplog.types import FloatArray, Signals
+from shiplog.vessel.settings import FilterSettings
 
-from .noise import Noise
-from .passage import OUTPUT_STATES, STATES, Estimates, Trace
-from .steps import BELIEVED, GATED, correct, propagate, weigh
+from .base import OUTPUT_STATES, STATES, Estimates, Trace
+from .kernels import BELIEVED, GATED, correct, propagate, weigh
+from .noise_model import Noise
 
 
 class MotionState(NamedTuple):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from shiplog.compiled import compiled
-from shiplog.ship import (
+from shiplog.ships.paper import (
     Coefficients,
     rudder_effect_rate,
     surge_acceleration,

@@ -21,8 +21,8 @@ import numpy as np
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray, Signals
 
-from .passage import Estimates, Filter, Trace
-from .steps import propagate
+from .base import Estimates, Filter, Trace
+from .kernels import propagate
 
 ROUNDING = 1e-9  # of a variance: no less is left of it in the difference
 

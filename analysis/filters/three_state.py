@@ -15,22 +15,22 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm, solve_discrete_lyapunov
 
 from analysis.design.discrete import discretise
-from analysis.gauge import Gauge
+from analysis.signals.signal_stats import Gauge
 from shiplog.compiled import compiled
-from shiplog.settings import FilterSettings
-from shiplog.ship import (
+from shiplog.ships.paper import (
     INPUTS,
     OUTPUTS,
     Coefficients,
     yaw_stiffness,
 )
 from shiplog.types import FloatArray, Signals
+from shiplog.vessel.settings import FilterSettings
 
+from .base import Estimates, Trace
 from .gains import Channel, channels, discrete_gain, ticked_gain
-from .noise import Noise
-from .passage import Estimates, Trace
+from .kernels import BELIEVED, GATED, correct, propagate, weigh
+from .noise_model import Noise
 from .ship_step import linearise, predict, tell, tell_all
-from .steps import BELIEVED, GATED, correct, propagate, weigh
 
 BEST, FIXED, TICKED = range(3)  # gains
 _GAINS = {"extended": BEST, "steady-state": FIXED, "quality": FIXED, "per-tick": TICKED}

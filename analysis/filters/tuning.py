@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from analysis.gauge import Gauge, gauge
-from analysis.inputs import last_inputs
-from analysis.wave_fit import Wave, fit_wave
-from shiplog.settings import FilterSettings
-from shiplog.ship import Coefficients
+from analysis.signals.hold import last_inputs
+from analysis.signals.signal_stats import Gauge, gauge
+from shiplog.ships.paper import Coefficients
+from shiplog.vessel.settings import FilterSettings
 
-from .kinds import make_filter
-from .noise import Noise
-from .passage import Estimates
+from .base import Estimates
+from .factory import make_filter
+from .noise_model import Noise
+from .wave_fit import Wave, fit_wave
 
 PAPER_RATIO = 0.01 / 400  # Burylin's Q over his R, 1/s^2: no default trusts the model more
 EVERYTHING = 1e12  # standard deviations

@@ -1,7 +1,8 @@
 """Burylin: continuous identification of a nonlinear vessel model, printed against computed.
 
 The paper's filter and its least squares over a sliding window as it has them
-(`analysis.identify.papers_scheme`), and what shiplog does, the equations in weak form.
+(`analysis.identification.comparison.paper_scheme`), and what shiplog does, the equations in weak
+form.
 
     python examples/papers/continuous_identification.py > docs/papers_continuous_identification.md
 """
@@ -16,13 +17,12 @@ import numpy as np
 from printed import AMBER, BLUE, GREEN, GREY, RED, Row, grid, number, page, picture, say, table
 from scipy.integrate import solve_ivp
 
-from analysis.design.pseudo_input import (
+from analysis.design.pseudo_input_system import (
     printed_input_matrix,
     pseudo_input_matrices,
     pseudo_inputs,
 )
-from analysis.identification import identify
-from analysis.identify.papers_scheme import (
+from analysis.identification.comparison.paper_scheme import (
     STRIDE_SECS,
     Q,
     R,
@@ -31,14 +31,15 @@ from analysis.identify.papers_scheme import (
     solved,
     windowed,
 )
-from analysis.sliding import History
-from analysis.weak_form import weak_form
-from recorders.manoeuvres import manoeuvre
-from recorders.sensors import suite
-from recorders.simulate import SimulatedTrial, simulate
-from recorders.voyage import sail
+from analysis.regression.coefficients import identify
+from analysis.regression.sliding import History
+from analysis.regression.weak_form import weak_form
+from recorders.simulated.manoeuvres import manoeuvre
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import SimulatedTrial, simulate
+from recorders.simulated.trajectory import sail
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
-from shiplog.ship import (
+from shiplog.ships.paper import (
     SURGE_COEFFICIENTS,
     YAW_COEFFICIENTS,
     Coefficients,

@@ -18,12 +18,12 @@ from scipy.linalg import null_space
 from scipy.signal import place_poles
 
 from analysis.design.observability import ComplexArray
+from analysis.design.per_tick import Motion, TickObserver, block_gains, tick_observer
 from analysis.design.placement import named, place_multilevel, polynomial_error
-from analysis.design.tick import Motion, TickObserver, block_gains, tick_observer
 from shiplog.errors import UsageError
-from shiplog.ship import surge_acceleration, yaw_acceleration_rate
+from shiplog.ships.paper import surge_acceleration, yaw_acceleration_rate
 from shiplog.types import FloatArray
-from shiplog.vessel import load_vessel
+from shiplog.vessel.vessel import load_vessel
 
 Order = Literal["full", "reduced"]
 

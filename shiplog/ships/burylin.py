@@ -1,4 +1,4 @@
-"""The paper's model: second-order nonlinear Nomoto with surge, as `shiplog.ship` has it.
+"""The paper's model: second-order nonlinear Nomoto with surge, as `shiplog.ships.paper` has it.
 
     w'' = a w' + b1 w + b2 w|w| + b3 w^3 + ks (d delta + e delta')
     v'  = f w^2 + g v^2 + h n
@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from math import inf
 
 from shiplog.compiled import compiled
-from shiplog.ship import COEFFICIENT_UNITS, Coefficients
 
 from .model import Model, Parameter, StateValue
 from .motion import (
@@ -25,6 +24,7 @@ from .motion import (
     observations,
     sail,
 )
+from .paper import COEFFICIENT_UNITS, Coefficients
 
 
 @equations(Coefficients)

@@ -1,9 +1,10 @@
 """A ship under way: what moves her, what pushes her off her way, and where she goes.
 
 One Runge-Kutta step of order four for every model, in real numbers: the paper's ship moves as
-`shiplog.ship` has her, to the last bit. A yaw moment is told as the rudder that turns her as much
-on the straight run of her approach, and changes what that rudder changes there, but for her loss of
-speed, the same to either side. So it pushes a ship with a sway to the side, too, as a rudder does.
+`shiplog.ships.paper` has her, to the last bit. A yaw moment is given as the rudder that turns her
+as much on the straight run of her approach, and changes what that rudder changes there, but for her
+loss of speed, the same to either side. So it pushes a ship with a sway to the side, too, as a
+rudder does.
 """
 
 from dataclasses import dataclass
@@ -13,14 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shiplog.compiled import compiled, compiled_within
-from shiplog.ship import Coefficients
-from shiplog.ship import steady_speed as papers_steady_speed
 from shiplog.types import FloatArray
-from shiplog.vessel import Vessel
 
-from . import ship_model
-from .model import SI, Model, Scale
+from .model import Model, Scale
 from .motion import Forcing, motion, observed
+from .paper import Coefficients
+from .paper import steady_speed as papers_steady_speed
 
 SLOWEST, FASTEST = 1e-6, 1e3  # of a steady run, in a model's unit of speed
 HALVINGS = 100
@@ -116,16 +115,6 @@ class Ship:
 
     def _at(self, channel: str) -> int:
         return [value.channel for value in self.model.state].index(channel)
-
-
-def ship_of(vessel: Vessel) -> Ship:
-    """The ship of a vessel file: of its `[model]` if it has one, else the paper's."""
-    own = vessel.model
-    if own is None:
-        return Ship(ship_model("burylin"), vessel.paper, SI)
-    model = ship_model(own.name)
-    scale = model.scale(own.length, own.speed, own.rpm)
-    return Ship(model, model.coefficients(own.parameters), scale)
 
 
 def straight(rpm: float, delta: float = 0.0) -> Acting:

@@ -1,0 +1,1 @@
+"""The regression check: a replay compared with its reference, channel by channel."""

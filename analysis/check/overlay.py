@@ -1,0 +1,63 @@
+"""A failed check as a picture: the reference and the replay, one over the other."""
+
+import os
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from analysis.view.rerun_io import WHOLE_RUN
+from shiplog import ShiplogError
+from shiplog.files import replacing
+from shiplog.types import FloatArray, TimeArray
+
+from .compare import Comparison
+
+MOST_VIEWS = 9  # the first to differ are where to look
+
+
+def write_overlay(comparison: Comparison, path: str | os.PathLike[str]) -> None:
+    """Write the channels that differ to an .rrd, the reference grey, the replay red over it.
+
+    Raises `ShiplogError` where `path` cannot be written to.
+    """
+    with replacing(path) as part:
+        recording = rr.RecordingStream("shiplog check", recording_id=comparison.name)
+        try:
+            recording.save(part, default_blueprint=_blueprint(comparison))
+        except RuntimeError as error:  # what Rerun makes of a full disk
+            raise ShiplogError(f"cannot write the overlay; is the disk full? {path}") from error
+        for difference in comparison.changed:
+            for label, log, colour, width in (
+                ("reference", comparison.reference, (150, 150, 150), 3.0),
+                ("replay", comparison.replay, (200, 40, 40), 1.5),
+            ):
+                channel = log.get(difference.topic) if log else None
+                if channel is not None and len(channel):
+                    entity = f"{difference.topic}/{label}"
+                    style = rr.SeriesLines(names=label, colors=colour, widths=width)
+                    recording.log(entity, style, static=True)
+                    _send(recording, entity, channel.measured_ns, channel.values)
+        recording.flush()
+        recording.disconnect()
+
+
+def _send(
+    recording: rr.RecordingStream, entity: str, stamps_ns: TimeArray, values: FloatArray
+) -> None:
+    known = np.isfinite(values)
+    time = rr.TimeColumn("stamp", timestamp=stamps_ns[known].astype("M8[ns]"))
+    recording.send_columns(entity, [time], rr.Scalars.columns(scalars=values[known]))
+
+
+def _blueprint(comparison: Comparison) -> rrb.Blueprint:
+    views = [
+        rrb.TimeSeriesView(
+            name=f"{difference.topic} [{difference.unit}]",
+            origin=difference.topic,
+            axis_x=WHOLE_RUN,
+        )
+        for difference in comparison.changed[:MOST_VIEWS]
+    ]
+    panel = rrb.TimePanel(state="collapsed", timeline="stamp", play_state="Paused")
+    return rrb.Blueprint(rrb.Grid(*views), panel, auto_views=False, auto_layout=False)

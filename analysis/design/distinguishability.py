@@ -1,0 +1,89 @@
+"""What the sensors of a plant cannot tell apart, and what would cure it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from shiplog.types import FloatArray
+
+from .augmentation import Influence, Plant, System, augmented
+from .placement import HiddenMode, hautus, named
+
+SAME_MODE = 1e-6  # relative: what counts as one mode before and after a sensor is added
+
+
+@dataclass(frozen=True)
+class Clash:
+    """A mode that the sensors do not show, what takes part in it and what would show it."""
+
+    mode: complex  # 1/s; of a complex pair the one above
+    disturbances: tuple[str, ...]
+    states: tuple[str, ...]  # of the plant
+    cures: tuple[str, ...]  # measurements, any one of which would do
+
+    def __str__(self) -> str:
+        who = " and ".join(repr(name) for name in self.disturbances)
+        if len(self.disturbances) == 1 and self.states:
+            who += " and the state " + " and ".join(repr(name) for name in self.states)
+        elif not self.disturbances:
+            who = "the state " + " and ".join(repr(name) for name in self.states)
+        verb = "cannot be told apart" if " and " in who else "cannot be seen"
+        remedy = f"measure {', or '.join(self.cures)}" if self.cures else "leave some of them out"
+        return f"at the mode {named(self.mode)} {who} {verb}; {remedy}"
+
+
+def clashes(plant: Plant, influences: Sequence[Influence]) -> tuple[Clash, ...]:
+    """What the plant's sensors cannot tell apart; empty where `disturbance_observer` has a gain.
+
+    Hautus's test of plant and exosystems together. Raises `UsageError` for what does not fit.
+    """
+    return clashing(augmented(plant, influences))
+
+
+def clashing(system: System) -> tuple[Clash, ...]:
+    """As `clashes`, of plant and exosystems that are one system already."""
+    return tuple(_clash(system, mode) for mode in hautus(system.A, system.C))
+
+
+def _clash(system: System, mode: HiddenMode) -> Clash:
+    """Who is in a hidden mode, and what shows it: a state, a state's integral, a disturbance."""
+    owners = sorted({system.owners[i] for i in mode.states} - {-1})
+    plant = [i for i in mode.states if system.owners[i] == -1]
+    cures = []
+    for i in plant:
+        if _shows(system, np.eye(1, len(system.A), i), mode.value):
+            cures.append(f"{system.states[i]!r} by a sensor of its own")
+        if _is_rate(system, i) and _shows_integral(system, i, mode.value):
+            cures.append(f"the integral of {system.states[i]!r}")
+    if not cures:
+        itself = [k for k in owners if _shows(system, system.D[[k]], mode.value)]
+        cures = [f"{system.names[k]!r} itself" for k in itself]
+    return Clash(
+        mode.value,
+        tuple(system.names[k] for k in owners),
+        tuple(system.states[i] for i in plant),
+        tuple(cures),
+    )
+
+
+def _shows(system: System, row: FloatArray, mode: complex) -> bool:
+    """Whether a mode is hidden no longer once `row` (1, N) is measured too."""
+    return not _hides(system.A, np.vstack((system.C, row)), mode)
+
+
+def _shows_integral(system: System, i: int, mode: complex) -> bool:
+    """Whether a mode is hidden no longer once the integral of state i is measured too."""
+    A = np.block([[system.A, np.zeros((len(system.A), 1))], [np.eye(1, len(system.A), i), 0.0]])
+    return not _hides(A, block_diag(system.C, np.eye(1)), mode)
+
+
+def _hides(A: FloatArray, C: FloatArray, mode: complex) -> bool:
+    return any(np.isclose(mode, left.value, rtol=SAME_MODE, atol=1e-9) for left in hautus(A, C))
+
+
+def _is_rate(system: System, i: int) -> bool:
+    """Whether a state of the plant is no integral of others: nobody measures that of a heading."""
+    row = system.A[i, : system.owners.count(-1)]
+    return bool(row[i]) or not row.any()

@@ -1,0 +1,62 @@
+"""The ship's model as a linear system of pseudo-inputs: its matrices."""
+
+from math import exp
+
+import numpy as np
+
+from shiplog.ships.paper import Coefficients
+from shiplog.types import FloatArray
+
+
+def pseudo_input_matrices(c: Coefficients, side: float) -> tuple[FloatArray, FloatArray]:
+    """A (5, 5) and B (5, 20) of the five-state model x' = A x + B u, with C = [e1, e4].
+
+    x = (w, w', w'', v, v'), u the twenty pseudo-inputs of `pseudo_inputs`, `side` the sign of w.
+    Burylin's (5) without its misprints: u7 is v delta, u9 is n delta E, u19 carries n, row three's
+    ww' has the factor 2, and a twentieth input v' n delta E is there, without which A x + B u is
+    not the derivative.
+    """
+    A = np.zeros((5, 5))
+    A[0, 1] = 1
+    A[1, :2] = c.b1, c.a
+    A[2, 1:3] = c.b1, c.a
+    b4, b5, b6, b7 = c.alpha1 * c.d, c.alpha2 * c.d, c.alpha1 * c.e, c.alpha2 * c.e
+    B = np.zeros((5, 20))
+    B[1, [3, 4, 6, 7, 8, 9]] = c.b2 * side, c.b3, b4, b6, b5, b7
+    B[2, [7, 9, 10, 11]] = b4, b5, b4, b5
+    B[2, [13, 15, 16, 17]] = 2 * c.b2 * side, 3 * c.b3, b6, b7
+    B[2, [18, 19]] = -c.alpha3 * b7, -c.alpha3 * b5
+    B[3, [2, 3, 5]] = c.h, c.f, c.g
+    B[4, [12, 13, 14]] = c.h, 2 * c.f, 2 * c.g
+    return A, B
+
+
+def printed_input_matrix(c: Coefficients) -> FloatArray:
+    """B as Burylin's (5) prints it, for w > 0, its short rows filled up with zeros, (5, 19).
+
+    Kept to be laid beside `pseudo_input_matrices`: with it A x + B u is not the derivative.
+    """
+    b4, b5, b6, b7 = c.alpha1 * c.d, c.alpha2 * c.d, c.alpha1 * c.e, c.alpha2 * c.e
+    B = np.zeros((5, 19))
+    B[1, [3, 4, 6, 7, 8, 9]] = c.b2, c.b3, b4, b6, b5, b7
+    B[2, [6, 7, 8, 9, 10]] = b4, -b5 * c.alpha3, b5, b4, b5
+    B[2, [12, 14, 15, 16, 17]] = c.b2, 3 * c.b3, b6, b7, -b7 * c.alpha3
+    B[3, [2, 3, 5]] = c.h, c.f, c.g
+    B[4, [10, 11, 12]] = c.h, 2 * c.f, 2 * c.g
+    return B
+
+
+def pseudo_inputs(
+    x: FloatArray, delta: float, delta_dot: float, n: float, n_dot: float, alpha3: float
+) -> FloatArray:
+    """The twenty pseudo-inputs u1 ... u20 of the five-state model, (20,)."""
+    w, w_dot, _, v, v_dot = x
+    E = exp(-v * alpha3)
+    return np.array(
+        [
+            delta, delta_dot, n, w**2, w**3, v**2, v * delta, v * delta_dot, n * delta * E,
+            n * delta_dot * E, v_dot * delta, n_dot * delta * E, n_dot, w * w_dot, v * v_dot,
+            w**2 * w_dot, v_dot * delta_dot, n_dot * delta_dot * E, v_dot * n * delta_dot * E,
+            v_dot * n * delta * E,
+        ]
+    )  # fmt: skip

@@ -1,0 +1,93 @@
+"""A trial as an identifier takes it: what the ship was given, and what was measured of her."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.checks.channel_stats import longest_step_secs
+from shiplog.errors import LogError
+from shiplog.ships.motion import OUTPUTS, Path
+from shiplog.ships.paper import INPUTS
+from shiplog.ships.path import path_of
+from shiplog.types import FloatArray, Signals
+
+LEAST_SECS = 60.0  # of a piece: a shorter one says nothing of a ship
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A run, or a piece of one, throughout which rudder and revolutions are known."""
+
+    name: str
+    signals: Signals
+    path: Path
+    measured: FloatArray  # (n, 4) in the order of OUTPUTS; NaN where not measured
+
+    def __len__(self) -> int:
+        """The number of samples."""
+        return len(self.measured)
+
+    @property
+    def dt_secs(self) -> float:
+        """From sample to sample."""
+        return self.signals.dt_secs
+
+    def has(self, output: str) -> bool:
+        """Whether an output was measured at all."""
+        return bool(np.isfinite(self.measured[:, OUTPUTS.index(output)]).sum() > 1)
+
+    def part(self, start: int, stop: int) -> "Trial":
+        """Its samples from `start` to before `stop`."""
+        signals = self.signals.part(start, stop)
+        return Trial(self.name, signals, path_of(signals), self.measured[start:stop])
+
+
+def trials_of(signals: Signals, name: str) -> tuple[Trial, ...]:
+    """The pieces of a run in which rudder and revolutions are known, each of `LEAST_SECS` or more.
+
+    Between an input's samples it is interpolated, over its gaps not. Raises `LogError` where no
+    piece is left.
+    """
+    inputs = {channel: _bridged(signals[channel], signals.dt_secs) for channel in INPUTS}
+    known = np.isfinite(inputs["rudder"]) & np.isfinite(inputs["rpm"])
+    whole = Signals(signals.start_ns, signals.dt_secs, {**signals.values, **inputs}, signals.first)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], known, [0]))))
+    pieces = [
+        (start, stop)
+        for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+        if (stop - start - 1) * signals.dt_secs >= LEAST_SECS
+    ]
+    if not pieces:
+        raise LogError(
+            f"rudder and rpm are known together for less than {LEAST_SECS:.0f} s at a time, "
+            f"too short to identify a ship; give a longer log: {name}"
+        )
+    return tuple(_trial(whole.part(*piece), name) for piece in pieces)
+
+
+def _trial(signals: Signals, name: str) -> Trial:
+    missing = np.full(len(signals), np.nan)
+    columns = [signals.values.get(output, missing) for output in OUTPUTS]
+    return Trial(name, signals, path_of(signals), np.column_stack(columns))
+
+
+def _bridged(values: FloatArray, dt: float) -> FloatArray:
+    """An input with the instants between its samples filled in, its gaps left open."""
+    at = np.flatnonzero(np.isfinite(values))
+    if len(at) < 2:
+        return values
+    filled = np.interp(np.arange(len(values)), at, values[at], left=np.nan, right=np.nan)
+    longest = longest_step_secs(float(np.median(np.diff(at))) * dt) / dt
+    for i in np.flatnonzero(np.diff(at) > longest):
+        filled[at[i] + 1 : at[i + 1]] = np.nan
+    return filled
+
+
+def usual(trials: Sequence[Trial], channel: str) -> float:
+    """The greatest of what the trials began with, over their first ten seconds: of speed or rpm."""
+    firsts = [
+        np.abs(trial.signals[channel][: max(2, round(10 / trial.dt_secs))]) for trial in trials
+    ]
+    known = [np.nanmedian(first) for first in firsts if np.isfinite(first).any()]
+    return float(max(known, default=np.nan))

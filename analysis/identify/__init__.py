@@ -1,1 +1,0 @@
-"""Identification that can be believed: ship models fitted to trials, with their uncertainty."""

@@ -1,0 +1,188 @@
+"""Least squares over a window that slides row by row, at a cost that knows nothing of its length.
+
+Nothing is ever subtracted, so nothing is left of what has gone. The rows come in blocks of the
+window's length. Of the block before, the triangular factor of every suffix is kept; of the block
+that fills, one factor grows by Givens' rotations. A window is a suffix and what has grown, and
+the two triangles are brought to one. (A queue of two stacks: Tangwongsan, Hirzel, Schneider and
+Wu, "General incremental sliding-window aggregation", 2015.)
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shiplog.compiled import compiled
+from shiplog.types import FloatArray
+
+from .batched_qr import TINY, Solutions, merge, no_solutions, solve
+
+ABREAST = 56  # windows solved together; a power of two would have their rows in one line of cache
+SLAB = 8192  # rows taken at a time where all are there
+NOTHING = (0.0, np.inf, -np.inf)  # the tally of no rows
+
+
+class Slid(NamedTuple):
+    """Least squares of each of k windows, the first of which ends with the `length`-th row."""
+
+    values: FloatArray  # (k, p), NaN for a column that is zero throughout, or if X is singular
+    conditions: FloatArray  # (k,) 2-norm, of the columns scaled to unit length; inf if singular
+
+
+class Stacks(NamedTuple):
+    """What is remembered of the rows so far; changed in place."""
+
+    seen: NDArray[np.int64]  # (1,) rows so far
+    block: FloatArray  # (n, p + 1) [X y] of the block that fills
+    older: FloatArray  # (n, p, p + 1) [R Q'y] of every suffix of the block before
+    newer: FloatArray  # (p, p + 1) the same of the block that fills
+    block_tally: FloatArray  # (n, 3) 1 if it is known, its excitation, and that again; of a row
+    older_tally: FloatArray  # (n, 3) rows known, least and greatest excitation; of a suffix
+    newer_tally: FloatArray  # (1, 3)
+
+
+class Unjudged(NamedTuple):
+    """Windows as they stand before anyone has judged them."""
+
+    solutions: Solutions
+    tallies: FloatArray  # (k, 3) rows known, least and greatest excitation
+
+
+def slide(X: FloatArray, y: FloatArray, length: int) -> Slid:
+    """Least squares over every `length` successive rows of X (m, p) and y (m,), p being small.
+
+    Rows that are not finite take up room in a window and count for nothing; a column that is zero
+    throughout a window has no value there; nor has any, where fewer rows are known than columns
+    or X is singular to the arithmetic's precision. Raises `ValueError` unless `length` is one at
+    the least.
+    """
+    p = X.shape[1]
+    stacks, still = no_rows(length, p), np.zeros(len(y))
+    values: list[FloatArray] = [np.empty((0, p))]
+    conditions: list[FloatArray] = [np.empty(0)]
+    for start in range(0, len(y), SLAB):
+        slab = slice(start, start + SLAB)
+        found, tallies = push(stacks, X[slab], y[slab], still[slab])
+        kept = found.inflations > 0
+        enough = np.isfinite(found.conditions) & (tallies[:, 0] >= kept.sum(axis=0))
+        values.append(np.where(kept & enough, found.values, np.nan).T)
+        conditions.append(np.where(enough, found.conditions, np.inf))
+    return Slid(np.concatenate(values), np.concatenate(conditions))
+
+
+def no_rows(length: int, p: int) -> Stacks:
+    """For windows of `length` rows of `p` regressors; `ValueError` unless there is a row."""
+    if length < 1:
+        raise ValueError(f"a window has one row at the least, not {length}")
+    nothing = np.array([NOTHING])
+    return Stacks(
+        np.zeros(1, np.int64),
+        np.zeros((length, p + 1)),
+        np.zeros((length, p, p + 1)),
+        np.zeros((p, p + 1)),
+        np.tile(nothing, (length, 1)),
+        np.tile(nothing, (length, 1)),
+        nothing.copy(),
+    )
+
+
+def push(stacks: Stacks, X: FloatArray, y: FloatArray, excitation: FloatArray) -> Unjudged:
+    """The windows that end in the next rows X (m, p), y (m,) and excitation (m,).
+
+    However the rows are parted into slabs, the windows are the same.
+    """
+    rows = np.column_stack((X, y)).astype(np.float64, copy=False)
+    unknown = ~np.isfinite(rows).all(axis=1)
+    tallies = np.column_stack((np.ones(len(y)), excitation, excitation))
+    rows[unknown], tallies[unknown] = 0.0, NOTHING
+    length, before = len(stacks.block), int(stacks.seen[0])
+    k = max(0, before + len(y) - length + 1) - max(0, before - length + 1)
+    window = Unjudged(no_solutions(k, X.shape[1]), np.tile(NOTHING, (k, 1)))
+    _push(stacks, rows, tallies, window)
+    return window
+
+
+@compiled
+def rotate_in(factor: FloatArray, rows: FloatArray, t: int) -> None:
+    """Row t of [X y] into a factor [R Q'y], by Givens' rotations; the row is used up."""
+    p = len(factor)
+    for j in range(p):
+        square = factor[j, j] ** 2 + rows[t, j] ** 2
+        if rows[t, j] == 0 or square < TINY:
+            continue
+        r = sqrt(square)
+        c, s = factor[j, j] / r, rows[t, j] / r
+        factor[j, j] = r
+        for k in range(j + 1, p + 1):
+            above, below = factor[j, k], rows[t, k]
+            factor[j, k] = c * above + s * below
+            rows[t, k] = c * below - s * above
+
+
+@compiled
+def rotate_all(factor: FloatArray, rows: FloatArray) -> None:
+    """Rows [X y] (m, p + 1) into a factor [R Q'y] (p, p + 1); they are used up."""
+    for t in range(len(rows)):
+        rotate_in(factor, rows, t)
+
+
+@compiled
+def _push(stacks: Stacks, rows: FloatArray, tallies: FloatArray, window: Unjudged) -> None:
+    """Rows (m, p + 1), used up, and their tallies (m, 3) onto the stacks."""
+    length, p, _ = stacks.older.shape
+    factors, others = np.zeros((p, p + 1, ABREAST)), np.empty((p, p + 1, ABREAST))
+    first = waiting = 0
+    for t in range(len(rows)):
+        at = stacks.seen[0] % length
+        if at == 0 and stacks.seen[0] > 0:
+            _turn_over(stacks)
+        for j in range(p + 1):
+            stacks.block[at, j] = rows[t, j]
+        _count_in(stacks.block_tally, at, tallies, t)
+        rotate_in(stacks.newer, rows, t)
+        _count_in(stacks.newer_tally, 0, tallies, t)
+        stacks.seen[0] += 1
+        if stacks.seen[0] < length:
+            continue
+        suffix = (at + 1) % length  # none is left of a whole block:
+        held = 1.0 if suffix else 0.0
+        for i in range(p):
+            for j in range(i, p + 1):
+                factors[i, j, waiting] = stacks.newer[i, j]
+                others[i, j, waiting] = held * stacks.older[suffix, i, j]
+        _count_in(window.tallies, first + waiting, stacks.newer_tally, 0)
+        if suffix:
+            _count_in(window.tallies, first + waiting, stacks.older_tally, suffix)
+        waiting += 1
+        if waiting == ABREAST or t + 1 == len(rows):
+            merge(factors, others, waiting)
+            solve(factors, waiting, first, window.solutions)
+            first, waiting = first + waiting, 0
+
+
+@compiled
+def _turn_over(stacks: Stacks) -> None:
+    """The block is full: its suffixes, and an empty one in its place."""
+    length, p, _ = stacks.older.shape
+    newer, tally = stacks.newer, stacks.newer_tally
+    newer[:] = 0.0
+    tally[0, 0], tally[0, 1], tally[0, 2] = NOTHING
+    for t in range(length - 1, -1, -1):
+        rotate_in(newer, stacks.block, t)
+        _count_in(tally, 0, stacks.block_tally, t)
+        for i in range(p):
+            for j in range(i, p + 1):
+                stacks.older[t, i, j] = newer[i, j]
+        for j in range(3):
+            stacks.older_tally[t, j] = tally[0, j]
+            stacks.block_tally[t, j] = NOTHING[j]
+    newer[:] = 0.0
+    tally[0, 0], tally[0, 1], tally[0, 2] = NOTHING
+
+
+@compiled
+def _count_in(tallies: FloatArray, i: int, others: FloatArray, j: int) -> None:
+    tallies[i, 0] += others[j, 0]
+    tallies[i, 1] = min(tallies[i, 1], others[j, 1])
+    tallies[i, 2] = max(tallies[i, 2], others[j, 2])

@@ -1,0 +1,316 @@
+"""An identified ship as tables for people, and as plain numbers for JSON."""
+
+from collections.abc import Iterator
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from analysis.identification.comparison.history import OFF
+from analysis.identification.identify import IdentifiedShip
+from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
+from analysis.identification.validation import Validation
+from analysis.manoeuvres.indices import Figure
+from shiplog import __version__
+from shiplog.ships.motion import OUTPUTS
+from shiplog.units import CATALOGUE, factor
+
+from .replay_tables import Section
+
+FITTED = "output error"
+PEOPLES = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}
+ALIKE, MOST_PAIRS = 0.97, 3  # of correlations that are told
+UNIT = {name: CATALOGUE[name].unit for name in OUTPUTS} | {"track": "m"}
+
+
+def sections(found: IdentifiedShip) -> tuple[Section, ...]:
+    """Tables in the units people use, and what is to be said of them."""
+    made = [_coefficients(found), _echoes(found), _runs(found)]
+    if found.validations:
+        made += [_held_out(found), *(_figures(v) for v in found.validations if v.figures)]
+    if found.candidates:
+        made.insert(0, _comparison(found))
+    return tuple(made)
+
+
+def _comparison(found: IdentifiedShip) -> Section:
+    rows = []
+    for candidate in found.candidates:
+        told = candidate.fit is not None
+        off = _mean_misfits(candidate)
+        rows.append(
+            (
+                candidate.model.name,
+                str(len(candidate.fit.problem.free)) if candidate.fit else "",
+                f"{100 * candidate.score:.3g}" if told else "runs away",
+                *(f"{100 * value:.3g}" if told and isfinite(value) else "" for value in off),
+            )
+        )
+    columns = ("model", "sought", "score [%]", *(f"{OUTPUTS[i]} [%]" for i in JUDGED_COLUMNS))
+    remark = (
+        "Each run in turn is predicted by a fit to the others, which know nothing of it but where "
+        "it began, its rudder's zero and its gyro's bias: the rms of what is off over the standard "
+        "deviation of what was measured. The least is taken."
+    )
+    title = f"Models by cross-validation: {found.model.name}"
+    return Section(title, columns, tuple(rows), (remark,))
+
+
+def _mean_misfits(candidate: Candidate) -> list[float]:
+    columns = [column[np.isfinite(column)] for column in candidate.misfits[:, JUDGED_COLUMNS].T]
+    return [float(np.mean(column)) if len(column) else np.nan for column in columns]
+
+
+def _coefficients(found: IdentifiedShip) -> Section:
+    told, rows = found.uncertainty, []
+    for i, name in enumerate(told.names):
+        value, half, bound = told.values[i], 1.96 * told.std[i], 1.96 * told.bound[i]
+        share = _percent(told.prior_share[i])
+        unit = found.model.parameter(name).unit
+        if name in told.vague:
+            rows.append((name, "not identifiable", "", "", share, unit))
+        else:
+            rows.append((name, f"{value:.5g}", f"± {half:.2g}", f"± {bound:.2g}", share, unit))
+    for name, value in found.known.items():
+        rows.append((name, f"{value:.5g}", "stated", "", "", found.model.parameter(name).unit))
+    columns = ("coefficient", "value", "95 %", "bound", "echo", "unit")
+    title = f"Coefficients: {found.model.title}"
+    return Section(title, columns, tuple(rows), tuple(_remarks(found)))
+
+
+def _remarks(found: IdentifiedShip) -> Iterator[str]:
+    for text, names in _by_advice(found).items():
+        yield f"{', '.join(names)}: not identifiable from these logs; what would tell: {text}."
+    yield (
+        "95 %: half the interval; bound: Cramér and Rao's, if each sample were off by itself. "
+        "Echo: how much of the value was believed before any data. "
+        f"Condition {found.uncertainty.condition:.0f}."
+    )
+    alike = _alike(found)
+    if alike:
+        yield f"Hardly to be told apart (correlation): {alike}."
+    scale = found.fit.problem.scale
+    if found.model.dimensionless:
+        yield (
+            f"Without dimensions: time in {scale.secs:.4g} s (L/U0), speed in {scale.speed:.4g} "
+            f"m/s, revolutions in {scale.rpm:.4g} rpm."
+        )
+    if found.uncertainty.enlarged > 1:
+        yield (
+            f"{'The halves' if len(found.fit.problem.runs) == 1 else 'The runs'} differ more than "
+            "their noise explains: intervals are enlarged "
+            f"{found.uncertainty.enlarged:.1f} times."
+        )
+    if found.ties is not None:
+        yield found.ties.advice(tied=found.model.name == "burylin-tied")
+
+
+def _alike(found: IdentifiedShip) -> str:
+    """The coefficients that the data know a sum of rather than each, the worst pairs first."""
+    told, names = found.uncertainty.correlation, found.uncertainty.names
+    pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(told[i, j]) > ALIKE]
+    pairs.sort(key=lambda pair: -abs(told[pair]))
+    return ", ".join(f"{names[j]} and {names[i]} {told[i, j]:+.3f}" for i, j in pairs[:MOST_PAIRS])
+
+
+def _by_advice(found: IdentifiedShip) -> dict[str, list[str]]:
+    grouped: dict[str, list[str]] = {}
+    for name, text in found.advice.items():
+        grouped.setdefault(text, []).append(name)
+    return grouped
+
+
+def _echoes(found: IdentifiedShip) -> Section:
+    """How much of each coefficient is prior, by each method that begins with one."""
+    by_method = _echoes_by_method(found)
+    rows = tuple(
+        (name, *(_percent(shares.get(name, np.nan)) for shares in by_method.values()))
+        for name in found.uncertainty.names
+    )
+    remark = (
+        "How much of a value is what was believed before, by a second run from other beliefs: the "
+        "fit from priors a standard deviation off and a start elsewhere, the other methods from "
+        f"priors to either side, {100 * OFF:.0f} % off or more, over the latter half of the runs. "
+        "100 % is a copy of the prior; beyond it errors grow."
+    )
+    return Section("Echo of what was believed before", ("coefficient", *by_method), rows, (remark,))
+
+
+def _echoes_by_method(found: IdentifiedShip) -> dict[str, dict[str, float]]:
+    told = {FITTED: dict(zip(found.uncertainty.names, found.uncertainty.prior_share, strict=True))}
+    for courses in found.courses:
+        if len(courses.priors) > 1:
+            told[courses.method] = dict(zip(courses.names, courses.usual_echo, strict=True))
+    return told
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if isfinite(share) else ""
+
+
+def _runs(found: IdentifiedShip) -> Section:
+    outputs, rows = found.fit.problem.outputs, []
+    for run in found.runs:
+        biases = [_shown(value, UNIT[name]) for name, value in run.biases.items()]
+        waves = ", ".join(f"{secs:.3g} s" for secs in run.wave_secs)
+        rows.append(
+            (
+                run.name, f"{run.duration_secs:.0f}",
+                *(_shown(run.rms[name], UNIT[name]) for name in outputs),
+                _shown(run.rudder_offset, "rad"), *biases, waves,
+            )
+        )  # fmt: skip
+    columns = (
+        "fitted to", "length\n[s]", *map(_headed, outputs), "rudder's\nzero [deg]",
+        *(_headed(name, " bias") for name in found.runs[0].biases), "swell",
+    )  # fmt: skip
+    remark = "Residuals' rms, and what each run has of its own, fitted with it."
+    return Section("Fit", columns, tuple(rows), (remark,))
+
+
+def _held_out(found: IdentifiedShip) -> Section:
+    names = [n for n in (*OUTPUTS, "track") if any(n in v.rms for v in found.validations)]
+    rows = []
+    for each in found.validations:
+        cells = [_shown(each.rms[n], UNIT[n]) if n in each.rms else "" for n in names]
+        seconds = f"{(len(each.trial) - 1) * each.trial.dt_secs:.0f}"
+        end = np.hypot(*(each.track[-1] - each.measured_track[-1]))
+        last = f"{end:.3g}" if isfinite(end) else ""
+        rows.append((each.trial.name, seconds, *cells, last))
+    columns = ("held out", "length\n[s]", *map(_headed, names), "at the end\n[m]")
+    remark = (
+        "Simulated open loop from how each run began, under its rudder and revolutions: the rms of "
+        "what is off."
+    )
+    return Section("Validation", columns, tuple(rows), (remark,))
+
+
+def _figures(validation: Validation) -> Section:
+    rows = tuple(_figure(figure) for figure in validation.figures)
+    columns = ("figure", "measured", "simulated", "off", "off [%]")
+    remark = "Counted from where the rudder leaves its rest by 0.5°."
+    return Section(f"Figures of {validation.trial.name}", columns, rows, (remark,))
+
+
+def _figure(figure: Figure) -> tuple[str, ...]:
+    """A row; of an angle no per cent are told."""
+    unit = figure.unit
+    cells = [_shown(v, unit, 4) for v in (figure.measured, figure.simulated)]
+    cells.append(_shown(figure.error, unit))
+    share = "" if unit == "rad" else f"{100 * figure.error / figure.measured:+.1f}"
+    return (f"{figure.name} [{_unit(unit)}]", *cells, share if isfinite(figure.error) else "")
+
+
+def _headed(name: str, what: str = "") -> str:
+    return f"{name.replace('_', ' ')}{what}\n[{_unit(UNIT[name])}]"
+
+
+def _unit(unit: str) -> str:
+    return PEOPLES.get(unit, unit)
+
+
+def _shown(value: float, unit: str, digits: int = 3) -> str:
+    """A number in the unit people use."""
+    return f"{value * factor(unit, _unit(unit)):.{digits}g}" if isfinite(value) else ""
+
+
+def as_json(found: IdentifiedShip) -> dict[str, Any]:
+    """The same as plain numbers in SI; what is not a number is None."""
+    told = found.uncertainty
+    told_of = {
+        "shiplog": __version__,
+        "model": {"name": found.model.name, "title": found.model.title},
+        "scale": {
+            "secs": found.fit.problem.scale.secs,
+            "speed": found.fit.problem.scale.speed,
+            "rpm": found.fit.problem.scale.rpm,
+            "length_given": found.length_given,
+        },
+        "coefficients": {
+            name: _coefficient(found, i) for i, name in enumerate(told.names)
+        },
+        "known": dict(found.known),
+        "echo": {
+            method: {name: float(share) for name, share in shares.items()}
+            for method, shares in _echoes_by_method(found).items()
+        },
+        "covariance": {"of": list(told.names), "values": told.covariance.tolist()},
+        "correlation": told.correlation.tolist(),
+        "condition": told.condition,
+        "enlarged": told.enlarged,
+        "agreement": {
+            "logs": list(told.agreement.names),
+            "by_own_noise": list(told.agreement.by_own_noise),
+            "by_noise_of_all": list(told.agreement.by_noise_of_all),
+            "contradiction": told.agreement.contradiction,
+            "odd": told.agreement.odd,
+        },
+        "ties": None if found.ties is None else {
+            "sum_over_d": found.ties.sum_over_d,
+            "std": found.ties.std,
+            "contradicted": found.ties.contradicted,
+            "advice": found.ties.advice(tied=found.model.name == "burylin-tied"),
+        },
+        "fit": [
+            {
+                "log": run.name, "duration_secs": run.duration_secs, "rms": dict(run.rms),
+                "rudder_offset": run.rudder_offset, "biases": dict(run.biases),
+                "wave_secs": list(run.wave_secs),
+            }
+            for run in found.runs
+        ],
+        "validation": [_validation(each) for each in found.validations],
+        "models": [
+            {
+                "name": c.model.name, "score": c.score if c.fit is not None else None,
+                "misfits": dict(zip(
+                    (OUTPUTS[i] for i in JUDGED_COLUMNS), _mean_misfits(c), strict=True
+                )),
+            }
+            for c in found.candidates
+        ],
+        "warnings": list(found.warnings),
+    }  # fmt: skip
+    return _finite(told_of)  # type: ignore[no-any-return]
+
+
+def _coefficient(found: IdentifiedShip, i: int) -> dict[str, Any]:
+    """A value that the logs do not tell stands as None: what is printed is believed."""
+    told = found.uncertainty
+    name = told.names[i]
+    vague = name in told.vague
+    return {
+        "value": None if vague else told.values[i],
+        "unit": found.model.parameter(name).unit,
+        "identifiable": not vague,
+        "interval": None if vague else told.interval[i].tolist(),
+        "std": told.std[i],
+        "cramer_rao_std": told.bound[i],
+        "prior_share": told.prior_share[i],
+        "what_would_tell": found.advice.get(name),
+    }
+
+
+def _validation(each: Validation) -> dict[str, Any]:
+    return {
+        "log": each.trial.name,
+        "ran_away": each.ran_away,
+        "rms": each.rms,
+        "figures": [
+            {
+                "name": f.name, "unit": f.unit, "measured": f.measured,
+                "simulated": f.simulated, "error": f.error,
+            }
+            for f in each.figures
+        ],
+    }  # fmt: skip
+
+
+def _finite(value: Any) -> Any:  # noqa: ANN401 - walks a tree of JSON
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_finite(inner) for inner in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if isfinite(value) else None
+    return value

@@ -1,0 +1,4 @@
+"""Resampled signals: statistics, held inputs, moments, concatenation.
+
+Imports nothing else of `analysis`.
+"""

@@ -1,0 +1,172 @@
+"""What the signals of a trial usually do: what the estimators must know before they begin."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog import Signals
+from shiplog.checks.channel_stats import longest_step_secs
+from shiplog.checks.quantiles import Thinned
+from shiplog.ships.paper import OUTPUTS, Coefficients, rudder_effects
+from shiplog.types import FloatArray, joined
+
+from .moments import Moments
+
+HEAD = 50_000  # samples of a long log are enough to tell how well a model fits
+
+
+@dataclass(frozen=True, eq=False)
+class Gauge:
+    """The signals' usual values; those of the outputs are (2,), yaw rate rad/s and speed m/s."""
+
+    count: int  # of the clock's instants
+    dt_secs: float
+    measured: tuple[int, int]  # how many instants have a sample of each output
+    first: FloatArray  # the first values measured
+    spread: FloatArray  # their standard deviation about the mean
+    intervals: FloatArray  # instants: the usual number from sample to sample
+    noise: FloatArray  # standard deviation of white noise in them
+    turning: float  # rad/s, the root of the mean square
+    ahead: float  # m/s, the median speed
+    fastest: float  # m/s
+    rpm: float  # the median
+    steering: float  # the rudder's largest effect, `ship.rudder_effects`
+    head: Signals  # the first of the signals, the inputs held
+
+    @property
+    def interval_secs(self) -> FloatArray:
+        """(2,) the usual time from sample to sample."""
+        return self.intervals * self.dt_secs
+
+    @property
+    def longest_steps(self) -> FloatArray:
+        """(2,) instants of the clock from sample to sample of an output, beyond which is a gap."""
+        return np.array([longest_step_secs(s) / self.dt_secs for s in self.interval_secs])
+
+
+class Gauger:
+    """Looks at signals, their inputs held, as they come in slabs.
+
+    Of `model` only the alphas are used. Source of the noise: `noise_level`.
+    """
+
+    def __init__(self, model: Coefficients) -> None:
+        self._model = model
+        self._outputs = {name: _OutputGauger() for name in OUTPUTS}
+        self._speed, self._rpm = Thinned(), Thinned()
+        self.fastest = self._steering = 0.0  # m/s so far, and of the rudder's effect
+        self._heads: list[Signals] = []
+        self._count, self._dt = 0, 1.0
+
+    def add(self, slab: Signals) -> None:
+        """Take the next signals."""
+        for name, output in self._outputs.items():
+            output.add(slab[name])
+        speed = slab["speed"]
+        known = np.isfinite(speed)
+        self._speed.add(speed[known])
+        self._rpm.add(slab["rpm"])
+        self.fastest = max(self.fastest, float(np.max(np.abs(speed[known]), initial=0.0)))
+        effects = rudder_effects(self._model, speed[known], slab["rpm"][known])
+        self._steering = max(self._steering, float(np.max(np.abs(effects), initial=0.0)))
+        if self._count < HEAD:
+            self._heads.append(slab.part(0, HEAD - self._count))
+        self._count, self._dt = self._count + len(slab), slab.dt_secs
+
+    def result(self) -> Gauge:
+        """What all that was added comes to."""
+        outputs = list(self._outputs.values())
+        yaw_rate = outputs[0].moments
+        return Gauge(
+            count=self._count,
+            dt_secs=self._dt,
+            measured=(outputs[0].moments.count, outputs[1].moments.count),
+            first=np.array([output.first for output in outputs]),
+            spread=np.array([output.moments.std for output in outputs]),
+            intervals=np.array([output.interval() for output in outputs]),
+            noise=np.array([output.noise.result() for output in outputs]),
+            turning=float(np.sqrt(yaw_rate.mean_square)),
+            ahead=self._speed.median(),
+            fastest=self.fastest,
+            rpm=self._rpm.median(),
+            steering=self._steering,
+            head=joined(self._heads),
+        )
+
+
+def gauge(signals: Signals, model: Coefficients) -> Gauge:
+    """What signals usually do, their inputs held; of `model` only the alphas are used."""
+    gauging = Gauger(model)
+    gauging.add(signals)
+    return gauging.result()
+
+
+class _OutputGauger:
+    """Looks at one output."""
+
+    def __init__(self) -> None:
+        self.moments, self.noise, self.first = Moments(), NoiseLevel(), np.nan
+        self._intervals, self._last, self._count = Thinned(), -1, 0
+
+    def add(self, values: FloatArray) -> None:
+        """Take the next values, NaN where not measured."""
+        at = np.flatnonzero(np.isfinite(values))
+        self.moments.add(values)
+        if len(at):
+            seen = values[at]
+            self.noise.add(seen)
+            numbers = at + self._count
+            if self._last < 0:
+                self.first = float(seen[0])
+                self._intervals.add(np.diff(numbers).astype(float))
+            else:
+                self._intervals.add(np.diff(numbers, prepend=self._last).astype(float))
+            self._last = int(numbers[-1])
+        self._count += len(values)
+
+    def interval(self) -> float:
+        """The median number of instants from sample to sample; 1 where there are not two."""
+        return self._intervals.median() if len(self._intervals.values) else 1.0
+
+
+def noise_level(values: FloatArray) -> float:
+    """The standard deviation of a signal's white noise, from its third differences, (n,).
+
+    NaN is not measured. Differences eight times the usual are spikes and not counted. A signal
+    printed to few digits has at least the noise of its rounding. NaN of fewer than four values.
+    """
+    level = NoiseLevel()
+    level.add(values[np.isfinite(values)])
+    return level.result()
+
+
+class NoiseLevel:
+    """As `noise_level`, of measured values that come in slabs."""
+
+    def __init__(self) -> None:
+        self._last: FloatArray = np.zeros(0)
+        self._moments = Moments()
+        self._thirds, self._least_step = Thinned(), np.inf
+
+    def add(self, seen: FloatArray) -> None:
+        """Take the next measured values."""
+        self._moments.add(seen)
+        new = np.concatenate((self._last[-1:], seen))
+        steps = np.abs(np.diff(new))
+        self._least_step = min(self._least_step, float(np.min(steps[steps > 0], initial=np.inf)))
+        seen = np.concatenate((self._last, seen))
+        # white noise of variance s^2 gives 20 s^2
+        self._thirds.add(np.diff(seen, 3) / np.sqrt(20.0))
+        self._last = seen[-3:]
+
+    def result(self) -> float:
+        """The standard deviation of all that was added."""
+        thirds = self._thirds.values
+        if not len(thirds):
+            return np.nan
+        usual = 1.4826 * float(np.median(np.abs(thirds)))
+        kept = thirds[np.abs(thirds) <= 8 * usual] if usual > 0 else thirds
+        std = self._moments.std
+        rounding = self._least_step / np.sqrt(12.0) if np.isfinite(self._least_step) else 0.0
+        floor = max(1e-6 * std, 1e-12)
+        return max(float(np.sqrt(np.mean(kept**2))), min(rounding, std), floor)

@@ -1,0 +1,258 @@
+"""What is drawn of an identified ship: each run against the simulated one, and how it was found."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.identification.comparison import paper_scheme, parameter_ekf, windows
+from analysis.identification.comparison.history import Courses, run_secs
+from analysis.identification.identify import IdentifiedShip
+from analysis.identification.segment import Trial
+from analysis.identification.validation import Validation
+from shiplog.ships.motion import OUTPUTS
+from shiplog.ships.paper import INPUTS
+from shiplog.types import FloatArray
+from shiplog.units import CATALOGUE, factor
+
+from .panels import Panel, limits, rounded, thousands
+from .series import (
+    BLUE,
+    CYAN,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    Colour,
+    Line,
+    Series,
+    banded,
+    measured_line,
+    thinned,
+)
+from .track_chart import Chart, chart
+
+COLOURS = dict(zip(OUTPUTS, (BLUE, ORANGE, CYAN, GREEN), strict=True))
+METHODS = {  # by what name, on top of those before it in the alphabet, and in which colour
+    paper_scheme.METHOD: ("a_paper", RED),
+    parameter_ekf.METHOD: ("kalman", BLUE),
+    windows.METHOD: ("windows", GREEN),
+}
+FAINT = 70  # of 255: how a course that echoes its prior is drawn
+LAG_SECS, LAGS_SHARE = 300.0, 0.25  # up to which lag, and up to which share of a run
+GUIDE = 2.0  # standard deviations
+
+
+@dataclass(frozen=True, eq=False)
+class RunSheet:
+    """A run, measured and simulated: panels side by side, row by row."""
+
+    title: str
+    start_ns: int
+    duration_secs: float
+    outputs: tuple[Panel, ...]
+    residuals: tuple[Panel, ...]
+    inputs: tuple[Panel, ...]
+    correlation: Panel
+    lag_secs: float  # up to which the correlation goes
+    track: Chart | None
+
+
+def run_sheets(found: IdentifiedShip) -> Iterator[RunSheet]:
+    """The runs that were fitted, then those held out."""
+    fit, problem = found.fit, found.fit.problem
+    for i, trial in enumerate(problem.trials):
+        simulated = np.full((len(trial), len(OUTPUTS)), np.nan)
+        simulated[:, problem.columns] = problem.predicted(fit.minimum.unknowns, i)
+        yield _sheet(f"run_{i + 1}", f"fitted: {trial.name}", trial, simulated, found, None)
+    for k, validation in enumerate(found.validations):
+        trial = validation.trial
+        drawn = _track(validation, found.vessel.length if found.vessel else None)
+        yield _sheet(
+            f"held_out_{k + 1}",
+            f"held out: {trial.name}",
+            trial,
+            validation.simulated,
+            found,
+            drawn,
+        )
+
+
+def _sheet(
+    origin: str, title: str, trial: Trial, simulated: FloatArray, found: IdentifiedShip,
+    track: Chart | None,
+) -> RunSheet:  # fmt: skip
+    shown = [
+        name
+        for i, name in enumerate(OUTPUTS)
+        if trial.has(name) and np.isfinite(simulated[:, i]).any()
+    ]
+    judged = [name for name in found.fit.problem.outputs if name in shown]
+    normalised = {name: _normalised(trial, simulated, found, name) for name in judged}
+    duration = (len(trial) - 1) * trial.dt_secs
+    lag_secs = min(LAG_SECS, LAGS_SHARE * duration)
+    return RunSheet(
+        title, trial.signals.start_ns, duration,
+        tuple(_output(origin, trial, simulated, name) for name in shown),
+        tuple(_residual(origin, trial, name, values) for name, values in normalised.items()),
+        tuple(_input(origin, trial, name) for name in INPUTS),
+        _correlation(origin, trial, normalised, lag_secs), lag_secs, track,
+    )  # fmt: skip
+
+
+def _output(origin: str, trial: Trial, simulated: FloatArray, name: str) -> Panel:
+    column, unit, scale = OUTPUTS.index(name), *_peoples(name)
+    at, values = _samples(trial, trial.measured[:, column] * scale)
+    measured = Series("measured", at, (Line("measured", values, GREY, 2.5),), spiky=True)
+    line = Line("simulated", simulated[:, column] * scale, COLOURS[name], 1.5)
+    drawn = Series("simulated", trial.signals.time_secs, (line,))
+    return Panel(
+        f"{origin}/{name}", f"{name.replace('_', ' ')} [{unit}]",
+        (thinned(measured), thinned(drawn)), limits(values, line.values),
+    )  # fmt: skip
+
+
+def _samples(trial: Trial, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The times and the values of what was measured; a piece of a log begins within it."""
+    at, known = measured_line(values, trial.dt_secs)
+    return at + trial.signals.time_secs[0], known
+
+
+def _peoples(name: str) -> tuple[str, float]:
+    entry = CATALOGUE[name]
+    return entry.display_unit, factor(entry.unit, entry.display_unit)
+
+
+def _input(origin: str, trial: Trial, name: str) -> Panel:
+    unit, scale = _peoples(name)
+    values = trial.signals[name] * scale
+    drawn = Series("given", trial.signals.time_secs, (Line(name, values, GREEN, 1.5),), spiky=True)
+    title = name if name == unit else f"{name} [{unit}]"
+    return Panel(f"{origin}/{name}", title, (thinned(drawn),), limits(values))
+
+
+def _normalised(
+    trial: Trial, simulated: FloatArray, found: IdentifiedShip, name: str
+) -> FloatArray:
+    """Measured less simulated over what the fit leaves of it as a rule, (n,)."""
+    column = OUTPUTS.index(name)
+    noise = found.fit.noises[found.fit.problem.outputs.index(name)]
+    _, usual = noise.spread(simulated[:, column], trial.dt_secs)
+    return np.asarray((trial.measured[:, column] - simulated[:, column]) / usual)
+
+
+def _residual(origin: str, trial: Trial, name: str, normalised: FloatArray) -> Panel:
+    at, values = _samples(trial, normalised)
+    drawn = Series("normalised", at, (Line("residual", values, COLOURS[name]),), spiky=True)
+    ends = trial.signals.time_secs[[0, -1]]
+    return Panel(
+        f"{origin}/residual_{name}", f"{name.replace('_', ' ')} residual [usual std]",
+        (thinned(drawn), _guides(ends, GUIDE)),
+        limits(values, np.array([-2.0, 2.0]) * GUIDE),
+    )  # fmt: skip
+
+
+def _guides(ends: FloatArray, bound: float) -> Series:
+    lines = (Line(f"±{bound:.2g}", np.full(2, sign * bound), GREY) for sign in (1, -1))
+    return Series("over", ends, tuple(lines))
+
+
+def _correlation(
+    origin: str, trial: Trial, normalised: dict[str, FloatArray], lag_secs: float
+) -> Panel:
+    """Autocorrelations over the lag; between the guides a white residual's would mostly be."""
+    lags = np.arange(1, max(2, round(lag_secs / trial.dt_secs)))
+    series: list[Series] = []
+    counts: list[int] = []
+    for name, values in normalised.items():
+        found, count = autocorrelation(values, int(lags[-1]))
+        line = Line(name.replace("_", " "), found[1:], COLOURS[name], 1.5)
+        series.append(thinned(Series(name, lags * trial.dt_secs, (line,))))
+        counts.append(count)
+    bound = GUIDE / np.sqrt(max(min(counts, default=1), 1))
+    series.append(_guides(np.array([0.0, lag_secs]), bound))
+    courses = [line.values for drawn in series for line in drawn.lines]
+    axis = limits(*courses, np.array([-0.2, 1.0]))
+    title = "autocorrelation of the residuals over the lag; grey: ±2σ if they were white"
+    return Panel(f"{origin}/correlation", title, tuple(series), axis)
+
+
+def autocorrelation(values: FloatArray, most: int) -> tuple[FloatArray, int]:
+    """Of values with gaps, (n,), at lags of 0 to `most` samples, and how many are known.
+
+    Each lag by the pairs of which both are known; NaN where there are none. About zero, not about
+    the mean: a residual that stays off is what is looked for.
+    """
+    known = np.isfinite(values)
+    length = 1 << int(len(values) + most).bit_length()
+    sums, pairs = (
+        np.fft.irfft(np.abs(np.fft.rfft(x, length)) ** 2, length)[: most + 1]
+        for x in (np.where(known, values, 0.0), known.astype(float))
+    )
+    pairs = np.round(pairs)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(pairs > 0, sums / pairs, np.nan)
+        return mean / mean[0], int(known.sum())
+
+
+def _track(validation: Validation, length: float | None) -> Chart | None:
+    trial = validation.trial
+    heading = trial.measured[:, OUTPUTS.index("heading")] if trial.has("heading") else None
+    if heading is not None:
+        at = np.flatnonzero(np.isfinite(heading))
+        heading = np.interp(np.arange(len(heading)), at, heading[at])
+    return chart(
+        "track, north up: grey as sailed, blue as simulated", validation.measured_track,
+        trial.signals.time_secs, heading, length, validation.track,
+    )  # fmt: skip
+
+
+def coefficient_panels(found: IdentifiedShip) -> list[Panel]:
+    """Each coefficient that was sought: its value and interval, and the courses of all methods."""
+    end = run_secs(found.fit.problem.trials)
+    return [_coefficient(found, i, end) for i in range(len(found.uncertainty.names))]
+
+
+def _coefficient(found: IdentifiedShip, i: int, end: float) -> Panel:
+    told = found.uncertainty
+    name, value, half = told.names[i], told.values[i], 1.96 * told.std[i]
+    courses = [each for each in found.courses if name in each.names]
+    priors = [each.priors[:, each.names.index(name)] for each in courses if len(each.priors) > 1]
+    reach = max([float(np.ptp(each)) / 2 for each in priors], default=abs(value) / 3)
+    unit = found.model.parameter(name).unit
+    prefix, scale = ("", 1.0) if unit == "1" else thousands(abs(value))
+    series = [_final(value * scale, half * scale, end, vague=name in told.vague)]
+    for each in courses:
+        series += _course(each, name, scale, limit=(value, 3 * reach))
+    said = "not identifiable" if name in told.vague else rounded(value * scale, half * scale)
+    axis = np.array([value - 1.4 * reach, value + 1.4 * reach]) * scale
+    title = f"{name} {said}" + ("" if unit == "1" else f" [{prefix}{unit}]")
+    return Panel(f"coefficient_{name}", title, tuple(series), limits(axis))
+
+
+def _final(value: float, half: float, end: float, *, vague: bool) -> Series:
+    """What output error says, with its interval; nothing where nothing is told."""
+    shown = np.full(2, np.nan if vague else value)
+    lines = banded("output error", shown, np.full(2, half), GREY)
+    return Series("interval", np.array([0.0, end]), lines)
+
+
+def _course(
+    courses: Courses, name: str, scale: float, limit: tuple[float, float]
+) -> Sequence[Series]:
+    """One method's courses from its priors, faint where they echo; nothing beyond the limit."""
+    i, (slug, colour) = courses.names.index(name), METHODS[courses.method]
+    echoes = courses.echoing[:, i]
+    lines: list[Line] = []
+    for values, stds in zip(courses.values[:, :, i], courses.stds[:, :, i], strict=True):
+        seen = np.where(np.abs(values - limit[0]) > limit[1], np.nan, values) * scale
+        pale: Colour = (*colour[:3], FAINT)
+        lines.append(Line(f"{courses.method}, echoing", np.where(echoes, seen, np.nan), pale))
+        sure = np.where(echoes, np.nan, seen)
+        if len(courses.values) == 1:
+            # a window less sure than the panel is high says nothing, and swings wildly
+            sure = np.where(GUIDE * stds > limit[1] / 3, np.nan, sure)
+            lines += banded(courses.method, sure, GUIDE * stds * scale, colour)
+        else:
+            lines.append(Line(courses.method, sure, colour, 1.5))
+    return [thinned(Series(slug, courses.time_secs, tuple(lines)))]

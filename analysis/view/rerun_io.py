@@ -1,0 +1,135 @@
+"""What every sheet in Rerun is made of: series, panels and charts, sent and laid out."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from shiplog.errors import ShiplogError
+from shiplog.files import replacing
+from shiplog.types import FloatArray
+
+from .panels import Panel
+from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Series
+from .track_chart import Chart
+
+ROWS_SENT = 1 << 16  # at once
+WHOLE_RUN = rrb.TimeAxis(
+    view_range=rr.TimeRange(
+        start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
+    )
+)
+
+
+@contextmanager
+def saving(recording: rr.RecordingStream, path: str | os.PathLike[str]) -> Iterator[None]:
+    """What is sent to the recording becomes the .rrd file `path` when all was sent.
+
+    Raises `ShiplogError` where `path` cannot be written to, or not to the end.
+    """
+    with replacing(path) as part:
+        try:
+            recording.save(part)
+            yield
+        except RuntimeError as error:  # what Rerun makes of a full disk
+            raise ShiplogError(f"cannot finish the review; is the disk full? {path}") from error
+        finally:
+            recording.disconnect()
+
+
+def send_style(recording: rr.RecordingStream, entity: str, series: Series) -> None:
+    """Say how the lines of a series look."""
+    style = rr.SeriesLines(
+        names=[line.name for line in series.lines],
+        colors=[line.colour for line in series.lines],
+        widths=[line.width for line in series.lines],
+        aggregation_policy="MinMax" if series.spiky else "Average",
+    )
+    recording.log(entity, style, static=True)
+
+
+def send_points(recording: rr.RecordingStream, entity: str, series: Series, start_ns: int) -> None:
+    """Send a series in slabs of a size that Rerun likes."""
+    values = np.column_stack([line.values for line in series.lines])
+    for start in range(0, len(values), ROWS_SENT):
+        part = slice(start, start + ROWS_SENT)
+        times = _times(series.time_secs[part], start_ns)
+        recording.send_columns(entity, times, rr.Scalars.columns(scalars=values[part]))
+
+
+def _times(time_secs: FloatArray, start_ns: int) -> list[rr.TimeColumn]:
+    since = np.round(time_secs * 1e9).astype(np.int64)
+    return [
+        rr.TimeColumn("time", duration=since.astype("m8[ns]")),
+        rr.TimeColumn("stamp", timestamp=(start_ns + since).astype("M8[ns]")),
+    ]
+
+
+def send_text(recording: rr.RecordingStream, entity: str, text: str) -> None:
+    """Send a page of words, in Markdown."""
+    page = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
+    recording.log(entity, page, static=True)
+
+
+def send_chart(recording: rr.RecordingStream, origin: str, drawn: Chart, start_ns: int) -> None:
+    """Draw a track."""
+    thin, dot = rr.Radius.ui_points(0.8), rr.Radius.ui_points(5.0)
+    track = rr.LineStrips2D([drawn.track], colors=[GREY], radii=thin)
+    recording.log(f"{origin}/line", track, static=True)
+    ships = rr.LineStrips2D(drawn.ships, colors=[CYAN], radii=thin)
+    recording.log(f"{origin}/ships", ships, static=True)
+    if drawn.simulated is not None:
+        simulated = rr.LineStrips2D([drawn.simulated], colors=[BLUE], radii=thin)
+        recording.log(f"{origin}/simulated", simulated, static=True)
+    ends = rr.Points2D(
+        drawn.track[[0, -1]], labels=["start", "end"], colors=[GREEN, RED], radii=dot
+    )
+    recording.log(f"{origin}/ends", ends, static=True)
+    scale = rr.LineStrips2D([drawn.scale], labels=[drawn.scale_label], colors=[GREY], radii=thin)
+    recording.log(f"{origin}/scale", scale, static=True)
+    now = rr.Points2D.from_fields(colors=[ORANGE], radii=dot)
+    recording.log(f"{origin}/now", now, static=True)
+    recording.send_columns(
+        f"{origin}/now",
+        _times(drawn.time_secs, start_ns),
+        rr.Points2D.columns(positions=drawn.track),
+    )
+
+
+def plot(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesView:
+    """A view of a panel, over the whole trial unless told otherwise."""
+    return rrb.TimeSeriesView(
+        origin=panel.name,
+        name=panel.title,
+        axis_x=axis,
+        axis_y=rrb.ScalarAxis(range=panel.limits),
+        plot_legend=rrb.PlotLegend(visible=False),
+    )
+
+
+def until(secs: float) -> rrb.TimeAxis:
+    """An axis from the start for so long."""
+    ends = (rr.TimeRangeBoundary.absolute(seconds=at) for at in (0.0, secs))
+    return rrb.TimeAxis(view_range=rr.TimeRange(*ends))
+
+
+def chart_view(origin: str, drawn: Chart) -> rrb.Spatial2DView:
+    """A view of a track."""
+    low, high = drawn.bounds
+    bounds = rrb.VisualBounds2D(x_range=(low[0], high[0]), y_range=(low[1], high[1]))
+    return rrb.Spatial2DView(origin=origin, name=drawn.title, visual_bounds=bounds)
+
+
+def laid_out(content: rrb.View | rrb.Container) -> rrb.Blueprint:
+    """The content as all there is to be seen."""
+    return rrb.Blueprint(
+        content,
+        rrb.TimePanel(state="collapsed", timeline="time", play_state="Paused"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_views=False,
+        auto_layout=False,
+    )

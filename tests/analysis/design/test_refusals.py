@@ -1,0 +1,153 @@
+"""Every design refuses every argument that does not fit: by its name, its shape, what it wants."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.design.cascade import cascade
+from analysis.design.exosystem import Plant, clashes, disturbance_observer
+from analysis.design.per_tick import block_gains
+from analysis.design.placement import hautus, place_multilevel
+from analysis.design.quality import (
+    cycle_regulator,
+    fast_and_slow,
+    quality_filter,
+    quality_regulator,
+)
+from analysis.design.riccati import error_covariance, kalman_gain
+from analysis.design.shaping import TransferFunction, augment_with_shaping
+from shiplog import UsageError
+
+A, COLUMN, ROW, I = (
+    np.array([[0.0, 1], [-0.2, -1]]),
+    np.array([[1.0], [0]]),
+    np.eye(1, 2),
+    np.eye(2),
+)
+SHAPING = TransferFunction(np.array([1.0]), np.array([1.0, 1]))
+
+
+def observed(A: Any, B: Any, C: Any) -> object:  # noqa: ANN401
+    plant = Plant(A, B, C, ("w", "w'"), ("gyro",))
+    clashes(plant, ())
+    return disturbance_observer(plant, (), frequency=0.1)
+
+
+# a design, and arguments that fit it
+FITTING: dict[Callable[..., object], dict[str, Any]] = {
+    kalman_gain: {"A": A, "G": I, "C": ROW, "Q": I, "R": [[1.0]], "N": np.zeros((2, 1))},
+    error_covariance: {"A": A, "L": COLUMN, "C": ROW, "W": I, "R": [[1.0]]},
+    quality_regulator: {"A": A, "B": COLUMN, "P": I, "R": [[1.0]], "G": I},
+    quality_filter: {"A": A, "S": ROW, "R1": I, "R2": [[1.0]], "G": I},
+    cycle_regulator: {"A": A, "B": COLUMN, "P": I, "R": [[1.0]], "cycles": 2, "G": I},
+    cascade: {
+        "A": A, "S": ROW, "R1": I, "R2": [[1.0]], "first": np.ones((2, 1)), "stages": 2,
+        "correlation_secs": 1.0,
+    },
+    augment_with_shaping: {
+        "A": A, "B": COLUMN, "C": ROW, "G": COLUMN, "shaping": SHAPING, "noise": I,
+    },
+    place_multilevel: {"A": A, "C": ROW, "poles": np.array([-1.0, -2])},
+    hautus: {"A": A, "C": ROW},
+    fast_and_slow: {"A": A, "border": 0.5},
+    block_gains: {"A": A, "Phi0": [[-1.0]], "Phi1": [[-1.0]]},
+    observed: {"A": A, "B": COLUMN, "C": ROW},
+}  # fmt: skip
+WEIGHTS = {
+    kalman_gain: ("Q", "R"), error_covariance: ("W", "R"), quality_regulator: ("P", "R", "G"),
+    quality_filter: ("R1", "R2", "G"), cycle_regulator: ("P", "R", "G"), cascade: ("R1", "R2"),
+}  # fmt: skip
+OPTIONS = ("cycles", "stages", "correlation_secs", "shaping", "border")
+ARGUMENTS = [(of, name) for of, given in FITTING.items() for name in given if name not in OPTIONS]
+of_each_argument = pytest.mark.parametrize(
+    ("of", "name"), ARGUMENTS, ids=[f"{of.__name__}-{name}" for of, name in ARGUMENTS]
+)
+
+
+def refusal(of: Callable[..., object], name: str, value: object) -> str:
+    with pytest.raises(UsageError) as caught:
+        of(**(FITTING[of] | {name: value}))
+    said = str(caught.value)
+    assert "\n" not in said
+    assert name in said
+    assert "expected" in said
+    return said
+
+
+@pytest.mark.parametrize("of", FITTING, ids=lambda of: of.__name__)
+def test_what_fits_is_taken(of: Callable[..., object]) -> None:
+    of(**FITTING[of])
+
+
+@of_each_argument
+@pytest.mark.parametrize("wrong", [(5,), (3, 5), (2, 2, 2), (0, 0), (3, 1)], ids=str)
+def test_a_wrong_shape_is_refused_by_its_name(
+    of: Callable[..., object], name: str, wrong: tuple[int, ...]
+) -> None:
+    said = refusal(of, name, np.ones(wrong))
+    assert f"of shape ({wrong[0]}," in said
+
+
+@of_each_argument
+@pytest.mark.parametrize("hole", [np.nan, np.inf])
+def test_nan_and_infinity_are_refused_with_the_shape(
+    of: Callable[..., object], name: str, hole: float
+) -> None:
+    given = np.array(FITTING[of][name], dtype=float)
+    given.flat[-1] = hole
+    said = refusal(of, name, given)
+    assert str(given.shape) in said
+    assert "NaN or infinities; expected finite numbers" in said
+
+
+@of_each_argument
+def test_what_are_no_numbers_is_refused(of: Callable[..., object], name: str) -> None:
+    for nothing in ("fast", [[1, 2], [3]], None):
+        if nothing is not None or name not in ("N", "G", "noise"):  # these may be left out
+            refusal(of, name, nothing)
+
+
+@pytest.mark.parametrize(
+    ("of", "name"), [(of, name) for of, names in WEIGHTS.items() for name in names]
+)
+def test_an_asymmetric_or_indefinite_weight_is_refused_with_the_shape(
+    of: Callable[..., object], name: str
+) -> None:
+    n = len(np.array(FITTING[of][name]))
+    indefinite = -np.eye(n)
+    indefinite[0, 0] = 1.0 if n > 1 else -1.0
+    said = refusal(of, name, indefinite)
+    assert f"{name}, ({n}, {n}), has the eigenvalue -1; expected a positive" in said
+    if n > 1:
+        said = refusal(of, name, np.eye(n) + np.triu(np.ones((n, n)), 1))
+        assert f"{name}, ({n}, {n}), differs from its transpose by 1; expected a symmetric" in said
+
+
+@pytest.mark.parametrize(
+    ("of", "change", "said"),
+    [
+        (kalman_gain, {"A": np.eye(2)}, r"A \(2, 2\) and C: the mode at 1 does not decay"),
+        (quality_filter, {"A": np.eye(2)}, r"A \(2, 2\) and S: the mode at 1 does not decay"),
+        (quality_regulator, {"A": np.eye(2)}, r"A \(2, 2\) and B: the mode at 1 does not decay"),
+        (cycle_regulator, {"A": np.eye(2)}, r"A \(2, 2\) and B: the mode at 1 does not decay"),
+        (place_multilevel, {"A": np.eye(2)}, r"A \(2, 2\) and C \(1, 2\): the mode at 1 cannot be"),
+        (observed, {"A": np.diag([-1.0, -2])}, r"at the mode -2 the state \"w'\" cannot be seen"),
+    ],
+)
+def test_a_pair_that_is_not_observable_is_refused_by_its_mode_and_with_a_cure(
+    of: Callable[..., object], change: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(UsageError, match=said) as caught:
+        of(**(FITTING[of] | change))
+    assert any(cure in str(caught.value) for cure in ("measure ", "add an input"))
+
+
+@pytest.mark.parametrize(
+    "poles", [[-1 + 1j, -1], [-1 + 1j, -1 + 1j], [-1 + 1j, -1.001 - 1j], [-1 - 1j, -2]]
+)
+def test_a_pole_without_its_conjugate_is_refused(poles: list[complex]) -> None:
+    said = refusal(place_multilevel, "poles", poles)
+    assert "poles, (2,), have -1" in said
+    assert "without its conjugate; expected both" in said

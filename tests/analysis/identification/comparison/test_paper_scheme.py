@@ -1,0 +1,83 @@
+"""The paper's own scheme, for comparison: it is what the paper has, and it echoes."""
+
+import numpy as np
+import pytest
+from fitted_runs import TRUE, a_trial, fitted
+
+from analysis.identification.comparison.history import two_priors
+from analysis.identification.comparison.paper_scheme import (
+    NINE,
+    papers_scheme,
+    papers_states,
+    regression,
+    solved,
+    windowed,
+)
+from analysis.identification.comparison.windows import windows
+from analysis.regression.coefficients import identify
+from analysis.regression.weak_form import weak_form
+from shiplog import load_vessel
+
+PRIOR = load_vessel("table1")[0].coefficients
+
+
+def test_a_window_is_the_least_squares_of_its_rows() -> None:
+    signals = a_trial().signals
+    states = papers_states(signals, PRIOR)
+    ends, found = windowed(signals, PRIOR, states)
+    k = int(np.searchsorted(ends, 310.0))
+    stop = round(ends[k] / 0.1)
+    expected = []
+    for rows in regression(signals, PRIOR, states):
+        part = rows[stop - 2000 : stop]
+        size = np.linalg.norm(part[:, :-1], axis=0)
+        expected += (
+            np.linalg.lstsq(part[:, :-1] / size, part[:, -1], rcond=None)[0] / size
+        ).tolist()
+    np.testing.assert_allclose(found[k], expected, rtol=1e-6)
+
+
+def test_with_the_truth_for_a_prior_it_finds_the_truth_whatever_it_is_worth() -> None:
+    signals = a_trial().signals
+    states = papers_states(signals, PRIOR, as_printed=False)
+    found = np.concatenate([solved(rows) for rows in regression(signals, PRIOR, states)])
+    off = dict(zip(NINE, found / np.array(PRIOR[:9]) - 1, strict=True))
+    assert abs(off["a"]) < 0.05
+    assert abs(off["d"]) < 0.05
+    assert abs(off["h"]) < 0.05
+
+
+def test_from_two_priors_it_comes_apart_where_the_fit_does_not() -> None:
+    fit, told = fitted()
+    found = papers_scheme(fit, two_priors(told, fit.problem.bounds))
+    assert found is not None
+    echo = dict(zip(found.names, found.usual_echo, strict=True))
+    assert echo["d"] > 0.5
+    assert echo["b1"] > 1.0
+    assert found.echoing.mean() > 0.7
+
+
+def test_it_knows_the_papers_model_alone() -> None:
+    fit, told = fitted("norrbin")
+    assert papers_scheme(fit, two_priors(told, fit.problem.bounds)) is None
+    assert windows(fit) is None
+
+
+def test_a_filter_that_ran_away_leaves_no_number() -> None:
+    assert np.isnan(solved(np.full((20, 4), np.nan))).all()
+
+
+@pytest.mark.parametrize("model", ["burylin", "burylin-tied"])
+def test_windows_in_weak_form_are_the_replays(model: str) -> None:
+    fit, _ = fitted(model, runs=2)
+    found = windows(fit)
+    assert found is not None
+    yaw = identify(weak_form(a_trial().signals, PRIOR)[0])[1]
+    first = len(yaw.time_secs)
+    np.testing.assert_allclose(
+        found.values[0, :first, found.names.index("d")], yaw.values[:, yaw.names.index("d")]
+    )
+    assert np.isnan(found.values[0, first]).all()  # the break between the runs
+    assert found.time_secs[first + 1] > 400.0
+    known = found.values[0, :, found.names.index("d")]
+    assert np.nanmedian(known) == pytest.approx(TRUE["d"], rel=0.02)

@@ -1,0 +1,115 @@
+"""The parameters as states: a filter against the joint least squares that it stands for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fitted_runs import TRUE, a_trial, fitted
+from scipy.optimize import least_squares
+
+from analysis.identification.comparison.history import two_priors
+from analysis.identification.comparison.parameter_ekf import (
+    _begun,
+    _calm,
+    _strides,
+    _taken_in,
+    augmented,
+)
+from analysis.identification.output_error import output_error
+from analysis.identification.problem import Nuisance
+from analysis.identification.uncertainty import uncertainty
+from shiplog.ships import ship_model
+
+
+@pytest.mark.parametrize("model", ["burylin", "burylin-tied", "norrbin"])
+def test_a_stride_is_the_joint_least_squares_of_belief_and_samples(model: str) -> None:
+    """By scipy, with finite differences, of prior and samples together."""
+    fit, told = fitted(model)
+    problem = replace(fit.problem, waves=())
+    covariance = np.diag((0.02 * np.abs(told.values)) ** 2)
+    belief = _begun(fit, 0, told.values * 1.01, covariance)
+    path, part = next(_strides(problem.trials[0], 20.0))
+    measured, weight = (column[part] for column in _calm(fit, 0))
+    found = _taken_in(problem, belief, path, measured, weight)
+    p, s = len(told.values), len(problem.model.state)
+    root = np.linalg.cholesky(np.linalg.inv(belief.covariance)).T
+
+    def off(z: np.ndarray) -> np.ndarray:
+        out = problem.model.simulate(
+            problem.parameters(belief.mean + z), (belief.mean + z)[p : p + s], path,
+            len(measured), offset=(belief.mean + z)[p + s], scale=problem.scale,
+        )[:, problem.columns]  # fmt: skip
+        for k, (column, _) in enumerate(problem.biases):
+            out[:, column] += (belief.mean + z)[p + s + 1 + k]
+        samples = ((measured - out) * np.sqrt(weight))[1:]
+        return np.concatenate((samples[np.isfinite(samples)], root @ z))
+
+    sizes = np.sqrt(np.diag(belief.covariance))
+    best = least_squares(off, np.zeros(len(sizes)), x_scale=sizes, xtol=1e-14, ftol=1e-14)
+    mean = belief.mean + best.x
+    stds = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)))[:p]
+    np.testing.assert_allclose(found.mean[:p] / stds, mean[:p] / stds, atol=0.02, rtol=0)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)[:p]), stds, rtol=1e-3)
+
+
+def test_strides_put_together_are_the_whole_run() -> None:
+    fit, told = fitted()
+    trial, model = fit.problem.trials[0], fit.problem.model
+    state = fit.problem.start()[len(told.values) :][:4]
+    whole = model.simulate(fit.parameters, state, trial.path, len(trial))
+    parts = [whole[:1]]
+    for path, part in _strides(trial, 2.0):
+        run = model.advance(fit.parameters, state, path, part.stop - part.start, np.eye(17)[:1])
+        parts.append(run.outputs[1:])
+        state = run.end
+    np.testing.assert_allclose(np.concatenate(parts), whole, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("runs", [1, 2])
+def test_from_priors_a_third_off_it_ends_where_output_error_is(runs: int) -> None:
+    fit, told = fitted(runs=runs)
+    found = augmented(fit, two_priors(told, fit.problem.bounds))
+    for values, stds in zip(found.values, found.stds, strict=True):
+        np.testing.assert_array_less(np.abs(values[-1] - told.values), 1.0 * told.std)
+        np.testing.assert_allclose(stds[-1], told.bound, rtol=0.25)
+    assert found.time_secs[-1] == pytest.approx(runs * 400.0, abs=0.3)
+    assert (np.diff(found.time_secs) >= 0).all()
+
+
+def test_it_begins_at_its_priors() -> None:
+    fit, told = fitted()
+    found = augmented(fit, two_priors(told, fit.problem.bounds))
+    np.testing.assert_array_equal(found.values[:, 0], found.priors)
+    np.testing.assert_allclose(found.echo[0], 1.0)
+
+
+def test_what_was_never_told_stays_what_it_was() -> None:
+    """b1 and e on a run that is over before the rudder moves."""
+    fit, told = fitted()
+    quiet = replace(fit.problem, trials=(fit.problem.trials[0].part(0, 90),), waves=())
+    short = replace(
+        fit, problem=quiet, spreads=tuple(
+            type(s)(s.effective[:90], s.usual[:90]) for s in fit.spreads
+        ),
+    )  # fmt: skip
+    found = augmented(short, two_priors(told, fit.problem.bounds))
+    assert found.echo[-1, told.names.index("e")] > 0.99
+    assert found.echoing[:, told.names.index("b1")].all()
+
+
+def test_nothing_but_states_and_parameters_will_do() -> None:
+    fit = output_error([a_trial()], ship_model("burylin"), nuisance=Nuisance.none())
+    told = uncertainty(fit)
+    found = augmented(fit, two_priors(told, fit.problem.bounds))
+    d = told.names.index("d")
+    np.testing.assert_allclose(found.values[:, -1, d], TRUE["d"], rtol=0.005)
+
+
+def test_a_ship_that_runs_away_leaves_no_number() -> None:
+    fit, told = fitted()
+    priors = two_priors(told, fit.problem.bounds)
+    priors[0, told.names.index("a")] = 50.0
+    found = augmented(fit, priors)
+    a = told.names.index("a")
+    assert np.isnan(found.values[0, 5:, a]).all()
+    assert np.isnan(found.echo[-1, a])

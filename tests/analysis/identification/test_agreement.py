@@ -1,0 +1,101 @@
+"""Whether runs are of one ship: clean ones agree, another ship's stands out and is named."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from trial_logs import as_log
+
+from analysis.identification.agreement import Agreement, agreement_of
+from analysis.identification.identify import IdentifiedShip, identify
+from analysis.identification.output_error import output_error
+from analysis.identification.runs import run_of
+from analysis.identification.segment import Trial
+from analysis.identification.uncertainty import uncertainty
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import simulate
+from shiplog import TrialLog, Vessel, load_vessel
+from shiplog.ships import ship_model
+
+SHIP = load_vessel("table1")[0]
+C = SHIP.coefficients
+OTHER = replace(SHIP, coefficients=C._replace(d=1.3 * C.d, e=1.3 * C.e))
+RUNS = (("zigzag-20-20", 0), ("zigzag-10-10", 1), ("zigzag-20-20-port", 2))
+
+
+@cache
+def a_log(manoeuvre: str, seed: int, vessel: Vessel = SHIP, noise: str = "paper") -> TrialLog:
+    trial = simulate(vessel, manoeuvre, duration_secs=400.0, seed=seed, sensors=suite(noise))
+    return as_log(trial, f"{manoeuvre}-{seed}.mcap")
+
+
+def a_trial(*args: object) -> Trial:
+    return run_of(a_log(*args)).trials[0]  # type: ignore[arg-type]
+
+
+@cache
+def mixed() -> IdentifiedShip:
+    """Two logs of one ship, the third of another."""
+    logs = [a_log(*run) for run in RUNS[:2]]
+    return identify([*logs, a_log(*RUNS[2], OTHER)], "burylin")
+
+
+def test_runs_of_one_ship_agree_within_their_noise() -> None:
+    fit = output_error([a_trial(*run) for run in RUNS], ship_model("burylin"))
+    found = agreement_of(fit)
+    assert found.names == tuple(f"{manoeuvre}-{seed}.mcap" for manoeuvre, seed in RUNS)
+    for ratios in (found.by_own_noise, found.by_noise_of_all):
+        # sums of squares of some thirty Gaussian numbers, over their number
+        assert 0.3 < np.mean(np.square(ratios)) * 3 / 2 < 2.0
+    assert (found.contradiction, found.enlarged) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "turning-circle-35", "pseudo-random"])
+def test_the_halves_of_a_run_agree_too(manoeuvre: str) -> None:
+    for seed in (0, 1):
+        found = agreement_of(output_error([a_trial(manoeuvre, seed)], ship_model("burylin")))
+        assert found.names == ("its first half", "its second half")
+        assert found.contradiction == 1.0
+
+
+def test_another_ship_among_the_logs_is_named_and_nothing_of_them_is_believed() -> None:
+    found = mixed()
+    (said,) = [w for w in found.warnings if "contradict each other" in w]
+    assert "zigzag-20-20-port-2.mcap the others" in said
+    assert found.uncertainty.agreement.contradiction > 20
+    assert set(found.uncertainty.vague) == set(found.uncertainty.names)
+
+
+def test_no_output_is_given_up_to_please_another_ships() -> None:
+    """An output whose noise may grow explains everything away, the speed first."""
+    fit = mixed().fit
+    speed = fit.problem.outputs.index("speed")
+    measured = np.concatenate([t.measured[:, 1] for t in fit.problem.trials])
+    assert fit.noises[speed].slow < 0.5 * np.nanstd(measured)
+    told = mixed().uncertainty
+    truth = np.array([C._asdict()[name] for name in told.names])
+    assert np.max(np.abs(told.values - truth) / told.std) < 2
+
+
+def test_of_two_logs_none_is_the_odd_one() -> None:
+    fit = output_error(
+        [a_trial(*RUNS[0]), a_trial(*RUNS[2], OTHER)], ship_model("burylin-tied"), known={"T3": 0.5}
+    )
+    found = agreement_of(fit)
+    assert found.odd is None
+    assert found.contradiction > 20
+
+
+def test_a_run_too_short_to_judge_by_itself_is_not_held_against_the_others() -> None:
+    assert Agreement(("a", "b"), (np.nan, 9.0), (1.0, 1.0)).contradiction == 1.0
+    assert Agreement((), (), ()).enlarged == 1.0
+
+
+def test_four_clean_logs_seldom_raise_the_alarm() -> None:
+    manoeuvres = ("zigzag-20-20", "zigzag-10-10-port", "zigzag-20-20-port", "zigzag-10-10")
+    for first in (100, 200):
+        trials = [a_trial(m, first + i) for i, m in enumerate(manoeuvres)]
+        found = uncertainty(output_error(trials, ship_model("burylin-tied"), known={"T3": 0.5}))
+        assert found.agreement.contradiction == 1.0
+        assert np.isfinite(found.between_runs).all()

@@ -1,0 +1,249 @@
+"""Output error: the truth is found, and how far off the fit may be is said rightly."""
+
+from functools import cache
+from math import radians
+
+import numpy as np
+import pytest
+from trial_logs import as_log
+
+from analysis.identification.output_error import OutputError, output_error
+from analysis.identification.problem import Nuisance
+from analysis.identification.residual_noise import Left, noise_of
+from analysis.identification.segment import Trial, trials_of
+from analysis.identification.swell import frequency_of
+from analysis.identification.uncertainty import uncertainty
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import simulate
+from shiplog import LogError, Signals, UsageError, load_vessel, resample
+from shiplog.ships import ship_model
+
+VESSEL = load_vessel("table1")[0]
+TRUTH = VESSEL.coefficients._asdict() | {"T3": 0.5}
+CHANNELS = ("yaw_rate", "speed", "rudder", "rpm")
+
+
+@cache
+def sailed(
+    manoeuvre: str = "zigzag-20-20", seed: int = 0, noise: str = "paper", seconds: float = 500.0
+) -> Signals:
+    trial = simulate(VESSEL, manoeuvre, duration_secs=seconds, seed=seed, sensors=suite(noise))
+    return resample(as_log(trial), channels=CHANNELS)
+
+
+def a_trial(*args: object, **settings: object) -> Trial:
+    name = f"{args}{settings}.mcap"  # pieces of one name are pieces of one run
+    return trials_of(sailed(*args, **settings), name)[0]  # type: ignore[arg-type]
+
+
+def errors(fit: OutputError) -> dict[str, float]:
+    """In per cent of the truth."""
+    found = dict(zip(fit.problem.model.names, fit.parameters, strict=True))
+    return {name: 100 * abs(found[name] / TRUTH[name] - 1) for name in fit.problem.free_names}
+
+
+# ---- what is found
+
+
+@pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "turning-circle-35", "pseudo-random"])
+def test_clean_data_give_the_truth_without_a_start(manoeuvre: str) -> None:
+    fit = output_error([a_trial(manoeuvre, noise="none")], ship_model("burylin"))
+    assert max(errors(fit).values()) < 1e-2
+    assert fit.minimum.settled
+
+
+def test_tied_zigzags_meet_what_was_asked_for() -> None:
+    model, seeds = ship_model("burylin-tied"), range(5)
+    rng = np.random.default_rng(3)
+    off = [{n: TRUTH[n] * rng.choice([0.5, 1.5]) for n in model.names[:8]} for _ in seeds]
+    for starts in ([None] * 5, [{n: v for n, v in o.items() if n != "T3"} for o in off]):
+        found = [
+            errors(output_error([a_trial(seed=s)], model, known={"T3": 0.5}, start=start))
+            for s, start in zip(seeds, starts, strict=True)
+        ]
+        median = {name: np.median([f[name] for f in found]) for name in found[0]}
+        assert max(median[name] for name in ("a", "d")) <= 0.1
+        assert max(median[name] for name in ("b2", "b3")) <= 0.5
+        assert max(median[name] for name in ("f", "g", "h")) <= 1.5
+
+
+def test_free_fits_reach_the_cramer_rao_bound_and_their_intervals_hold_the_truth() -> None:
+    fits = [output_error([a_trial(seed=s)], ship_model("burylin")) for s in range(8)]
+    found = [uncertainty(fit) for fit in fits]
+    truth = np.array([TRUTH[name] for name in found[0].names])
+    off = np.array([u.values - truth for u in found])
+    bound = np.median([u.bound for u in found], axis=0)
+    ratios = np.sqrt(np.mean(off**2, axis=0)) / bound
+    assert np.sqrt(np.mean(ratios**2)) < 1.2
+    assert ratios.max() < 1.8  # of nine, over eight seeds: chance makes one of them so large
+    inside = [(u.interval[:, 0] < truth) & (truth < u.interval[:, 1]) for u in found]
+    assert 0.88 < np.mean(inside) <= 1.0
+
+
+def test_each_trial_has_its_own_rudder_zero_and_gyro_bias() -> None:
+    offsets, biases = (radians(0.4), radians(-0.3)), (radians(0.003), radians(-0.002))
+    trials = []
+    for seed, (offset, bias) in enumerate(zip(offsets, biases, strict=True)):
+        s = sailed(seed=seed)
+        values = dict(s.values) | {
+            "rudder": s["rudder"] - offset, "yaw_rate": s["yaw_rate"] + bias
+        }  # fmt: skip
+        trials += trials_of(Signals(s.start_ns, s.dt_secs, values), f"{seed}.mcap")
+    fit = output_error(trials, ship_model("burylin-tied"), known={"T3": 0.5})
+    own = [fit.minimum.unknowns[fit.problem.own_slice(i)] for i in (0, 1)]
+    assert [u[4] for u in own] == pytest.approx(offsets, abs=radians(0.03))
+    assert [u[5] for u in own] == pytest.approx(biases, abs=radians(0.001))
+    assert max(errors(fit).values()) < 3
+
+
+def test_a_known_parameter_stays_and_a_freed_one_is_sought() -> None:
+    fit = output_error(
+        [a_trial("pseudo-random", noise="none")], ship_model("burylin"),
+        known={"b3": TRUTH["b3"]}, free=["alpha2"], nuisance=Nuisance.none(),
+    )  # fmt: skip
+    assert "b3" not in fit.problem.free_names
+    assert errors(fit)["alpha2"] < 1
+
+
+def test_samples_that_were_not_measured_do_not_count() -> None:
+    s = sailed(noise="none")
+    values = {name: np.array(v) for name, v in s.values.items()}
+    values["yaw_rate"][100:900] = np.nan
+    values["speed"][::3] = np.nan
+    trial = trials_of(Signals(s.start_ns, s.dt_secs, values), "holes.mcap")[0]
+    assert max(errors(output_error([trial], ship_model("burylin"))).values()) < 1e-2
+
+
+def test_one_spike_in_a_hundred_changes_little() -> None:
+    s = sailed(seed=4)
+    values = {name: np.array(v) for name, v in s.values.items()}
+    values["yaw_rate"][::100] += radians(0.3)
+    spiked = trials_of(Signals(s.start_ns, s.dt_secs, values), "spikes.mcap")[0]
+    fit = output_error([spiked], ship_model("burylin-tied"), known={"T3": 0.5})
+    assert errors(fit)["d"] < 1
+    assert errors(fit)["b2"] < 2
+
+
+# ---- how far off it may be
+
+
+def test_what_one_turning_circle_cannot_tell_is_said_to_be_vague() -> None:
+    fit = output_error([a_trial("turning-circle-35")], ship_model("burylin"))
+    vague = uncertainty(fit).vague
+    assert "b1" in vague
+    assert not {"a", "d", "f", "g", "h"} & set(vague)
+    tied = output_error(
+        [a_trial("turning-circle-35")], ship_model("burylin-tied"), known={"T3": 0.5}
+    )
+    assert uncertainty(tied).vague == ()
+
+
+def test_the_alphas_are_vague_at_constant_revolutions() -> None:
+    trials = [a_trial("turning-circle-35")]
+    fit = output_error(trials, ship_model("burylin"), free=["alpha1", "alpha2", "alpha3"])
+    assert {"alpha1", "alpha2", "alpha3"} <= set(uncertainty(fit).vague)
+
+
+def test_what_was_believed_and_not_measured_is_all_prior() -> None:
+    trials = [a_trial("turning-circle-35", noise="white")]
+    fit = output_error(trials, ship_model("three-dof"), length=200.0)
+    found = uncertainty(fit)
+    share = dict(zip(found.names, found.prior_share, strict=True))
+    assert share["p"] > 0.5
+    assert "p" in found.vague
+    assert np.all((found.prior_share > -1e-9) & (found.prior_share < 1 + 1e-9))
+
+
+def test_runs_of_different_ships_widen_the_intervals() -> None:
+    s = sailed(seed=1)
+    other = Signals(s.start_ns, s.dt_secs, dict(s.values) | {"rudder": 0.8 * s["rudder"]})
+    same = [a_trial(seed=0), a_trial(seed=1)]
+    mixed = [a_trial(seed=0), trials_of(other, "other.mcap")[0]]
+    model, known = ship_model("burylin-tied"), {"T3": 0.5}
+    alike, unlike = (uncertainty(output_error(t, model, known=known)) for t in (same, mixed))
+    assert alike.enlarged == 1.0
+    assert np.all(unlike.std > 2 * alike.std)
+
+
+def test_four_runs_are_judged_by_leaving_each_out() -> None:
+    runs = [a_trial(seed=s, seconds=200.0) for s in range(4)]
+    found = uncertainty(output_error(runs, ship_model("burylin-tied"), known={"T3": 0.5}))
+    assert np.isfinite(found.between_runs).all()
+    assert found.enlarged == 1.0
+    # three degrees of freedom: rough, but of the size of the others
+    assert np.all(found.between_runs < 8 * found.bound)
+
+
+# ---- the noise
+
+
+def test_noise_is_told_apart_by_its_law() -> None:
+    rng = np.random.default_rng(0)
+    level = np.sin(np.arange(20_000) / 300)
+    white = 0.02 * rng.standard_normal(20_000) + 0.05 * level * rng.uniform(-1, 1, 20_000) * 3**0.5
+    found = noise_of([Left(white, level, 0.1)], proportional=True, least=1e-9)
+    assert found.white == pytest.approx(0.02, rel=0.05)
+    assert found.relative == pytest.approx(0.05, rel=0.05)
+    assert found.slow == 0
+    slow = np.convolve(rng.standard_normal(20_200), np.ones(201) / 201**0.5, "valid") * 0.03
+    found = noise_of([Left(white + slow, level, 0.1)], proportional=True, least=1e-9)
+    assert found.slow == pytest.approx(0.03, rel=0.3)
+    assert 10 < found.slow_secs < 40
+
+
+def test_a_wave_is_found_and_white_noise_has_none() -> None:
+    rng = np.random.default_rng(1)
+    time = np.arange(5000) * 0.1
+    noise, std = rng.standard_normal((5000, 2)), np.ones((5000, 2))
+    assert frequency_of(noise, std, 0.1) is None
+    noise[:, 1] += 0.3 * np.sin(time / 10 + 1)
+    noise[500:900] = np.nan
+    assert frequency_of(noise, std, 0.1) == pytest.approx(0.1, rel=0.03)
+
+
+def test_a_swell_is_a_nuisance_and_no_longer_stays_off() -> None:
+    fit = output_error([a_trial(seed=6)], ship_model("burylin"))
+    assert len(fit.problem.waves[0]) == 1
+    omega = fit.minimum.unknowns[fit.problem.own_slice(0)][-5]
+    assert omega == pytest.approx(0.1, rel=0.01)
+    assert fit.noises[1].slow < 0.02
+    assert not output_error([a_trial(seed=6, noise="white")], ship_model("burylin")).problem.waves
+
+
+# ---- what cannot be fitted
+
+
+def test_no_trials_unknown_names_and_a_rudder_at_rest_are_refused() -> None:
+    with pytest.raises(UsageError, match="at least one log"):
+        output_error([], ship_model("nomoto"))
+    with pytest.raises(UsageError, match="no parameter 'T4'; it has a, b2"):
+        output_error([a_trial()], ship_model("burylin-tied"), known={"T4": 1.0})
+    s = sailed()
+    still = Signals(s.start_ns, s.dt_secs, dict(s.values) | {"rudder": np.zeros(len(s))})
+    with pytest.raises(LogError, match=r"the rudder moves by 0.0° in all.*still\.mcap"):
+        output_error(trials_of(still, "still.mcap"), ship_model("nomoto"))
+
+
+def test_ten_seconds_are_too_short_and_gaps_part_a_trial() -> None:
+    s = sailed()
+    with pytest.raises(LogError, match=r"less than 60 s at a time.*short\.mcap"):
+        trials_of(s.part(0, 100), "short.mcap")
+    rudder = np.array(s["rudder"])
+    rudder[2000:2300] = np.nan
+    values = dict(s.values) | {"rudder": rudder}
+    pieces = trials_of(Signals(s.start_ns, s.dt_secs, values), "gap.mcap")
+    assert [len(piece) for piece in pieces] == [2000, len(s) - 2300]
+    assert all(np.isfinite(piece.signals["rudder"]).all() for piece in pieces)
+
+
+def test_a_sparse_run_does_not_hide_what_stays_off_in_another() -> None:
+    rng = np.random.default_rng(0)
+    slow = np.zeros(6000)
+    for k in range(1, len(slow)):
+        slow[k] = 0.99 * slow[k - 1] + 0.1 * np.sqrt(1 - 0.99**2) * rng.standard_normal()
+    dense = Left(slow + 0.01 * rng.standard_normal(6000), np.zeros(6000), 0.1)
+    sparse = Left(0.1 * rng.standard_normal(2), np.zeros(2), 600.0)
+    alone = noise_of([dense], proportional=False, least=1e-9)
+    beside = noise_of([dense, sparse], proportional=False, least=1e-9)
+    assert beside.slow == pytest.approx(alone.slow, rel=0.05)
+    assert beside.slow_secs == pytest.approx(alone.slow_secs, rel=0.3)

@@ -1,0 +1,211 @@
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from analysis.regression.changes import MOST_BLOCKS, Change, ChangeWatch, ShipWatch
+from analysis.regression.first_model import BARE
+from analysis.regression.weak_form import (
+    CHANNELS,
+    Equation,
+    Rows,
+    WeakForm,
+    weak_form,
+    with_constant,
+)
+from analysis.replay.replay import Analysis, analyse
+from analysis.report.replay_json import summarise
+from analysis.report.replay_tables import markdown, sections
+from analysis.view.panels import coefficient_panels
+from analysis.view.series import Sketch
+from benchmarks.changed_ship import changed_trial
+from benchmarks.changes import Case, halfway, told, unchanged
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import simulate
+from recorders.simulated.trajectory import Gust, Unrest
+from shiplog import TrialLog, Vessel, load_vessel, resample
+
+ZIGZAG = Case("table1", guessed=False, manoeuvre="zigzag-20-20", noise="paper")
+
+
+@pytest.mark.parametrize("vessel", ["table1", "table1-rad"])
+@pytest.mark.parametrize("guessed", [False, True])
+@pytest.mark.parametrize(
+    "manoeuvre", ["zigzag-20-20", "zigzag-10-10", "pseudo-random", "turning-circle"]
+)
+def test_where_nothing_changed_nothing_is_told(vessel: str, guessed: bool, manoeuvre: str) -> None:
+    for noise in ("paper", "white"):
+        case = Case(vessel, guessed, manoeuvre, noise)
+        for secs in (600.0, 1200.0):
+            assert told(unchanged(case, secs, seed=1), case) == ()
+
+
+@pytest.mark.parametrize("name", ["d", "f", "b2"])
+@pytest.mark.parametrize("guessed", [False, True])
+@pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "pseudo-random"])
+def test_a_fifth_more_or_less_is_found_in_time_with_its_size(
+    name: str, guessed: bool, manoeuvre: str
+) -> None:
+    case = Case("table1", guessed, manoeuvre, "white")
+    for seed, factor in enumerate((0.8, 1.2)):
+        changes = told(halfway(case, name, factor, seed), case)
+        (found,) = [change for change in changes if change.name == name]
+        assert abs(found.at_secs - 600) < 100
+        assert abs(found.share - (factor - 1)) < max(1.5 * found.share_half, 0.01)
+        assert abs(found.after / found.before - 1) == pytest.approx(abs(found.share))
+        assert (found.from_secs, found.until_secs) == pytest.approx((30, 1170), abs=2)
+
+
+def test_unrest_of_the_sea_is_no_change(vessel: Vessel) -> None:
+    for seed in range(4):
+        sailed = simulate(
+            vessel, "zigzag-20-20", duration_secs=1200.0, seed=seed, sensors=suite("paper"),
+            unrest=Unrest(np.radians(0.2), 0.005),
+        )  # fmt: skip
+        assert told(TrialLog("unrest", sailed.channels), ZIGZAG) == ()
+
+
+def test_a_steady_moment_that_sets_in_is_no_coefficient(vessel: Vessel) -> None:
+    gusts = (Gust(np.radians(2.0), 500.0),)
+    for seed in range(4):
+        sailed = simulate(
+            vessel, "zigzag-20-20", duration_secs=1200.0, seed=seed, sensors=suite("paper"),
+            gusts=gusts,
+        )  # fmt: skip
+        assert told(TrialLog("gust", sailed.channels), ZIGZAG) == ()
+
+
+def test_two_coefficients_that_change_together_are_both_told(vessel: Vessel) -> None:
+    log = changed_trial(
+        vessel, "pseudo-random", {"a": 1.2, "d": 0.8}, at_secs=700.0, duration_secs=1500.0,
+        sensors=suite("white"), seed=1,
+    )  # fmt: skip
+    changes = {change.name: change for change in told(log, replace(ZIGZAG, noise="white"))}
+    assert set(changes) == {"a", "d"}
+    assert changes["a"].share == pytest.approx(0.2, abs=0.02)
+    assert changes["d"].share == pytest.approx(-0.2, abs=0.02)
+
+
+def test_where_several_could_have_changed_all_are_named() -> None:
+    """In a 10/10 zig-zag the yaw rate is always as large: f does what h does."""
+    case = replace(ZIGZAG, manoeuvre="zigzag-10-10")
+    (found,) = told(halfway(case, "f", 0.8, seed=0), case)
+    assert "f" in (found.name, *found.instead)
+    assert found.instead
+    assert "in its place" in str(found)
+
+
+def made(changes: dict[int, float], n: int = 3000, seed: int = 0) -> Rows:
+    """Rows with white noise whose first slope becomes what is given, from the row given."""
+    rng = np.random.default_rng(seed)
+    X, slope = rng.standard_normal((n, 2)), np.full(n, 1.0)
+    for start, value in changes.items():
+        slope[start:] = value
+    y = X[:, 0] * slope + X[:, 1] + 0.3 * rng.standard_normal(n)
+    equation = Equation(("a", "d"), 1.0, 10.0)
+    return Rows(equation, 5.0 + np.arange(n), y, X, X[:, 0], 0.1)
+
+
+def watched(rows: Rows, cuts: list[int] | None = None) -> tuple[Change, ...]:
+    watch = ChangeWatch(rows.equation, len(rows.target))
+    edges = [0, *(cuts or []), len(rows.target)]
+    for start, stop in pairwise(edges):
+        watch.add(rows.part(start, stop))
+    return watch.result()
+
+
+def test_what_comes_and_goes_is_told_twice() -> None:
+    found = watched(made({1000: 1.5, 2000: 1.0}))
+    assert [change.name for change in found] == ["a", "a"]
+    assert [change.at_secs for change in found] == pytest.approx([1005, 2005], abs=20)
+    assert [change.share for change in found] == pytest.approx([0.5, -1 / 3], abs=0.07)
+    assert found[0].until_secs < found[1].at_secs
+    assert found[1].from_secs > found[0].at_secs
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_where_slabs_are_cut_changes_no_bit(seed: int) -> None:
+    rows = made({1200: 1.3}, seed=seed)
+    rows.target[100:140] = np.nan
+    cuts = np.sort(np.random.default_rng(seed).integers(0, 3001, 12)).tolist()
+    assert watched(rows, cuts) == watched(rows)
+    assert watched(rows)
+
+
+def test_rows_in_a_gap_belong_to_no_side() -> None:
+    rows = made({1500: 1.3})
+    rows.target[1400:1600] = np.nan
+    (found,) = watched(rows)
+    assert abs(found.at_secs - 1505) < 130
+    assert found.share == pytest.approx(0.3, abs=0.06)
+
+
+def test_less_than_a_hundredth_is_not_worth_telling() -> None:
+    rows = made({1500: 1.005})
+    clear = replace(rows, target=rows.regressors @ [1.0, 1.0])
+    clear.target[1500:] += 0.005 * rows.regressors[1500:, 0]
+    assert watched(clear) == ()
+
+
+def test_of_a_month_no_more_is_kept_than_of_a_day() -> None:
+    yaw = Equation(("a", "b1", "b2", "b3", "d", "e", "constant"), 1.0, 60.0)
+    watch = ChangeWatch(yaw, 31 * 86400)
+    assert len(watch._factors) <= MOST_BLOCKS
+    assert ChangeWatch(yaw, 0).result() == ()
+
+
+@pytest.fixture(scope="module")
+def changed() -> Analysis:
+    vessel, text = load_vessel("table1")
+    log = changed_trial(
+        vessel, "zigzag-20-20", {"d": 0.8}, at_secs=600.0, duration_secs=1200.0,
+        sensors=suite("paper"), seed=3, vessel_toml=text,
+    )  # fmt: skip
+    return analyse(log)
+
+
+def test_a_replay_tells_of_it_in_words_in_a_table_and_in_numbers(changed: Analysis) -> None:
+    (change,) = changed.changes
+    (said,) = [warning for warning in changed.warnings if "differs" in warning]
+    assert said.startswith("d differs before and after 600 s by -")
+    assert "a model that does not hold for both" in said
+    (section,) = [s for s in sections(changed) if s.title == "Changes within the trial"]
+    assert section.rows[0][0] == "d [1/s²]"
+    assert section.title in markdown(changed)
+    (summary,) = summarise(changed)["changes"]
+    assert summary["at_secs"] == change.at_secs
+    assert summary["share"] == pytest.approx(-0.2, abs=0.01)
+
+
+def test_its_levels_are_drawn_and_meet_at_the_change(changed: Analysis) -> None:
+    sketch = Sketch(changed.clock, changed.usual)
+    sketch.add(changed)
+    panels = {panel.name: panel for panel in coefficient_panels(changed, sketch.result())}
+    step = panels["coefficient_d"].series[-1]
+    (change,) = changed.changes
+    assert step.time_secs.tolist() == [change.from_secs, change.at_secs, change.until_secs]
+    before, after = (line.values for line in step.lines)
+    np.testing.assert_array_equal(np.isnan(before), [False, False, True])
+    np.testing.assert_array_equal(np.isnan(after), [True, False, False])
+    assert after[1] / before[1] == pytest.approx(change.after / change.before)
+    low, high = panels["coefficient_d"].limits
+    assert low < after[1] < before[1] < high
+    assert "→" in panels["coefficient_d"].title
+    assert all(len(panels[f"coefficient_{name}"].series) == 2 for name in ("a", "f"))
+
+
+def test_of_a_trial_without_a_change_nothing_is_said(zigzag_analysis: Analysis) -> None:
+    assert zigzag_analysis.changes == ()
+    assert summarise(zigzag_analysis)["changes"] == []
+    assert len(sections(zigzag_analysis)) == 4
+
+
+def test_the_ship_is_watched_as_its_two_equations_are(vessel: Vessel) -> None:
+    log = halfway(ZIGZAG, "f", 0.8, seed=0)
+    signals = resample(log, channels=CHANNELS)
+    yaw, surge = weak_form(signals, vessel.coefficients)
+    found = watched(with_constant(yaw)) + watched(surge)
+    assert found == told(log, ZIGZAG)
+    equations = WeakForm(BARE, len(signals), signals.dt_secs, (1, 1, 1, 1))
+    assert ShipWatch(equations, guessed=True).result() == ()

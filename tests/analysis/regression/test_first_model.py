@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+
+from analysis.regression.coefficients import Identifier
+from analysis.regression.first_model import BARE, fit_first_model
+from analysis.regression.weak_form import weak_form
+from analysis.signals.signal_stats import gauge
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import simulate
+from shiplog import LogError, Signals, TrialLog, Vessel, resample
+
+NAMES = ("yaw_rate", "speed", "rudder", "rpm")
+
+
+def sailed(vessel: Vessel, manoeuvre: str, duration: float, **settings: float) -> Signals:
+    sensors = suite("paper", {k.replace("__", "."): v for k, v in settings.items()})
+    trial = simulate(vessel, manoeuvre, duration_secs=duration, seed=1, sensors=sensors)
+    return resample(TrialLog("trial", trial.channels), channels=NAMES)
+
+
+def fitted(signals: Signals, name: str) -> Vessel:
+    yaw_rows, surge_rows = weak_form(signals, BARE)
+    yaw, surge = (
+        Identifier(yaw_rows.equation, len(yaw_rows.target), constant=True),
+        Identifier(surge_rows.equation, len(surge_rows.target)),
+    )
+    yaw.add(yaw_rows)
+    surge.add(surge_rows)
+    return fit_first_model(yaw, surge, gauge(signals, BARE), name)
+
+
+def test_a_ship_that_obeys_the_first_model_is_found(vessel: Vessel) -> None:
+    c = vessel.coefficients._replace(
+        b3=0.0, b2=-2.0, alpha1=1.0, alpha2=0.0, alpha3=0.0, d=2e-5, e=0
+    )
+    ship = Vessel("simple", c)
+    found = fitted(sailed(ship, "zigzag-20-20", 800.0), "x").coefficients
+    for name, tolerance in (("a", 0.02), ("b2", 0.15), ("d", 0.02), ("f", 0.15), ("h", 0.15)):
+        assert getattr(found, name) == pytest.approx(getattr(c, name), rel=tolerance), name
+
+
+def test_a_biased_gyro_is_taken_up_by_the_constant(vessel: Vessel) -> None:
+    plain = fitted(sailed(vessel, "zigzag-20-20", 600.0), "x").coefficients
+    biased = fitted(
+        sailed(vessel, "zigzag-20-20", 600.0, yaw_rate__bias=float(np.radians(0.02))), "x"
+    ).coefficients
+    assert biased.a == pytest.approx(plain.a, rel=0.03)
+    assert biased.d == pytest.approx(plain.d, rel=0.03)
+
+
+@pytest.mark.parametrize(("manoeuvre", "duration"), [("turning-circle", 4.0)])
+def test_a_log_that_cannot_tell_is_refused(vessel: Vessel, manoeuvre: str, duration: float) -> None:
+    with pytest.raises(LogError, match="give the ship's with --vessel"):
+        fitted(sailed(vessel, manoeuvre, duration), "short.mcap")
+
+
+def test_a_ship_at_rest_tells_nothing() -> None:
+    still = {name: np.zeros(4000) for name in NAMES}
+    with pytest.raises(LogError, match="too little moves in it to fit one of yaw and surge"):
+        fitted(Signals(0, 0.1, still), "quiet.mcap")

@@ -1,0 +1,94 @@
+"""The sample data: each replays as its reference says, and tells the truth that lies beside it."""
+
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from places import KVLCC2, SAMPLE_DATA
+
+from analysis.check.compare import compare, logs_in
+from analysis.replay.replay import analyse
+from shiplog import load_vessel, read
+from shiplog.tables.foreign import read_table
+from shiplog.tables.layout import load_layout
+from shiplog.vessel.settings import DISTURBANCES, FILTERS, SMOOTHED
+from shiplog.vessel.vessel import PRESETS
+
+LOGS = logs_in(SAMPLE_DATA)
+
+
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
+def test_every_sample_replays_as_its_reference(log: Path) -> None:
+    comparison = compare(log)
+    assert comparison.ok, str(comparison)
+
+
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
+def test_every_sample_is_filtered_nearer_to_its_truth(log: Path) -> None:
+    found, truth = analyse(read(log)), read(log.with_suffix(".truth.mcap"))
+    at = (truth["yaw_rate"].measured_ns - found.signals.start_ns) * 1e-9
+    inside = (at >= 0) & (at <= found.signals.time_secs[-1])
+    for name, state in (("yaw_rate", 0), ("speed", 3)):
+        times, values = found.signals.time_secs, found.estimates.states[:, state]
+        estimated = np.interp(at[inside], times, values) - truth[name].values[inside]
+        there = np.isfinite(found.signals[name])
+        true = np.interp(times[there], at, truth[name].values)
+        measured = found.signals[name][there] - true
+        better = 3 if "dropouts" not in log.name or name == "speed" else 1  # a bias stays
+        assert np.std(measured) / np.std(estimated) > better
+
+
+KINDS = [(kind, False) for kind in FILTERS] + [(kind, True) for kind in SMOOTHED]
+SETS = [list(s) for n in (1, 2, 3) for s in combinations(DISTURBANCES, n)]
+
+
+@pytest.mark.parametrize(("kind", "smooth"), KINDS)
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
+def test_every_filter_replays_every_sample(log: Path, kind: str, smooth: bool) -> None:
+    found = analyse(read(log), settings={"filter.kind": kind, "filter.smooth": smooth})
+    estimates = found.estimates
+    assert np.isfinite(estimates.states).all()
+    assert np.isfinite(estimates.stds).all()
+    believed = sum(residuals.count for residuals in found.residuals)
+    assert believed > 0.7 * np.isfinite(estimates.innovations).sum()
+
+
+@pytest.mark.parametrize("models", SETS, ids="+".join)
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
+def test_every_disturbance_is_observed_in_every_sample(log: Path, models: list[str]) -> None:
+    found = analyse(read(log), settings={"disturbance.models": models})
+    assert np.isfinite(found.disturbance.yaw).all()
+    assert np.isfinite(found.disturbance.surge).all()
+    assert (found.disturbance.yaw_wave is None) == ("wave" not in models)
+
+
+def test_the_samples_are_small_and_carry_all_that_is_promised() -> None:
+    names = {log.stem for log in LOGS}
+    assert {"turning_circle_35", "zigzag_20_20", "pseudo_random"} <= names
+    assert any(name.startswith("zigzag_10_10") for name in names)
+    for log in LOGS:
+        assert log.stat().st_size < 1_000_000
+        assert log.with_suffix(".ref.mcap").stat().st_size < 300_000
+        assert read(log).vessel_toml is not None
+
+
+def test_the_vessel_files_are_the_presets() -> None:
+    for name, text in PRESETS.items():
+        path = SAMPLE_DATA / "vessels" / f"{name}.toml"
+        assert path.read_text(encoding="utf-8") == text
+        assert load_vessel(path)[0].coefficients == load_vessel(name)[0].coefficients
+
+
+RUNS = sorted(KVLCC2.glob("*/*.dat"))
+
+
+@pytest.mark.skipif(not RUNS, reason="the SIMMAN data are not in ../shared/data/kvlcc2")
+@pytest.mark.parametrize(("kind", "smooth"), KINDS)
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
+def test_every_filter_replays_every_run_of_the_kvlcc2(run: Path, kind: str, smooth: bool) -> None:
+    log = read_table(run, load_layout(SAMPLE_DATA / "layouts" / f"simman_{run.parent.name}.toml"))
+    found = analyse(log, settings={"filter.kind": kind, "filter.smooth": smooth})
+    assert np.isfinite(found.estimates.states).all()
+    assert np.isfinite(found.estimates.stds).all()
+    assert found.estimates.gated.mean() < 0.01

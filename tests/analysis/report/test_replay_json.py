@@ -1,0 +1,54 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.replay.replay import Analysis, analyse
+from analysis.report.replay_json import summarise
+from shiplog import TrialLog
+
+
+def test_the_json_has_what_is_promised(zigzag_analysis: Analysis) -> None:
+    found = json.loads(json.dumps(summarise(zigzag_analysis), allow_nan=False))
+    assert {"log", "model", "filter", "disturbance", "coefficients", "warnings"} <= set(found)
+    for output in ("yaw_rate", "speed"):
+        said = found["filter"][output]
+        assert {"innovation_rms", "normalised_innovation_squared", "whiteness_p"} <= set(said)
+    for name in ("a", "b1", "b2", "b3", "d", "e", "f", "g", "h"):
+        assert {"value", "std", "unit"} <= set(found["coefficients"][name])
+    assert found["coefficients"]["b2"]["unit"] == "1/(rad·s)"
+    assert found["log"]["duration_secs"] == pytest.approx(500.0)
+    assert found["log"]["channels"]["/yaw_rate/simulated"]["rate_hz"] == pytest.approx(10.0)
+
+
+def test_the_numbers_are_the_analysis(zigzag_analysis: Analysis) -> None:
+    found = summarise(zigzag_analysis)
+    innovations = zigzag_analysis.estimates.innovations[:, 1]
+    assert found["filter"]["speed"]["innovation_rms"] == pytest.approx(
+        np.sqrt(np.nanmean(innovations**2))
+    )
+    settled = zigzag_analysis.disturbance.yaw[1000:]
+    assert found["disturbance"]["yaw"]["mean"] == pytest.approx(np.mean(settled))
+
+
+def test_a_fitted_model_is_said_to_be_one(zigzag_log: TrialLog) -> None:
+    found = summarise(analyse(replace(zigzag_log, vessel_toml=None)))
+    assert found["model"]["origin"] == "a first model, fitted to this log"
+
+
+def test_the_settings_and_the_wave_are_told(zigzag_log: TrialLog) -> None:
+    settings = {
+        "filter.wave": True,
+        "filter.wave_frequency": 0.6,
+        "filter.wave_std": 1e-3,
+        "disturbance.models": ["constant", "wave"],
+        "disturbance.wave_frequency": 0.5,
+    }
+    found = summarise(analyse(zigzag_log, settings=settings))
+    assert found["settings"]["filter"]["kind"] == "extended"
+    assert found["settings"]["disturbance"]["models"] == ("constant", "wave")
+    assert found["settings"]["identifier"] == {"window_secs": 200.0}
+    assert found["wave"]["frequency_rad_per_s"] == 0.6
+    assert {"yaw", "yaw_as_rudder", "surge", "yaw_wave", "surge_wave"} == set(found["disturbance"])
+    assert summarise(analyse(zigzag_log))["wave"] is None

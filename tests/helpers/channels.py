@@ -1,0 +1,18 @@
+"""Channels from values and times in seconds."""
+
+import numpy as np
+
+from shiplog.types import Channel
+
+START = 1_700_000_000 * 10**9
+
+Values = np.ndarray[tuple[int], np.dtype[np.float64]]
+
+
+def channel(
+    values: Values, times: Values | None = None, name: str = "yaw_rate", lag: float = 0.0
+) -> Channel:
+    """A channel of 10 Hz, or of the given times in seconds."""
+    at = 0.1 * np.arange(len(values)) if times is None else times
+    stamps = START + np.round(at * 1e9).astype(np.int64)
+    return Channel(name, "a", "1", stamps, stamps + int(lag * 1e9), values)

@@ -1,0 +1,16 @@
+"""A minimal layout file, and layouts parsed from text."""
+
+from shiplog.tables.layout import Layout, parse_layout
+
+MINIMAL = """
+[time]
+column = 1
+unit = "s"
+[yaw_rate]
+column = 2
+unit = "deg/s"
+"""
+
+
+def layout(text: str = MINIMAL, top: str = "") -> Layout:
+    return parse_layout(f"{top}\n{text}", "gyro.toml")

@@ -1,0 +1,171 @@
+"""MCAP files as others write them, as ours are damaged, and what mcap's own reader finds there."""
+
+import struct
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from mcap.opcode import Opcode
+from mcap.reader import McapReader, make_reader
+from mcap.writer import Writer
+
+from shiplog import Channel, LogWriter, TrialLog
+from shiplog.mcap.schema import encode, schema_for
+
+START = 1_700_000_000_000_000_000
+EXTREMES = [0.0, -0.0, 1.0, -1e308, 5e-324, float("inf"), float("-inf"), float("nan")]
+UNIT = {"yaw_rate": "rad/s", "speed": "m/s", "rudder": "rad", "position": "m"}
+
+Samples = dict[str, list[tuple[int, int, bytes]]]  # topic: received, measured, the values' bytes
+
+
+def channel(name: str, count: int, seed: int = 0, source: str = "test") -> Channel:
+    rng = np.random.default_rng(seed)
+    measured = START + np.cumsum(rng.integers(1, 200_000_000, count))
+    received = np.sort(measured + rng.integers(0, 50_000_000, count))
+    values = np.where(rng.random(count) < 0.3, rng.choice(EXTREMES, count), rng.normal(size=count))
+    return Channel(name, source, UNIT.get(name, "1"), measured, received, values)
+
+
+def position(count: int, fields: tuple[str, ...]) -> Channel:
+    at = START + np.arange(count) * 1_000_000_000
+    values = np.random.default_rng(5).normal(size=(count, len(fields)))
+    return Channel("position", "x".join(fields), "m", at, at + 7, values, fields)
+
+
+def samples(log: TrialLog) -> Samples:
+    return {
+        c.topic: [
+            (received, measured, value.tobytes())
+            for received, measured, value in zip(
+                c.received_ns.tolist(), c.measured_ns.tolist(), c.values, strict=True
+            )
+        ]
+        for c in log
+    }
+
+
+def samples_by_mcap(path: Path, reader: Callable[..., McapReader] = make_reader) -> Samples:
+    """The samples by mcap's own reader and the file's own schemas: nothing of ours."""
+    found: Samples = defaultdict(list)
+    types: dict[int, Any] = {}
+    with path.open("rb") as stream:
+        for schema, topic, message in reader(stream, validate_crcs=True).iter_messages():
+            assert schema is not None
+            if schema.id not in types:
+                pool = descriptor_pool.DescriptorPool()
+                for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
+                    pool.Add(file)
+                types[schema.id] = message_factory.GetMessageClass(
+                    pool.FindMessageTypeByName(schema.name)
+                )
+            decoded = types[schema.id].FromString(message.data)
+            doubles = [
+                getattr(decoded, f.name)
+                for f in decoded.DESCRIPTOR.fields
+                if f.type == f.TYPE_DOUBLE and not f.is_repeated
+            ]
+            found[topic.topic].append(
+                (message.log_time, message.publish_time, struct.pack(f"<{len(doubles)}d", *doubles))
+            )
+    return dict(found)
+
+
+def written(path: Path, *channels: Channel, **options: Any) -> Path:  # noqa: ANN401 - mcap's own
+    """The channels in a file as another program would lay it out."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, **options)
+        writer.start()
+        messages = []
+        for c in channels:
+            schema = schema_for(c.fields)
+            schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+            channel_id = writer.register_channel(
+                c.topic, "protobuf", schema_id, {"unit": c.unit, **c.metadata}
+            )
+            times = zip(c.received_ns.tolist(), c.measured_ns.tolist(), encode(c), strict=True)
+            messages += [(received, channel_id, *rest) for received, *rest in times]
+        for received, channel_id, measured, data in sorted(messages, key=lambda m: m[0]):
+            writer.add_message(channel_id, received, data, measured)
+        writer.finish()
+    return path
+
+
+def foreign(
+    path: Path, messages: list[bytes], *, unit: str | None = "rad/s", topic: str = "/yaw_rate/imu"
+) -> Path:
+    """A file of another program whose scalar messages are these bytes, one a second."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = schema_for(())
+        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        metadata = {} if unit is None else {"unit": unit}
+        channel_id = writer.register_channel(topic, "protobuf", schema_id, metadata)
+        for second, data in enumerate(messages):
+            at = START + second * 1_000_000_000
+            writer.add_message(channel_id, at, data, at)
+        writer.finish()
+    return path
+
+
+def scalar(value: float, tag: int = 0x09) -> bytes:
+    return bytes([tag]) + struct.pack("<d", value)
+
+
+def top_level(data: bytes) -> list[tuple[int, int, int]]:
+    """Opcode, start and end of the file's records, their heads included."""
+    found, at = [], 8
+    while at + 9 <= len(data) - 8:
+        opcode, length = struct.unpack_from("<BQ", data, at)
+        found.append((opcode, at, at + 9 + length))
+        at += 9 + length
+    return found
+
+
+def chunks(data: bytes) -> list[tuple[int, int]]:
+    return [(start, end) for opcode, start, end in top_level(data) if opcode == Opcode.CHUNK]
+
+
+def flushed(path: Path, slabs: int = 5, count: int = 100) -> tuple[TrialLog, bytes]:
+    """A log written in flushed slabs, so in many chunks, and the bytes of its finished file."""
+    whole = [channel("yaw_rate", slabs * count, 1), channel("speed", slabs * count, 2)]
+    with LogWriter(path, metadata={"place": "Neva"}) as writer:
+        for at in range(0, slabs * count, count):
+            part = slice(at, at + count)
+            for c in whole:
+                writer.write(
+                    Channel(
+                        c.name,
+                        c.source,
+                        c.unit,
+                        c.measured_ns[part],
+                        c.received_ns[part],
+                        c.values[part],
+                    )
+                )
+            writer.flush()
+    return TrialLog("trial.mcap", tuple(whole)), path.read_bytes()
+
+
+def is_part_of(log: TrialLog, held: TrialLog) -> bool:
+    """Whether a log holds nothing but samples of the other, each as often and in that order."""
+    told = samples(held)
+    for topic, found in samples(log).items():
+        rest = iter(told.get(topic, []))
+        if not all(sample in rest for sample in found):
+            return False
+    return True
+
+
+def within(fraction: float, low: int, high: int) -> int:
+    return low + int(fraction * (high - low))
+
+
+def flipped(data: bytes, bit: int) -> bytes:
+    changed = bytearray(data)
+    changed[bit // 8] ^= 1 << bit % 8
+    return bytes(changed)

@@ -1,0 +1,73 @@
+"""What a log holds, whatever the slabs it comes in."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from faults import dropout, freeze, spike
+from trial_logs import InSlabs
+
+from shiplog import Channel, TrialLog
+from shiplog.checks.channel_stats import ChannelSurvey, possible, survey_log
+
+START = 1_700_000_000 * 10**9
+
+
+def channel(name: str, seconds: list[float], values: list[float] | np.ndarray) -> Channel:
+    at = START + np.round(np.array(seconds) * 1e9).astype(np.int64)
+    return Channel(name, "a", "1", at, at, np.array(values, float))
+
+
+def of(its: Channel, *, strict: bool = False) -> ChannelSurvey:
+    return survey_log(TrialLog("x", (its,)), strict=strict)[its.name]
+
+
+def told(found: ChannelSurvey) -> dict[str, str]:
+    """All that is said of a channel, to the last digit."""
+    said = {field.name: repr(getattr(found, field.name)) for field in fields(found)}
+    return said | {"stuck": repr(found.stuck and vars(found.stuck))}
+
+
+def test_gaps_are_told_by_when_and_how_long() -> None:
+    silent = channel("speed", [0, 1, 2, 10, 11, 12, 30], np.zeros(7))
+    assert of(silent).gaps == ((2.0, 8.0), (12.0, 18.0))
+    assert of(channel("speed", [0, 1, 2], np.zeros(3))).gaps == ()
+    assert of(channel("speed", [], [])).gaps == ()
+
+
+def test_a_channel_without_samples_is_there() -> None:
+    empty = of(channel("speed", [], []))
+    assert (empty.samples, empty.known, empty.usual_secs, empty.span_ns) == (0, 0, 0.0, (0, 0))
+
+
+def test_only_possible_values_are_known_where_it_is_strict() -> None:
+    wild = channel("speed", [0, 1, 2, 3], [5, 1e9, 6, np.nan])
+    assert of(wild).known == 3
+    assert of(wild, strict=True).known == 2
+    assert of(wild, strict=True).extremes == (5.0, 6.0)
+    assert of(wild).impossible.count == 1
+    np.testing.assert_array_equal(possible(wild).values, [5, np.nan, 6, np.nan])
+
+
+def test_the_usual_period_of_what_is_known_leaves_out_what_is_not() -> None:
+    values = np.full(100, np.nan)
+    values[::10] = 1.0
+    found = of(channel("speed", list(0.1 * np.arange(100)), values))
+    assert found.usual_secs == pytest.approx(0.1)
+    assert found.usual_known_secs == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_slabs_do_not_matter(zigzag_log: TrialLog, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    log = dropout("yaw_rate", 100.0, 20.0)(
+        freeze("speed", 50.0, 60.0)(
+            spike("speed", 300.0, 1e9)(spike("yaw_rate", 10.0, np.nan)(zigzag_log))
+        )
+    )
+    cuts = np.sort(rng.uniform(0, 500, 40)).tolist()
+    whole, parted = survey_log(log), survey_log(InSlabs(log, cuts))
+    for one, other in zip(whole, parted, strict=True):
+        assert told(one) == told(other)
+    assert whole["speed"].stuck is not None
+    assert whole["yaw_rate"].gaps

@@ -1,0 +1,134 @@
+"""Chunks laid out by columns hold what mcap's own writer puts there."""
+
+import io
+import struct
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+
+import shiplog.mcap.encode
+from shiplog import Channel, LogWriter, TrialLog, write
+from shiplog.mcap.encode import Part, chunks
+from shiplog.mcap.schema import GEOGRAPHIC, encode, schema_for
+from shiplog.mcap.writer import CHUNK_BYTES
+
+
+def trial(rng: np.random.Generator, count: int) -> TrialLog:
+    """Channels of three message sizes, one of them ragged, received in a jumble."""
+
+    def times() -> np.ndarray:
+        return np.sort(rng.integers(0, 10**12, count))
+
+    def channel(name: str, fields: tuple[str, ...] = (), unit: str = "m/s") -> Channel:
+        at = times()
+        values = rng.normal(size=(count, len(fields)) if fields else count)
+        return Channel(name, "a", unit, at, at + rng.integers(0, 10**9, count), values, fields)
+
+    return TrialLog(
+        "trial",
+        (
+            channel("speed"),
+            channel("sway"),
+            channel("position", ("north", "east"), "m"),
+            channel("geo", GEOGRAPHIC, "deg"),
+        ),
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_message_is_the_one_mcaps_own_writer_would_write(seed: int) -> None:
+    log = trial(np.random.default_rng(seed), 400)
+    ours, theirs = io.BytesIO(), io.BytesIO()
+    writer = Writer(theirs)
+    writer.start()
+    messages = []
+    for number, c in enumerate(log, start=1):
+        schema = schema_for(c.fields)
+        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        assert writer.register_channel(c.topic, "protobuf", schema_id) == number
+        rows = zip(c.received_ns.tolist(), c.measured_ns.tolist(), encode(c), strict=True)
+        messages += [(got, number, k, was, data) for k, (got, was, data) in enumerate(rows)]
+    for got, number, k, was, data in sorted(messages, key=lambda m: m[0]):
+        writer.add_message(number, got, data, was, k)
+    writer.finish()
+    parts = [Part(number, 0, c) for number, c in enumerate(log, start=1)]
+    for chunk in chunks(parts, 8192):
+        ours.write(chunk.body.tobytes())
+    theirs.seek(0)
+    expected = b"".join(
+        struct.pack("<BQHIQQ", 5, 22 + len(m.data), m.channel_id, m.sequence, m.log_time,
+                    m.publish_time) + m.data
+        for _, _, m in make_reader(theirs).iter_messages()
+    )  # fmt: skip
+    assert sorted(_split(ours.getvalue())) == sorted(_split(expected))
+    received = [struct.unpack_from("<Q", r, 15)[0] for r in _split(ours.getvalue())]
+    assert received == sorted(received)
+
+
+def test_laid_out_little_by_little_it_is_the_same_as_all_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(4)
+    parts = []
+    for number, (name, count) in enumerate(
+        {"speed": 900, "sway": 350, "geo": 120, "heave": 0}.items()
+    ):
+        at = np.sort(rng.integers(0, 2000, count))  # many at one instant
+        fields = GEOGRAPHIC if name == "geo" else ()
+        values = rng.normal(size=(count, len(fields)) if fields else count)
+        parts.append(Part(number, 7, Channel(name, "a", "1", at, at, values, fields)))
+    at_once = b"".join(chunk.body.tobytes() for chunk in chunks(parts, 4096))
+    monkeypatch.setattr(shiplog.mcap.encode, "LAID_OUT_AT_ONCE", 100)
+    bits = list(chunks(parts, 4096))
+    assert b"".join(chunk.body.tobytes() for chunk in bits) == at_once
+    assert len(bits) > len(at_once) / 4096 + 3
+    for chunk in bits:
+        data = chunk.body.tobytes()
+        for channel_id, entries in chunk.index.items():
+            for got, offset in entries.tolist():
+                said = struct.unpack_from("<BQHIQ", data, offset)
+                assert (said[0], said[2], said[4]) == (5, channel_id, got)
+
+
+def _split(data: bytes) -> list[bytes]:
+    found, at = [], 0
+    while at < len(data):
+        size = 9 + struct.unpack_from("<Q", data, at + 1)[0]
+        found.append(data[at : at + size])
+        at += size
+    return found
+
+
+@pytest.mark.parametrize("largest", [100, 1000, 1 << 20])
+def test_the_index_says_where_each_message_stands(largest: int) -> None:
+    log = trial(np.random.default_rng(9), 150)
+    parts = [Part(number, 0, c) for number, c in enumerate(log, start=1)]
+    seen = 0
+    for chunk in chunks(parts, largest):
+        data = chunk.body.tobytes()
+        assert len(data) <= largest + 200
+        for channel_id, entries in chunk.index.items():
+            for got, offset in entries.tolist():
+                opcode, _, its_channel, _, received = struct.unpack_from("<BQHIQ", data, offset)
+                assert (opcode, its_channel, received) == (5, channel_id, got)
+                assert chunk.first_ns <= received <= chunk.last_ns
+                seen += 1
+    assert seen == 600
+
+
+def test_small_slabs_are_gathered_into_large_chunks(tmp_path: pytest.TempPathFactory) -> None:
+    path = tmp_path / "a.mcap"
+    with LogWriter(path) as writer:
+        for k in range(3000):
+            at = np.arange(k * 20, (k + 1) * 20)
+            writer.write(Channel("speed", "log", "m/s", at, at, at * 1.0))
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    sizes = [index.uncompressed_size for index in summary.chunk_indexes]
+    assert len(sizes) == 5
+    assert max(sizes) <= CHUNK_BYTES + 1000
+    assert min(sizes) > CHUNK_BYTES / 4
+    write(TrialLog("x", ()), tmp_path / "empty.mcap")

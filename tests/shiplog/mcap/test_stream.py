@@ -1,0 +1,381 @@
+"""A log in its file, slab by slab, is the log that is read whole."""
+
+import tracemalloc
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.opcode import Opcode
+from mcap.writer import CompressionType, IndexType, Writer
+from mcap_files import (
+    START,
+    channel,
+    chunks,
+    flipped,
+    foreign,
+    position,
+    samples_by_mcap,
+    scalar,
+    top_level,
+    within,
+    written,
+)
+
+import shiplog.mcap.stream
+from shiplog import Channel, LogError, LogWriter, TrialLog, read, write
+from shiplog.mcap.schema import GEOGRAPHIC, schema_for
+from shiplog.mcap.stream import LogFile, open_log
+from shiplog.types import one_channel
+
+ANYWHERE = st.floats(0, 1, exclude_max=True)
+SLAB = 300
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "trial.mcap"
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small files are long ones."""
+    _small(monkeypatch)
+
+
+def _small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shiplog.mcap.stream, "HELD_SAMPLES", 10)
+    monkeypatch.setattr(shiplog.mcap.stream, "SLAB_SAMPLES", SLAB)
+
+
+def in_its_file(path: Path) -> LogFile:
+    log = open_log(path)
+    assert isinstance(log, LogFile)
+    return log
+
+
+def whole(slabs: Iterator[tuple[Channel, ...]]) -> dict[Any, Channel]:
+    """The slabs of each topic, one after the other."""
+    parts: dict[Any, list[Channel]] = defaultdict(list)
+    for slab in slabs:
+        for part in slab:
+            parts[part.key].append(part)
+    return {key: one_channel(few) for key, few in parts.items()}
+
+
+def described(c: Channel) -> tuple[object, ...]:
+    return c.name, c.source, c.unit, c.fields, dict(c.metadata), c.values.dtype, c.values.shape
+
+
+def assert_as_read(log: LogFile, read_whole: TrialLog) -> None:
+    found = {key: c for key, c in whole(log.slabs()).items() if len(c)}
+    expected = {c.key: c for c in read_whole if len(c)}
+    assert found.keys() == expected.keys()
+    for key, c in expected.items():
+        assert described(found[key]) == described(c)
+        np.testing.assert_array_equal(found[key].received_ns, c.received_ns)
+        np.testing.assert_array_equal(found[key].measured_ns, c.measured_ns)
+        assert found[key].values.tobytes() == c.values.tobytes()
+    assert log.name == read_whole.name
+    assert log.metadata == read_whole.metadata
+    assert log.vessel_toml == read_whole.vessel_toml
+    assert log.warnings == read_whole.warnings
+    assert log.data_lost == read_whole.data_lost
+
+
+def recorded(path: Path) -> bytes:
+    """A log of two channels flushed every hundred samples of each; the bytes of its file."""
+    with LogWriter(path, metadata={"place": "Neva"}) as writer:
+        for start in range(0, 1000, 100):
+            at = START + 1000 * np.arange(start, start + 100)
+            values = np.random.default_rng(start).normal(size=(2, 100))
+            writer.write(Channel("yaw_rate", "test", "rad/s", at - 7, at, values[0]))
+            writer.write(Channel("speed", "test", "m/s", at, at + 5, values[1]))
+            writer.flush()
+    return path.read_bytes()
+
+
+def trial() -> tuple[Channel, ...]:
+    return (
+        channel("yaw_rate", 3000, 1),
+        channel("speed", 700, 2),
+        channel("yaw_rate", 90, 3, "imu"),
+        position(30, GEOGRAPHIC),
+        position(40, ("north", "east")),
+    )
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"index_types": IndexType.NONE},
+        {"compression": CompressionType.NONE},
+        {"compression": CompressionType.LZ4},
+        {"enable_crcs": False},
+        {"enable_data_crcs": True},
+        {"repeat_channels": False, "repeat_schemas": False},
+        {"use_statistics": False, "use_summary_offsets": False},
+        {"chunk_size": 100},
+    ],
+    ids=str,
+)
+def test_the_slabs_are_what_is_read_whole_however_the_file_is_laid_out(
+    path: Path, options: dict[str, Any]
+) -> None:
+    written(path, *trial(), **{"chunk_size": 1 << 13, **options})
+    log = in_its_file(path)
+    assert_as_read(log, read(path))
+    assert_as_read(log, read(path))  # a second pass
+
+
+def test_the_slabs_are_the_samples_that_mcap_reads(path: Path) -> None:
+    held = channel("yaw_rate", 3000, 1), channel("speed", 700, 2)
+    written(path, *held, chunk_size=1 << 13)
+    theirs = samples_by_mcap(path)
+    for c in whole(in_its_file(path).slabs()).values():
+        assert [t[0] for t in theirs[c.topic]] == c.received_ns.tolist()
+        assert b"".join(t[2] for t in theirs[c.topic]) == c.values.tobytes()
+
+
+def test_a_slab_has_about_as_many_samples_as_it_should_and_its_channels_in_order(
+    path: Path,
+) -> None:
+    written(path, *trial(), chunk_size=4000)
+    topics = [c.topic for c in read(path)]
+    slabs = list(in_its_file(path).slabs())
+    assert len(slabs) > 5
+    for slab in slabs[:-1]:
+        assert SLAB <= sum(map(len, slab)) <= SLAB + 4000 // 40
+    for slab in slabs:
+        assert [c.topic for c in slab] == topics
+
+
+def test_what_is_known_before_the_first_pass_is_what_the_summary_says(path: Path) -> None:
+    write(TrialLog("t", trial()[:3], {"place": "Neva"}, "T1 = 1\n"), path)
+    log = in_its_file(path)
+    assert (log.name, log.metadata["place"], log.vessel_toml) == ("trial.mcap", "Neva", "T1 = 1\n")
+    assert log.warnings == ()
+    assert not log.data_lost
+
+
+def test_a_short_log_is_read_whole(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = recorded(path)
+    for contents in (data, data[:-40]):  # with a summary and without
+        path.write_bytes(contents)
+        for enough, kind in ((2000, TrialLog), (1999, LogFile)):
+            monkeypatch.setattr(shiplog.mcap.stream, "HELD_SAMPLES", enough)
+            log = open_log(path)
+            assert isinstance(log, kind)
+            assert log.warnings == read(path).warnings
+
+
+def test_units_are_converted_in_every_slab(path: Path) -> None:
+    foreign(path, [scalar(float(k)) for k in range(1000)], unit="deg/s")
+    (yaw_rate,) = whole(in_its_file(path).slabs()).values()
+    assert yaw_rate.unit == "rad/s"
+    np.testing.assert_allclose(yaw_rate.values, np.radians(np.arange(1000.0)), rtol=1e-15)
+
+
+@pytest.mark.parametrize("unfinished", [False, True])
+def test_a_topic_described_twice_is_one_channel_in_every_slab(
+    path: Path, *, unfinished: bool
+) -> None:
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=2000)
+        writer.start()
+        schema = schema_for(())
+        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        said = {"unit": "rad/s"}
+        first, second = (
+            writer.register_channel("/yaw_rate/gyro", "protobuf", schema_id, said | {"run": run})
+            for run in "12"
+        )
+        for k in range(1000):
+            writer.add_message(first if k % 3 and k < 600 else second, k, scalar(k), k)
+        writer.finish()
+    if unfinished:
+        path.write_bytes(path.read_bytes()[:-10])
+    log = in_its_file(path)
+    assert_as_read(log, read(path))
+    (yaw_rate,) = whole(log.slabs()).values()
+    assert yaw_rate.values.tolist() == list(range(1000))
+    assert yaw_rate.metadata == {"run": "1"}
+
+
+def test_samples_are_put_in_order_within_a_chunk(path: Path) -> None:
+    rng = np.random.default_rng(0)
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = schema_for(())
+        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        channel_id = writer.register_channel("/a/b", "protobuf", schema_id, {})
+        for hundred in range(0, 1000, 100):
+            for k in (hundred + rng.integers(0, 100, 100)).tolist():
+                writer.add_message(channel_id, k // 2, scalar(rng.normal()), k)
+            writer.flush()
+        writer.finish()
+    assert_as_read(in_its_file(path), read(path))
+
+
+@pytest.mark.parametrize("unfinished", [False, True])
+def test_a_file_in_another_order_from_chunk_to_chunk_is_read_whole(
+    path: Path, *, unfinished: bool
+) -> None:
+    with LogWriter(path) as writer:
+        for start in (5000, 0):
+            at = START + start + np.arange(1000)
+            writer.write(Channel("speed", "log", "m/s", at, at, np.ones(1000)))
+            writer.flush()
+    if unfinished:
+        path.write_bytes(path.read_bytes()[:-10])
+    log = open_log(path)
+    assert isinstance(log, TrialLog)
+    assert np.all(np.diff(log["speed"].received_ns) > 0)
+
+
+def test_messages_outside_chunks_are_read_whole(path: Path) -> None:
+    written(path, *trial(), use_chunking=False)
+    log = open_log(path)
+    assert isinstance(log, TrialLog)
+    assert sum(map(len, log)) == 3860
+
+
+def test_a_chosen_source_stands_alone_and_first_in_every_slab(path: Path) -> None:
+    held = [
+        channel("speed", 2000, 2),
+        channel("yaw_rate", 2000, 1),
+        channel("yaw_rate", 900, 3, "imu"),
+    ]
+    written(path, *held, chunk_size=4000)
+    chosen = {"yaw_rate": "imu"}
+    log = in_its_file(path).preferring(chosen)
+    for slab in log.slabs():
+        topics = [c.topic for c in slab]
+        assert topics == ["/yaw_rate/imu", "/speed/test"]
+    assert_as_read(log, read(path).preferring(chosen))
+
+
+@pytest.mark.parametrize("chosen", [{"yaw_rate": "nobody"}, {"rudder": "test"}])
+def test_a_source_that_is_not_there_is_refused_as_by_a_log(
+    path: Path, chosen: dict[str, str]
+) -> None:
+    written(path, *trial())
+    with pytest.raises(LogError) as ours:
+        in_its_file(path).preferring(chosen)
+    with pytest.raises(LogError) as theirs:
+        read(path).preferring(chosen)
+    assert str(ours.value) == str(theirs.value)
+
+
+def test_what_read_refuses_is_refused_when_opening(path: Path) -> None:
+    for contents in (b"", b"time,yaw_rate\n"):
+        path.write_bytes(contents)
+        with pytest.raises(LogError):
+            open_log(path)
+    foreign(path, [scalar(1.0)] * 100, unit="m")
+    with pytest.raises(LogError, match="should be in rad/s"):
+        open_log(path)
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        writer.add_metadata("shiplog", {"format_version": "2"})
+        writer.finish()
+    with pytest.raises(LogError, match="install a newer"):
+        open_log(path)
+
+
+def test_a_pass_that_is_given_up_leaves_the_file_closed(path: Path) -> None:
+    written(path, *trial(), chunk_size=4000)
+    log = in_its_file(path)
+    slabs = log.slabs()
+    next(slabs)
+    slabs.close()  # type: ignore[attr-defined]
+    assert_as_read(log, read(path))
+
+
+@pytest.fixture(scope="module")
+def damaged(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, Path]:
+    path = tmp_path_factory.mktemp("damaged") / "trial.mcap"
+    return recorded(path), path
+
+
+def _same_or_both_refused(path: Path) -> None:
+    try:
+        read_whole = read(path)
+    except LogError:
+        with pytest.raises(LogError):
+            _gone_through(path)
+        return
+    log = open_log(path)
+    if isinstance(log, LogFile):
+        assert_as_read(log, read_whole)
+    else:
+        assert log.warnings == read_whole.warnings
+
+
+def _gone_through(path: Path) -> None:
+    log = open_log(path)
+    assert isinstance(log, LogFile)
+    list(log.slabs())
+
+
+@given(ANYWHERE, ANYWHERE, st.booleans())
+@settings(derandomize=True, deadline=None, max_examples=150)
+def test_a_file_with_a_bit_flipped_is_said_to_be_what_it_is_read_as(
+    damaged: tuple[bytes, Path], record: float, where: float, in_its_head: bool
+) -> None:
+    data, path = damaged
+    _, start, end = top_level(data)[within(record, 0, len(top_level(data)))]
+    if in_its_head:
+        end = min(end, start + 60)
+    path.write_bytes(flipped(data, within(where, 8 * start, 8 * end)))
+    with pytest.MonkeyPatch.context() as patch:
+        _small(patch)
+        _same_or_both_refused(path)
+
+
+@given(ANYWHERE, st.sampled_from([0, 1, 4096]))
+@settings(derandomize=True, deadline=None, max_examples=60)
+def test_an_unfinished_file_is_said_to_be_what_it_is_read_as(
+    damaged: tuple[bytes, Path], where: float, zeros: int
+) -> None:
+    data, path = damaged
+    path.write_bytes(data[: within(where, 8, len(data))] + bytes(zeros))
+    with pytest.MonkeyPatch.context() as patch:
+        _small(patch)
+        _same_or_both_refused(path)
+
+
+def test_a_damaged_first_chunk_costs_the_slabs_no_other(path: Path) -> None:
+    data = recorded(path)
+    _, end = chunks(data)[0]
+    (data_end,) = (begin for opcode, begin, _ in top_level(data) if opcode == Opcode.DATA_END)
+    broken = flipped(data, 8 * (end - 20))
+    for contents in (broken, broken[:data_end]):  # the summary describes it still, or nothing does
+        path.write_bytes(contents)
+        log = open_log(path)
+        assert isinstance(log, LogFile)
+        assert_as_read(log, read(path))
+
+
+def test_a_pass_takes_no_more_memory_the_longer_the_file(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shiplog.mcap.stream, "SLAB_SAMPLES", 1 << 15)
+    peaks = []
+    for count in (100_000, 400_000):
+        write(TrialLog("t", (channel("yaw_rate", count),)), path)
+        log = in_its_file(path)
+        tracemalloc.start()
+        samples = sum(len(c) for slab in log.slabs() for c in slab)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert samples == count
+    assert peaks[1] < 1.4 * peaks[0]
+    assert peaks[1] < 400_000 * 24

@@ -1,0 +1,275 @@
+"""Ship models: one interface, right motion, exact sensitivities."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from trial_logs import as_log
+
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import SimulatedTrial, simulate
+from shiplog import Signals, UsageError, Vessel, resample
+from shiplog.ships import (
+    LADDER,
+    Model,
+    Scale,
+    ship_model,
+)
+from shiplog.ships.motion import OUTPUTS, Forcing, motion, observed
+from shiplog.ships.path import path_of
+from shiplog.types import FloatArray
+
+DT = 1.0
+LENGTH, SPEED, RPM = 160.0, 8.0, 90.0
+TOLERANCES = {"yaw_rate": 1e-7, "speed": 1e-5, "sway": 1e-5, "heading": 1e-5}
+
+
+# ---- the models once more, from their descriptions: rates of the state, and what is observed
+
+
+Oracle = Callable[[SimpleNamespace, FloatArray, float, float, float], tuple[list[float], ...]]
+
+
+def as_norrbin(
+    c: SimpleNamespace, x: FloatArray, delta: float, _: float, eta: float
+) -> tuple[list[float], ...]:
+    rho, nu, psi = x
+    a3 = getattr(c, "a3", 0.0)
+    rates = [c.a * rho + a3 * rho**3 + c.k * delta, c.f * rho**2 + c.g * nu**2 + c.h * eta, rho]
+    return rates, [rho, nu, 0.0, psi]
+
+
+def as_burylin(
+    c: SimpleNamespace, x: FloatArray, delta: float, delta_dot: float, n: float
+) -> tuple[list[float], ...]:
+    w, w_dot, v, psi = x
+    b1, e = (-c.d, c.T3 * c.d) if hasattr(c, "T3") else (c.b1, c.e)
+    ks = c.alpha1 * v + c.alpha2 * n * np.exp(-c.alpha3 * v)
+    w_2dot = c.a * w_dot + b1 * w + c.b2 * w * abs(w) + c.b3 * w**3
+    w_2dot += ks * (c.d * delta + e * delta_dot)
+    return [w_dot, w_2dot, c.f * w**2 + c.g * v**2 + c.h * n, w], [w, v, 0.0, psi]
+
+
+def turning(
+    c: SimpleNamespace, rho: float, rho_dot: float, nu: float, delta: float, delta_dot: float,
+    eta: float,
+) -> float:  # fmt: skip
+    """rho'' of the slipstream model."""
+    ks = c.k * ((1 - c.m) * nu**2 + c.m * eta**2)
+    hull = c.a * nu * rho_dot + c.b1 * nu**2 * rho + c.b2 * nu * rho * abs(rho)
+    return float(hull + ks * (nu * delta + c.T3 * delta_dot))
+
+
+def as_slipstream(
+    c: SimpleNamespace, x: FloatArray, delta: float, delta_dot: float, eta: float
+) -> tuple[list[float], ...]:
+    rho, rho_dot, nu, psi = x
+    sigma = c.c1 * rho + c.c2 * rho * abs(rho) / nu
+    rates = [
+        rho_dot,
+        turning(c, rho, rho_dot, nu, delta, delta_dot, eta),
+        c.f * rho**2 + c.g * nu**2 + c.h * eta,
+        rho,
+    ]
+    return rates, [rho, np.sqrt(nu**2 - sigma**2), sigma, psi]
+
+
+def as_drift_lag(
+    c: SimpleNamespace, x: FloatArray, delta: float, delta_dot: float, eta: float
+) -> tuple[list[float], ...]:
+    rho, rho_dot, nu, sigma, psi = x
+    rates = [
+        rho_dot,
+        turning(c, rho, rho_dot, nu, delta, delta_dot, eta) + c.e0 * nu * eta**2,
+        c.f * rho**2 + c.f1 * rho * sigma + c.f2 * sigma**2 + c.g * nu**2 + c.h * eta,
+        (c.c1 * nu * rho + c.c2 * rho * abs(rho) - nu * sigma) / c.Td,
+        rho,
+    ]
+    return rates, [rho, np.sqrt(nu**2 - sigma**2), sigma, psi]
+
+
+def as_three_dof(
+    c: SimpleNamespace, x: FloatArray, delta: float, _: float, eta: float
+) -> tuple[list[float], ...]:
+    rho, sigma, nu, psi = x
+    at, weights = np.polynomial.legendre.leggauss(5)  # the rule is a part of the model
+    along = at / 2
+    flow = weights / 2 * np.abs(sigma + along * rho) * (sigma + along * rho)
+    side, moment = flow.sum(), (along * flow).sum()
+    s = (1 - c.m) * nu**2 + c.m * eta**2
+    rudder = s * delta + c.w * np.sqrt(s) * (sigma - 0.8 * rho)
+    surge = c.h * (eta * (eta + c.p * (eta - nu)) - (1 + c.g) * nu**2) + c.xd * rudder * delta
+    surge += c.xvr * sigma * rho + c.x4 * sigma**4 / (nu**2 + sigma**2)
+    rates = [
+        c.nv * nu * sigma + c.nr * nu * rho - c.cn * moment + c.nd * rudder,
+        c.yv * nu * sigma + c.yr * nu * rho - c.cy * side + c.yd * rudder,
+        surge,
+        rho,
+    ]
+    return rates, [rho, nu, sigma, psi]
+
+
+ORACLES: dict[str, Oracle] = {
+    "nomoto": as_norrbin,
+    "norrbin": as_norrbin,
+    "burylin": as_burylin,
+    "burylin-tied": as_burylin,
+    "slipstream": as_slipstream,
+    "drift-lag": as_drift_lag,
+    "three-dof": as_three_dof,
+}
+
+
+def a_run(seconds: float = 120.0) -> Signals:
+    """A rudder to one side and to the other, in straight lines with knots on samples."""
+    time = np.arange(round(seconds / DT) + 1) * DT
+    rudder = np.interp(time, [5.0, 15.0, 40.0, 60.0], np.radians([0.0, 15.0, 15.0, -15.0]))
+    return Signals(0, DT, {"rudder": rudder, "rpm": np.where(time < 70, 90.0, 80.0)})
+
+
+def a_ship(name: str) -> tuple[Model, FloatArray, FloatArray, Scale]:
+    """A model, parameters at which all of it acts, an initial state, and its scale."""
+    model = ship_model(name)
+    start = model.starts()
+    parameters = start + 0.1 * np.where(start == 0, 1.0, np.abs(start))
+    if not model.dimensionless:
+        parameters[model.names.index("b3")] = -0.5
+    scale = model.scale(LENGTH, SPEED, RPM)
+    begins = {"speed": SPEED / scale.speed, "yaw_rate": 1e-3 * scale.secs, "sway": 0.01}
+    state = np.array([begins.get(value.channel or "", 0.0) for value in model.state])
+    return model, parameters, state, scale
+
+
+def integrated(
+    name: str, parameters: FloatArray, state: FloatArray, signals: Signals, offset: float
+) -> FloatArray:
+    """(n, 4) the outputs by scipy: the rudder in straight lines, revolutions until the next."""
+    model, secs = ship_model(name), LENGTH / SPEED
+    units = (1.0, 1.0, 1.0) if "burylin" in name else (secs, SPEED, RPM)
+    c = SimpleNamespace(**dict(zip(model.names, parameters.tolist(), strict=True)))
+    rudder, eta = signals["rudder"] + offset, signals["rpm"] / units[2]
+    slopes = np.diff(rudder) / DT
+    states = [state]
+    for begun, slope, driven in zip(rudder, slopes, eta, strict=False):
+
+        def rates(
+            t: float, x: FloatArray, begun: float = begun, slope: float = slope, n: float = driven
+        ) -> FloatArray:
+            found = ORACLES[name](c, x, begun + slope * t, slope * units[0], n)[0]
+            return np.array(found) / units[0]
+
+        states.append(solve_ivp(rates, (0, DT), states[-1], rtol=1e-10, atol=1e-13).y[:, -1])
+    outputs = np.array([ORACLES[name](c, x, 0.0, 0.0, 0.0)[1] for x in states])
+    return np.asarray(outputs * [1 / units[0], units[1], units[1], 1.0])
+
+
+@pytest.mark.parametrize("name", LADDER)
+def test_every_model_moves_as_scipy_integrates_its_equations(name: str) -> None:
+    model, parameters, state, scale = a_ship(name)
+    signals = a_run()
+    found = model.simulate(
+        parameters, state, path_of(signals), len(signals), offset=0.02, scale=scale
+    )
+    exact = integrated(name, parameters, state, signals, 0.02)
+    assert np.ptp(exact[:, 3]) > 0.1
+    for output, got, right in zip(OUTPUTS, found.T, exact.T, strict=True):
+        np.testing.assert_allclose(got, right, atol=TOLERANCES[output], err_msg=output)
+
+
+@pytest.mark.parametrize("name", LADDER)
+def test_sensitivities_are_the_derivatives(name: str) -> None:
+    model, parameters, state, scale = a_ship(name)
+    signals = a_run()
+    path, n, p = path_of(signals), len(signals), len(parameters)
+    directions = np.eye(p + len(state) + 1)
+    found = model.sensitivities(parameters, state, path, n, directions, offset=0.01, scale=scale)
+    at = np.concatenate((parameters, state, [0.01]))
+    for along, exact in zip(directions, found, strict=True):
+        h = 1e-5 * max(abs(float(at @ along)), 1e-2)
+
+        def moved(by: float, along: FloatArray = along) -> FloatArray:
+            z = at + by * along
+            return model.simulate(z[:p], z[p:-1], path, n, offset=float(z[-1]), scale=scale)
+
+        differences = (moved(h) - moved(-h)) / (2 * h)
+        size = np.abs(exact).max(axis=0) + 1e-9
+        np.testing.assert_allclose(exact / size, differences / size, atol=2e-5)
+
+
+@pytest.fixture(scope="module")
+def voyage(vessel: Vessel) -> SimulatedTrial:
+    return simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=suite("none"))
+
+
+def test_the_papers_model_is_the_one_that_is_simulated(
+    voyage: SimulatedTrial, vessel: Vessel
+) -> None:
+    signals = resample(as_log(voyage), channels=("yaw_rate", "speed", "rudder", "rpm"))
+    model = ship_model("burylin")
+    state = np.array([0.0, 0.0, signals["speed"][0], 0.0])
+    parameters = np.array(vessel.coefficients)
+    out = model.simulate(parameters, state, path_of(signals), len(signals))
+    # the rudder's knots lie between samples: without them these would be off by 3e-6
+    np.testing.assert_allclose(out[:, 0], signals["yaw_rate"], atol=2e-9)
+    np.testing.assert_allclose(out[:, 1], signals["speed"], atol=1e-7)
+
+
+def test_knots_between_samples_are_put_back() -> None:
+    time = np.arange(0.0, 40.0, 1.0)
+    knots, angles = [10.3, 14.7, 25.45, 33.2], [0.0, 0.2, 0.2, -0.1]
+    rudder = np.interp(time, knots, angles)
+    path = path_of(Signals(0, 1.0, {"rudder": rudder, "rpm": np.full(40, 80.0)}))
+    begins = np.concatenate(([0.0], np.cumsum(path.secs)))[:-1]
+    assert set(np.round(knots, 6)) <= set(np.round(begins, 6))
+    np.testing.assert_allclose(path.delta, np.interp(begins, knots, angles), atol=1e-9)
+    assert path.sample[path.sample >= 0].tolist() == list(range(1, 40))
+
+
+def test_a_rudder_that_is_not_straight_is_left_as_it_was_measured() -> None:
+    rudder = np.random.default_rng(1).normal(size=50)
+    path = path_of(Signals(0, 1.0, {"rudder": rudder, "rpm": np.full(50, 80.0)}))
+    assert len(path.secs) == 49
+    np.testing.assert_array_equal(path.delta, rudder[:-1])
+
+
+def test_a_slow_clock_is_walked_in_short_steps() -> None:
+    path = path_of(Signals(0, 10.0, {"rudder": np.linspace(0, 1, 4), "rpm": np.full(4, 80.0)}))
+    assert path.secs.max() <= 2.0
+    assert path.sample[path.sample >= 0].tolist() == [1, 2, 3]
+    np.testing.assert_allclose(path.secs.sum(), 30.0)
+
+
+def test_the_ties_leave_the_papers_own_coefficients(vessel: Vessel) -> None:
+    model, c = ship_model("burylin-tied"), vessel.coefficients
+    values = c._asdict() | {"T3": c.e / c.d}
+    tied = model.expand(np.array([values[name] for name in model.names], complex))
+    np.testing.assert_allclose(np.real(tied), c, rtol=1e-12)
+
+
+def test_a_ship_that_runs_away_ends_in_nan() -> None:
+    model, parameters, state, scale = a_ship("slipstream")
+    parameters[model.names.index("b2")] = 50.0
+    out = model.simulate(parameters, state, path_of(a_run()), 121, scale=scale)
+    assert np.isnan(out[-1]).all()
+    assert np.isfinite(out[0]).all()
+
+
+def test_unknown_models_and_parameters_are_refused_with_the_nearest() -> None:
+    with pytest.raises(UsageError, match="did you mean 'nomoto'"):
+        ship_model("nomotto")
+    with pytest.raises(UsageError, match=r"no parameter 'b4'.*it has a, b1"):
+        ship_model("burylin").parameter("b4")
+
+
+def test_what_has_no_equations_says_so() -> None:
+    with pytest.raises(NotImplementedError, match="tuple"):
+        motion((), (), Forcing(0, 0, 0))
+    with pytest.raises(NotImplementedError, match="tuple"):
+        observed((), ())
+
+
+def test_outputs_of_a_model_are_known_ones() -> None:
+    for name in LADDER:
+        assert set(ship_model(name).outputs) <= set(OUTPUTS)

@@ -1,0 +1,174 @@
+"""A ship under way: every model's equations in SI, what pushes her, and where she goes."""
+
+from itertools import pairwise
+from math import radians
+
+import numpy as np
+import pytest
+from ladder import RPM, SHIPS, SPEED, approach, rates_in_si, vessel_of
+from scipy.integrate import solve_ivp
+
+from shiplog import Vessel, load_vessel
+from shiplog.ships import ship_model
+from shiplog.ships.model import SI
+from shiplog.ships.paper import (
+    Coefficients,
+    rudder_effect,
+    steady_speed,
+    surge_acceleration,
+    yaw_acceleration_rate,
+)
+from shiplog.ships.under_way import Acting, Ship, rates_of, step, straight
+from shiplog.vessel.ship import ship_of
+
+TABLE1 = load_vessel("table1")[0].paper
+
+
+def papers(c: Coefficients = TABLE1) -> Ship:
+    return Ship(ship_model("burylin"), c, SI)
+
+
+# ---- the paper's ship
+
+
+def test_the_papers_ship_moves_by_the_equations_filters_have_to_the_last_bit() -> None:
+    rng, ship = np.random.default_rng(0), papers()
+    hull = ship.hull(9.0, 80.0)
+    for w, w_dot, v, delta, rate in rng.normal(size=(100, 5)) * (0.01, 1e-4, 3.0, 0.3, 0.04):
+        x = np.array([w, w_dot, 9 + v, 0.3, 5.0, 6.0])
+        found = rates_of(TABLE1, hull, x, straight(80, delta)._replace(delta_dot=rate), 0.0, 0.0)
+        w_ddot = yaw_acceleration_rate(TABLE1, w, w_dot, 9 + v, 80.0, delta, rate)
+        surge = surge_acceleration(TABLE1, w, 9 + v, 80.0)
+        assert found[:4].tolist() == [w_dot, w_ddot, surge, w]
+        assert found[4:] == pytest.approx((9 + v) * np.array([np.cos(0.3), np.sin(0.3)]))
+
+
+def test_a_moment_of_the_papers_ship_stands_in_her_yaw_alone() -> None:
+    hull = papers().hull(9.0, 80.0)
+    size = TABLE1.d * rudder_effect(TABLE1, 9.0, 80.0)
+    assert hull.per_rudder.tolist() == [0.0, size, 0.0, 0.0]
+    assert papers().moment(hull) == (size, "rad/s³")
+
+
+def test_a_moment_and_a_force_add_to_yaw_and_surge_alone() -> None:
+    hull, x = papers().hull(9.0, 80.0), np.array([0.01, 1e-4, 8.0, 0.3, 5.0, 6.0])
+    calm = Acting(0.2, 0.01, 80.0, 0.0, 0.0, 0.0, 0.0)
+    free = rates_of(TABLE1, hull, x, calm, 3.0, 0.1)
+    pushed = rates_of(TABLE1, hull, x, calm._replace(moment=0.02, force=0.03), 3.0, 0.1)
+    size = 0.02 * TABLE1.d * rudder_effect(TABLE1, 9.0, 80.0)
+    assert pushed - free == pytest.approx([0, size, 0.03, 0, 0, 0], abs=1e-15)
+
+
+def test_a_ship_that_nothing_holds_back_gains_what_the_forces_give() -> None:
+    free = papers(Coefficients(*[0.0] * 12))
+    hull = free.hull(1.0, 0.0)._replace(per_rudder=np.array([0.0, 1.0, 0.0, 0.0]))
+    pushed = straight(0)._replace(moment=2e-5, force=0.03)
+    after = step(free.coefficients, hull, free.begun(1.0), pushed, 0.0, 2.0, np.empty((3, 6)))
+    assert after[:3] == pytest.approx([4e-5, 4e-5, 1.06])
+
+
+def test_the_papers_ship_begins_at_her_speed_in_closed_form(vessel: Vessel) -> None:
+    assert ship_of(vessel).steady_speed(80.0) == steady_speed(TABLE1, 80.0)
+
+
+# ---- any model's
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_a_straight_run_settles_where_nothing_changes_the_speed(name: str) -> None:
+    ship = ship_of(vessel_of(name))
+    speed = ship.steady_speed(RPM)
+    assert speed == pytest.approx(approach(name), rel=1e-12)
+    rates = rates_of(
+        ship.coefficients, ship.hull(speed, RPM), ship.begun(speed), straight(RPM), 0.0, 0.0
+    )
+    surge = [value.channel for value in ship.model.state].index("speed")
+    assert rates[surge] == pytest.approx(0, abs=1e-14)
+    assert ship.steady_speed(1.1 * RPM) > speed
+
+
+@pytest.mark.parametrize("changes", [{"h": -0.01}, {"g": 0.0}])
+def test_a_ship_without_a_steady_speed_has_none(changes: dict[str, float]) -> None:
+    ship = ship_of(vessel_of("nomoto"))
+    other = Ship(ship.model, ship.coefficients._replace(**changes), ship.scale)
+    assert other.steady_speed(RPM) == 0.0
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_the_rates_in_si_are_those_of_the_equations_as_printed(name: str) -> None:
+    ship, rng = ship_of(vessel_of(name)), np.random.default_rng(1)
+    speed = approach(name)
+    hull, begun = ship.hull(speed, RPM), ship.begun(speed)
+    for _ in range(50):
+        x = begun + rng.normal(size=len(begun)) * np.where(begun > 0, 0.1, 0.05)
+        acting = Acting(*rng.normal(size=2) * (0.3, 0.03), 80.0, 0.02, 0.01, 0.7, 0.03)
+        found = rates_of(ship.coefficients, hull, x, acting, 3.0, 0.5)
+        moment = 0.02 + 0.01 * np.sin(0.7 * 3.5)
+        rudder = acting.delta + 0.5 * acting.delta_dot, acting.delta_dot
+        expected = rates_in_si(name, x, rudder, 80.0, worth=moment, force=0.03)
+        assert found == pytest.approx(expected, rel=1e-11, abs=1e-13)
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_a_moment_pushes_to_its_side_and_slows_nobody(name: str) -> None:
+    ship = ship_of(vessel_of(name))
+    hull = ship.hull(SPEED, RPM)
+    size, unit = ship.moment(hull)
+    assert size > 0
+    assert unit == ("rad/s³" if name in ("slipstream", "drift-lag") else "rad/s²")
+    assert hull.per_rudder[hull.ahead] == 0
+
+
+# ---- Runge and Kutta's error
+
+
+def hard_over(t: float, start: float, rate: float) -> float:
+    """The rudder on its way to 35°."""
+    return min(max(t - start, 0.0) * rate, radians(35))
+
+
+def stepped(start: float, rate: float) -> np.ndarray:
+    """w, w' and v every 0.1 s of 200 s, (2000, 3): a step a sample, whatever the rudder does."""
+    ship, found, work = papers(), [], np.empty((3, 6))
+    state = ship.begun(steady_speed(TABLE1, 80.0))
+    hull = ship.hull(state[2], 80.0)
+    for k in range(2000):
+        delta, after = (hard_over(k * 0.1 + h, start, rate) for h in (0.0, 0.1))
+        moving = straight(80, delta)._replace(delta_dot=(after - delta) / 0.1)
+        state = step(TABLE1, hull, state, moving, 0.0, 0.1, work).copy()
+        found.append(state[:3])
+    return np.array(found)
+
+
+def exact(start: float, rate: float) -> np.ndarray:
+    """The same by another integrator, from knot to knot of the rudder."""
+    c, x, parts = TABLE1, np.array([0.0, 0.0, steady_speed(TABLE1, 80.0)]), []
+
+    def moving(t: float, x: np.ndarray, delta_dot: float) -> list[float]:
+        w, w_dot, v = x
+        w_ddot = yaw_acceleration_rate(c, *x, 80.0, hard_over(t, start, rate), delta_dot)
+        return [w_dot, w_ddot, surge_acceleration(c, w, v, 80.0)]
+
+    times, knots = np.arange(1, 2001) * 0.1, [0.0, start, start + radians(35) / rate, 200.0]
+    for (begins, ends), delta_dot in zip(pairwise(knots), (0.0, rate, 0.0), strict=True):
+        asked = times[(times > begins + 1e-9) & (times <= ends + 1e-9)].clip(max=ends)
+        run = solve_ivp(
+            moving, (begins, ends), x, "DOP853", np.unique([*asked, ends]), args=(delta_dot,),
+            rtol=1e-13, atol=1e-16,
+        )  # fmt: skip
+        parts.append(run.y[:, : len(asked)].T)
+        x = run.y[:, -1]
+    return np.concatenate(parts)
+
+
+@pytest.mark.parametrize(
+    # identification, section 3: 4e-11 with knots on the grid, 3e-6 off it, of each state's size
+    ("start", "rate_deg", "least", "most"),
+    [(10.0, 2.5, 0.0, 5e-11), (10.0, 2.3456, 2.5e-6, 3.5e-6), (10.03, 2.3456, 2.5e-6, 4e-6)],
+)
+def test_runge_kutta_at_a_tenth_of_a_second_wants_the_rudders_knots_on_its_grid(
+    start: float, rate_deg: float, least: float, most: float
+) -> None:
+    true = exact(start, radians(rate_deg))
+    off = np.abs(stepped(start, radians(rate_deg)) - true) / np.abs(true).max(axis=0)
+    assert least <= off.max() < most

@@ -1,0 +1,306 @@
+"""Foreign tables: what must be read, and what must be refused and how."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from layout_texts import MINIMAL, layout
+from places import KVLCC2, LAYOUTS
+from scipy.signal import savgol_filter
+
+from shiplog.errors import LayoutError
+from shiplog.tables.foreign import read_table, rebuilt_heading, uniform_times
+from shiplog.tables.layout import Layout, load_layout
+from shiplog.types import TrialLog
+
+
+def table(tmp_path: Path, text: str, encoding: str = "utf-8") -> Path:
+    path = tmp_path / "run.txt"
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def refusal(tmp_path: Path, text: str, its: Layout | None = None) -> str:
+    with pytest.raises(LayoutError) as caught:
+        read_table(table(tmp_path, text), its or layout())
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.endswith(str(tmp_path / "run.txt"))
+    return message
+
+
+# ---- the table
+
+
+def test_a_table_is_read_in_si_with_its_sign_and_its_times(tmp_path: Path) -> None:
+    its = layout(
+        "[time]\ncolumn = 1\nunit = 'ms'\n[rudder]\ncolumn = 3\nunit = 'deg'\nsign = -1\n"
+        "[speed]\ncolumn = 2\nunit = 'kn'\n",
+        "source = 'bridge'\nstart = 2001-09-09T01:46:40Z",
+    )
+    log = read_table(table(tmp_path, "0,10,5\n100,20,-5\n"), its)
+    assert [c.topic for c in log] == ["/speed/bridge", "/rudder/bridge"]
+    np.testing.assert_allclose(log["speed"].values, [18520 / 3600, 37040 / 3600])
+    np.testing.assert_allclose(log["rudder"].values, np.radians([-5, 5]))
+    assert log["speed"].measured_ns.tolist() == [10**18, 10**18 + 100_000_000]
+    assert np.array_equal(log["rudder"].received_ns, log["rudder"].measured_ns)
+    assert log.metadata == {"converted_from": "run.txt", "layout": "gyro"}
+
+
+def test_columns_are_found_by_their_headers(tmp_path: Path) -> None:
+    text = "[time]\ncolumn = 't [s]'\nunit = 's'\n[rpm]\ncolumn = 'shaft'\nunit = 'rpm'\n"
+    its = layout(text, "header = true\nskip_rows = 1\ndelimiter = ';'\ndecimal_comma = true")
+    path = table(tmp_path, '\ufeffFerry trials\n"shaft";note;"t [s]"\n80,5;a;0\n81,5;;0,1\n')
+    log = read_table(path, its)
+    assert log["rpm"].values.tolist() == [80.5, 81.5]
+    assert log["rpm"].measured_ns.tolist() == [0, 100_000_000]
+
+
+def test_a_header_that_is_not_there_is_an_error_with_the_nearest_one(tmp_path: Path) -> None:
+    text = "[time]\ncolumn = 't'\nunit = 's'\n[rpm]\ncolumn = 'shaft rpm'\nunit = 'rpm'\n"
+    said = refusal(tmp_path, "t,shaft_rpm\n0,1\n", layout(text, "header = true"))
+    assert "no column is headed 'shaft rpm'; did you mean 'shaft_rpm'?" in said
+
+
+def test_a_header_given_twice_is_an_error(tmp_path: Path) -> None:
+    text = "[time]\ncolumn = 't'\nunit = 's'\n[rpm]\ncolumn = 'n'\nunit = 'rpm'\n"
+    assert "more than one" in refusal(tmp_path, "t,n,n\n0,1,2\n", layout(text, "header = true"))
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "text"),
+    [
+        ("whitespace", "  0   1 x\n\t\t\n\n 1\t 2  y\n\t\t\n"),
+        (",", "0, 1,x\r\n\r\n1, 2,y\r\n,,\r\n"),
+        (";", "0;1;x\n;;\n1;2;y"),
+        ("tab", "0\t1\tx\n\t\t\n1\t2\ty\n"),
+    ],
+)
+def test_every_delimiter_is_read_and_blank_lines_are_passed_over(
+    tmp_path: Path, delimiter: str, text: str
+) -> None:
+    log = read_table(table(tmp_path, text), layout(top=f"delimiter = '{delimiter}'"))
+    np.testing.assert_allclose(log["yaw_rate"].values, np.radians([1, 2]))
+
+
+def test_empty_and_nan_cells_were_not_measured(tmp_path: Path) -> None:
+    log = read_table(table(tmp_path, '0,\n1,nan\n2 ,NaN \n3," "\n4, 1 \n'), layout())
+    assert np.isnan(log["yaw_rate"].values).tolist() == [True, True, True, True, False]
+
+
+@pytest.mark.parametrize("cell", ["n/a", "1_000", "1,5", "--", "0x10"])
+def test_a_cell_that_is_no_number_is_named_with_line_column_and_text(
+    tmp_path: Path, cell: str
+) -> None:
+    said = refusal(tmp_path, f'\n0,1\n\n1,"{cell}"\n')
+    assert f"line 4, column 2: {cell!r} is not a number" in said
+
+
+def test_a_point_beside_a_decimal_comma_is_not_guessed_at(tmp_path: Path) -> None:
+    its = layout(top="delimiter = ';'\ndecimal_comma = true")
+    assert "'1.234'" in refusal(tmp_path, "0;1.234\n", its)
+
+
+def test_infinity_and_a_missing_time_are_named_with_their_line(tmp_path: Path) -> None:
+    assert "line 2 has an infinite yaw_rate" in refusal(tmp_path, "0,1\n1,-inf\n")
+    assert "line 2 has an infinite yaw_rate" in refusal(tmp_path, "0,1\n1,1e999\n")
+    assert "line 2 has no time" in refusal(tmp_path, "0,1\nnan,1\n")
+    assert "line 1 has an infinite time" in refusal(tmp_path, "inf,1\n0,1\n")
+
+
+def test_times_that_run_backwards_are_named_with_line_and_remedy(tmp_path: Path) -> None:
+    said = refusal(tmp_path, "0,1\n2,1\n\n1,1\n")
+    assert "backwards at line 4" in said
+    assert "put the lines in the order of time" in said
+
+
+def test_times_outside_what_a_log_can_hold_are_refused(tmp_path: Path) -> None:
+    assert "line 1 is before 1970" in refusal(tmp_path, "-1,1\n0,1\n")
+    assert "line 2 is before 1970 or after 2262" in refusal(tmp_path, "0,1\n1e10,1\n")
+
+
+def test_a_row_of_another_length_is_named_with_both_counts(tmp_path: Path) -> None:
+    assert "line 3 has 3 columns where line 1 has 2" in refusal(tmp_path, "0,1\n\n1,2,3\n")
+
+
+def test_a_column_beyond_the_table_is_an_error(tmp_path: Path) -> None:
+    assert "line 1 has 1 columns, but yaw_rate is to be column 2" in refusal(tmp_path, "0\n1\n")
+
+
+def test_a_table_without_rows_is_an_error(tmp_path: Path) -> None:
+    assert "no rows" in refusal(tmp_path, "")
+    assert "no rows" in refusal(tmp_path, "t,r\n", layout(top="header = true"))
+
+
+def test_a_wrong_encoding_is_named_with_its_line_and_remedy(tmp_path: Path) -> None:
+    path = table(tmp_path, "0,1\n1,5°\n", "cp1252")
+    with pytest.raises(LayoutError, match="line 2 is not utf-8; give the encoding"):
+        read_table(path, layout())
+
+
+def test_a_table_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(LayoutError, match="no such file"):
+        read_table(tmp_path / "gone.txt", layout())
+    with pytest.raises(LayoutError, match="cannot read"):
+        read_table(tmp_path, layout())
+
+
+def test_a_model_is_scaled_to_the_ship_at_equal_froude_number(tmp_path: Path) -> None:
+    its = layout(
+        "[time]\ncolumn = 1\nunit = 's'\n[speed]\ncolumn = 2\nunit = 'm/s'\n"
+        "[yaw_rate]\ncolumn = 3\nunit = 'rad/s'\n[rpm]\ncolumn = 4\nunit = 'rev/s'\n"
+        "[rudder]\ncolumn = 5\nunit = 'rad'\n[position]\nnorth = 6\neast = 7\nunit = 'm'\n",
+        "froude_scale = 25",
+    )
+    log = read_table(table(tmp_path, "0,1,1,1,1,1,2\n1,1,1,1,1,1,2\n"), its)
+    assert log["speed"].measured_ns.tolist() == [0, 5 * 10**9]
+    wanted = {"speed": 5.0, "yaw_rate": 0.2, "rpm": 12.0, "rudder": 1.0}
+    assert {name: log[name].values[0] for name in wanted} == pytest.approx(wanted)
+    assert log["position"].values.tolist() == [[25, 50], [25, 50]]
+    assert log.metadata["froude_scale"] == "25.0"
+
+
+def test_a_position_on_the_globe_keeps_its_degrees(tmp_path: Path) -> None:
+    text = "[time]\ncolumn = 1\nunit = 's'\n[position]\nlatitude = 2\nlongitude = 3\nunit = 'deg'\n"
+    position = read_table(table(tmp_path, "0,59.5,24.25\n1,59.6,24.5\n"), layout(text))["position"]
+    assert (position.fields, position.unit) == (("latitude", "longitude", "altitude"), "deg")
+    np.testing.assert_array_equal(position.values, [[59.5, 24.25, np.nan], [59.6, 24.5, np.nan]])
+
+
+def test_earth_fixed_velocities_are_turned_into_speed_and_sway(tmp_path: Path) -> None:
+    its = layout(
+        "[time]\ncolumn = 1\nunit = 's'\n[heading]\ncolumn = 2\nunit = 'deg'\n"
+        "[velocity_north]\ncolumn = 3\nunit = 'm/s'\n[velocity_east]\ncolumn = 4\nunit = 'm/s'\n"
+    )
+    # north bound and drifting east; east bound and drifting south: both to starboard
+    log = read_table(table(tmp_path, "0,0,5,1\n1,90,-1,5\n"), its)
+    np.testing.assert_allclose(log["speed"].values, [5, 5])
+    np.testing.assert_allclose(log["sway"].values, [1, 1])
+    assert "over the ground" in log["speed"].metadata["computed_from"]
+
+
+# ---- what was printed coarsely
+
+
+def three_digits(values: np.ndarray) -> np.ndarray:
+    return np.array([float(f"{value:.2e}") for value in values])
+
+
+@pytest.mark.parametrize("step", [0.0213, 0.135265, 1.7])
+@pytest.mark.parametrize("start", [0.0, 37.0])
+def test_a_uniform_step_is_rebuilt_from_times_of_three_digits(step: float, start: float) -> None:
+    times = start + step * np.arange(3000)
+    rebuilt, wrong = uniform_times(three_digits(times))
+    assert wrong is None
+    assert np.diff(rebuilt) == pytest.approx(step, rel=1e-4)
+    assert np.max(np.abs(rebuilt - times)) < step
+
+
+def test_exact_uniform_times_stay_as_they_are() -> None:
+    times = 0.1 * np.arange(100)
+    np.testing.assert_allclose(uniform_times(times)[0], times, atol=1e-9)
+
+
+def test_times_that_are_not_uniform_are_not_made_so(tmp_path: Path) -> None:
+    its = layout(MINIMAL.replace('unit = "s"', 'unit = "s"\nrebuild = "uniform"'))
+    lines = [f"{i if i < 50 else i + 40},0\n" for i in range(100)]
+    assert "the times are not uniform" in refusal(tmp_path, "".join(lines), its)
+    assert "the times are not uniform" in refusal(tmp_path, "1,0\n1,0\n1,0\n", its)
+
+
+def test_a_coarse_heading_is_rebuilt_though_the_gyro_has_a_bias() -> None:
+    time_secs = np.arange(0, 900, 0.2)
+    heading = np.radians(120 + 25 * np.sin(time_secs / 40) + 0.1 * time_secs)
+    rate = np.radians(25 / 40 * np.cos(time_secs / 40) + 0.1) + np.radians(0.005)
+    printed = np.radians(np.round(np.degrees(heading)) % 360)
+    printed[1000:1010] = np.nan
+    rebuilt = rebuilt_heading(time_secs, printed, rate)
+    assert np.isnan(rebuilt).sum() == 10
+    assert np.degrees(np.nanmax(np.abs(rebuilt - heading))) < 0.2
+    assert np.degrees(np.nanstd(rebuilt - heading)) < 0.06
+
+
+@pytest.mark.parametrize("count", [1, 2, 15])
+def test_a_short_heading_is_rebuilt_too(count: int) -> None:
+    time_secs = np.arange(count) * 1.0
+    np.testing.assert_allclose(
+        rebuilt_heading(time_secs, 0.01 * time_secs, np.full(count, 0.01)),
+        0.01 * time_secs,
+        atol=1e-9,
+    )
+
+
+# ---- the real data
+
+
+def kvlcc2(laboratory: str) -> list[Path]:
+    return sorted((KVLCC2 / laboratory).glob("*.dat"))
+
+
+def real(path: Path) -> TrialLog:
+    return read_table(path, load_layout(LAYOUTS / f"simman_{path.parent.name}.toml"))
+
+
+RUNS = [pytest.param(path, id=path.stem) for path in kvlcc2("marin") + kvlcc2("hsva")] or [
+    pytest.param(Path(), marks=pytest.mark.skip("the SIMMAN data are not in ../shared/data/kvlcc2"))
+]
+
+
+@pytest.mark.parametrize("path", RUNS)
+def test_a_kvlcc2_run_begins_at_eight_metres_a_second_and_91_rpm(path: Path) -> None:
+    log = real(path)
+    assert log["speed"].values[0] == pytest.approx(8.0, abs=0.15)
+    assert log["rpm"].values == pytest.approx(91.3, abs=0.9)
+    assert np.all(log["speed"].values > 2.4)
+
+
+@pytest.mark.parametrize("path", RUNS)
+def test_the_yaw_rate_is_the_derivative_of_the_heading(path: Path) -> None:
+    log = real(path)
+    time_secs = (log["heading"].measured_ns - log["heading"].measured_ns[0]) * 1e-9
+    turned = np.gradient(log["heading"].values, time_secs)
+    assert np.degrees(np.std(turned - log["yaw_rate"].values)) < 0.012
+
+
+@pytest.mark.parametrize("path", RUNS)
+def test_speed_and_sway_agree_with_the_differentiated_positions(path: Path) -> None:
+    log = real(path)
+    position, heading = log["position"], log["heading"].values
+    dt = float(np.diff(position.measured_ns).mean()) * 1e-9
+    half = int(30 / dt)  # s; MARIN's positions are printed to 10 m
+    north, east = (
+        savgol_filter(position.values[:, i], 2 * half + 1, 3, deriv=1, delta=dt) for i in (0, 1)
+    )
+    inner = slice(half, -half)
+    ahead = (north * np.cos(heading) + east * np.sin(heading))[inner]
+    across = (east * np.cos(heading) - north * np.sin(heading))[inner]
+    assert np.std(ahead - log["speed"].values[inner]) < 0.15
+    assert np.std(across - log["sway"].values[inner]) < 0.25
+
+
+@pytest.mark.parametrize("path", RUNS)
+def test_a_positive_rudder_is_followed_by_a_turn_to_starboard(path: Path) -> None:
+    log = real(path)
+    rudder, rate = log["rudder"].values, log["yaw_rate"].values
+    dt = float(np.diff(log["rudder"].measured_ns).mean()) * 1e-9
+    first = int(np.argmax(np.abs(rudder) > 0.8 * np.abs(rudder).max()))
+    later = first + int(30 / dt)
+    assert np.sign(rate[later] - rate[first]) == np.sign(rudder[first])
+
+
+@pytest.mark.parametrize("path", [p for p in RUNS if "MARIN" in str(p.id)] or RUNS)
+def test_the_step_of_marins_runs_is_rebuilt(path: Path) -> None:
+    steps = np.diff(real(path)["rudder"].measured_ns) * 1e-9
+    assert steps == pytest.approx(0.135265, abs=2e-6)
+
+
+@pytest.mark.parametrize("path", [p for p in RUNS if "HSVA" in str(p.id)] or RUNS)
+def test_a_fine_heading_rounded_as_marins_is_rebuilt_from_the_yaw_rate(path: Path) -> None:
+    log = real(path)
+    time_secs = (log["heading"].measured_ns - log["heading"].measured_ns[0]) * 1e-9
+    fine = log["heading"].values
+    printed = np.radians(three_digits(np.degrees(fine) + 150) - 150)  # to whole degrees
+    biased = log["yaw_rate"].values + np.radians(0.005)
+    rebuilt = rebuilt_heading(time_secs, printed, biased)
+    assert np.degrees(np.std(printed - fine)) > 0.28
+    assert np.degrees(np.std(rebuilt - fine)) < 0.06

@@ -1,0 +1,198 @@
+"""The settings of filter and observer, from a vessel file, the command line and Python alike."""
+
+from dataclasses import fields
+
+import pytest
+
+from analysis.regression.sliding import WINDOW_SECS
+from analysis.regression.weak_form import BUMP_SECS
+from shiplog import Vessel, load_vessel
+from shiplog.cli.arguments import parser, replay_settings
+from shiplog.errors import UsageError, VesselError
+from shiplog.vessel.settings import (
+    DISTURBANCES,
+    FILTERS,
+    SHORTEST_WINDOW_SECS,
+    SMOOTHED,
+    DisturbanceSettings,
+    FilterSettings,
+    IdentifierSettings,
+    as_table,
+    disturbance_settings,
+    filter_settings,
+    identifier_settings,
+    without_effect,
+)
+from shiplog.vessel.vessel import PRESETS, idle, parse_vessel, with_settings
+
+PARSERS = {
+    "filter": filter_settings,
+    "disturbance": disturbance_settings,
+    "identifier": identifier_settings,
+}
+
+
+def faults_of(section: str, table: dict[str, object]) -> str:
+    faults: list[str] = []
+    PARSERS[section](table, faults)
+    return "; ".join(faults)
+
+
+def given(*arguments: str) -> dict[str, object]:
+    return replay_settings(parser().parse_args(["replay", "x.mcap", *arguments]))
+
+
+def test_what_a_vessel_file_leaves_out_is_the_papers() -> None:
+    vessel, _ = load_vessel("table1")
+    assert vessel.filter.chosen == "pseudo-input"
+    assert not vessel.filter.smooth
+    assert vessel.disturbance.models == ("constant",)
+    assert (vessel.disturbance.yaw_frequency, vessel.disturbance.spectrum) == (0.05, "butterworth")
+
+
+@pytest.mark.parametrize("kind", FILTERS)
+def test_every_filter_can_be_named_in_a_vessel_file(kind: str) -> None:
+    text = PRESETS["table1"] + f'kind = "{kind}"\ngate = 4\n'
+    vessel = parse_vessel(text, "ship.toml")
+    assert vessel.filter.chosen == kind
+    assert vessel.filter.gate == 4.0
+
+
+@pytest.mark.parametrize("models", [["wave"], ["constant", "wave"], list(DISTURBANCES)])
+def test_every_disturbance_can_be_named_in_a_vessel_file(models: list[str]) -> None:
+    vessel = parse_vessel(f"{PRESETS['table1']}\n[disturbance]\nmodels = {models}\n", "ship.toml")
+    assert vessel.disturbance.models == tuple(models)
+
+
+def test_windows_are_what_a_file_and_the_command_line_say(vessel: Vessel) -> None:
+    assert vessel.identifier.window_secs == WINDOW_SECS
+    assert SHORTEST_WINDOW_SECS == BUMP_SECS
+    stated = parse_vessel(f"{PRESETS['table1']}[identifier]\nwindow_secs = 300\n", "ship.toml")
+    assert stated.identifier.window_secs == 300.0
+    chosen = given("--set", "identifier.window_secs=400")
+    assert with_settings(stated, chosen).identifier.window_secs == 400.0
+    auto = with_settings(stated, {"identifier.window_secs": "auto"})
+    assert auto.identifier.window_secs == WINDOW_SECS
+
+
+@pytest.mark.parametrize("settings", [FilterSettings(kind="quality"), DisturbanceSettings()])
+def test_settings_are_their_table_and_back(settings: FilterSettings | DisturbanceSettings) -> None:
+    faults: list[str] = []
+    parse = filter_settings if isinstance(settings, FilterSettings) else disturbance_settings
+    assert parse(as_table(settings), faults) == settings
+    assert not faults
+
+
+def test_a_wave_is_told_by_a_filter_that_has_room_for_it() -> None:
+    assert FilterSettings(wave=True).chosen == "extended"
+    said = faults_of("filter", {"kind": "pseudo-input", "wave": True})
+    assert said == "filter.kind = 'pseudo-input' has no room for a wave; take 'extended'"
+
+
+@pytest.mark.parametrize("kind", [kind for kind in FILTERS if kind not in SMOOTHED])
+def test_what_has_not_the_best_gain_is_not_smoothed(kind: str) -> None:
+    said = faults_of("filter", {"kind": kind, "smooth": True})
+    assert said.endswith("take 'pseudo-input' or 'extended'")
+    assert kind in said
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value", "said"),
+    [
+        ("filter", "kind", "kalman", "filter.kind must be one of pseudo-input, steady-state"),
+        ("filter", "smooth", 1, "filter.smooth must be true or false, got 1"),
+        ("filter", "gate", 0, "filter.gate must be positive, got 0"),
+        ("filter", "gate", "6", "filter.gate must be a number, got '6'"),
+        ("filter", "shift", -0.1, "filter.shift must lie between 0 and 1000, got -0.1"),
+        ("filter", "wave_damping", 2.0, "filter.wave_damping must lie between -inf and 1, got 2"),
+        ("filter", "speed_std", float("nan"), "filter.speed_std must be finite, got nan"),
+        ("filter", "yaw_rate_std", True, "filter.yaw_rate_std must be a number, got True"),
+        ("filter", "shfit", 0.1, "unknown key 'filter.shfit', did you mean 'shift'?"),
+        ("disturbance", "models", [], "must be a list of some of constant, ramp, wave, got []"),
+        ("disturbance", "models", "wave", "must be a list of some of constant, ramp, wave"),
+        ("disturbance", "models", ["swell"], "must be a list of some of constant, ramp, wave"),
+        ("disturbance", "spectrum", "bessel", "disturbance.spectrum must be one of butterworth"),
+        ("disturbance", "yaw_frequency", -1, "disturbance.yaw_frequency must be positive, got -1"),
+        ("identifier", "window_secs", 30, "identifier.window_secs must lie between 60 and 1e+09"),
+        ("identifier", "window", 300, "did you mean 'window_secs'?"),
+    ],
+)
+def test_a_value_that_does_not_do_is_named(
+    section: str, key: str, value: object, said: str
+) -> None:
+    assert said in faults_of(section, {key: value})
+
+
+def test_a_section_that_is_none_and_other_faults_are_told_together() -> None:
+    with pytest.raises(VesselError, match=r"2 faults.*\[filter\] must be a section"):
+        parse_vessel('filter = 3\nlength = "long"\n' + PRESETS["table1"].split("[filter]")[0], "x")
+
+
+def test_settings_given_stand_above_the_vessels_own(vessel: Vessel) -> None:
+    changed = with_settings(vessel, {"filter.kind": "extended", "disturbance.models": ["ramp"]})
+    assert changed.filter.kind == "extended"
+    assert changed.filter.process_ratio == vessel.filter.process_ratio
+    assert changed.disturbance.models == ("ramp",)
+    assert changed.coefficients == vessel.coefficients
+    assert with_settings(vessel, {}) is vessel
+
+
+def test_a_setting_is_left_to_the_log_again(vessel: Vessel) -> None:
+    assert vessel.filter.process_ratio == 2.5e-5
+    assert with_settings(vessel, {"filter.process_ratio": "auto"}).filter.process_ratio is None
+    with_gate = with_settings(vessel, {"filter.gate": 3.0})
+    assert with_settings(with_gate, {"filter.gate": "auto"}).filter.gate == 6.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "names"),
+    [
+        ({"filter.shift": 0.2}, ["filter.shift"]),
+        ({"filter.kind": "quality", "filter.shift": 0.2}, []),
+        ({"filter.kind": "extended", "filter.as_printed": True}, ["filter.as_printed"]),
+        ({"filter.yaw_bandwidth": 0.1}, ["filter.yaw_bandwidth"]),
+        ({"filter.wave_std": 1e-3}, ["filter.wave_std"]),
+        ({"filter.wave": True, "filter.wave_std": 1e-3}, []),
+        ({"disturbance.wave_frequency": 0.6}, ["disturbance.wave_frequency"]),
+        ({"disturbance.models": ["wave"], "disturbance.wave_frequency": 0.6}, []),
+    ],
+)
+def test_a_setting_of_which_nothing_comes_is_told(
+    vessel: Vessel, settings: dict[str, object], names: list[str]
+) -> None:
+    changed = with_settings(vessel, settings)
+    assert without_effect(changed.filter, changed.disturbance) == names
+    assert all(name in idle(changed)[0] for name in names)
+    assert bool(idle(changed)) == bool(names)
+
+
+def test_settings_of_another_kind_are_refused_all_at_once(vessel: Vessel) -> None:
+    with pytest.raises(UsageError) as caught:
+        with_settings(vessel, {"yaw.T1": 3.0, "filter.gate": -1.0, "disturbance.modles": ["wave"]})
+    for said in ("'yaw.T1'", "filter.gate must be positive", "did you mean 'models'?"):
+        assert said in str(caught.value)
+
+
+def test_the_command_line_gives_them_by_name() -> None:
+    assert given() == {}
+    assert given("--filter", "quality", "--set", "filter.shift=0.2") == {
+        "filter.kind": "quality",
+        "filter.shift": 0.2,
+    }
+    assert given("--smooth", "--wave") == {"filter.smooth": True, "filter.wave": True}
+    assert given("--disturbance", "ramp,wave", "--set", "disturbance.spectrum=binomial") == {
+        "disturbance.models": ["ramp", "wave"],
+        "disturbance.spectrum": "binomial",
+    }
+    assert given("--set", 'disturbance.models=["ramp"]') == {"disturbance.models": ["ramp"]}
+
+
+@pytest.mark.parametrize("text", ["filter.gate", "=3", "filter.gate="])
+def test_a_setting_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="--set wants KEY=VALUE"):
+        given("--set", text)
+
+
+def test_every_field_states_what_it_may_be() -> None:
+    for kind in (FilterSettings, DisturbanceSettings, IdentifierSettings):
+        assert all("kind" in field.metadata for field in fields(kind))
