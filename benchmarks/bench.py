@@ -6,13 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
 
 from .logs import NAMES
 
 VESSEL: Vessel = load_vessel("table1")[0]
-NOISE = Noise(np.array([8e-5, 0.12]), np.full(2, 2.5e-5))  # as good as any: both are told the same
+NOISE = NoiseModel(
+    np.array([8e-5, 0.12]), np.full(2, 2.5e-5)
+)  # as good as any: both are told the same
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from analysis.regression.changes import Change, ShipWatch
+from analysis.regression.changes import Change, ShipChangeTest
 from analysis.regression.first_model import BARE
 from analysis.regression.weak_form import CHANNELS, WeakForm
 from recorders.simulated.sensors import suite
@@ -87,7 +87,7 @@ def told(log: TrialLog, case: Case) -> tuple[Change, ...]:
     signals = resample(log, channels=CHANNELS)
     model = BARE if case.guessed else load_vessel(case.vessel)[0].paper
     equations = WeakForm(model, len(signals), signals.dt_secs, (1, 1, 1, 1))
-    watch = ShipWatch(equations, guessed=case.guessed)
+    watch = ShipChangeTest(equations, guessed=case.guessed)
     watch.add(*equations.step(signals, float(np.max(np.abs(signals["speed"])))))
     return watch.result()
 

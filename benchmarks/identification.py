@@ -15,9 +15,9 @@ from time import process_time
 
 import numpy as np
 
-from analysis.identification.least_squares import Spread, eliminated, information
+from analysis.identification.least_squares import ResidualStd, eliminated, information
 from analysis.identification.output_error import LEAST_STD, output_error, pose
-from analysis.identification.segment import Trial, trials_of
+from analysis.identification.segment import Segment, segments_of
 from analysis.identification.uncertainty import uncertainty
 from recorders.simulated.sensors import Sensor, suite
 from recorders.simulated.simulate import simulate
@@ -90,12 +90,14 @@ def truth() -> dict[str, float]:
     return {**c._asdict(), "T3": c.e / c.d}
 
 
-def known_trial(manoeuvre: str, seed: int, seconds: float = SECONDS, noise: str = "paper") -> Trial:
+def known_trial(
+    manoeuvre: str, seed: int, seconds: float = SECONDS, noise: str = "paper"
+) -> Segment:
     """A trial of the paper's ship."""
     vessel = load_vessel("table1")[0]
     trial = simulate(vessel, manoeuvre, duration_secs=seconds, seed=seed, sensors=suite(noise))
     log = TrialLog("trial", trial.channels, trial.metadata, trial.vessel_toml)
-    return trials_of(resample(log, channels=CHANNELS), "trial")[0]
+    return segments_of(resample(log, channels=CHANNELS), "trial")[0]
 
 
 def one(
@@ -133,7 +135,7 @@ def true_bound(
         [_std(suite(noise)[name], column, LEAST_STD[name]) for name, column in columns]
     )
     z, left = problem.start(), [np.zeros_like(stds)]
-    told = information(problem, left, [Spread(stds, stds)], [problem.jacobian(z, 0)], power=0)
+    told = information(problem, left, [ResidualStd(stds, stds)], [problem.jacobian(z, 0)], power=0)
     precision = eliminated(told + np.diag(problem.prior[1]), len(problem.free))
     scale = np.sqrt(np.diag(precision))
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(precision / np.outer(scale, scale)))) / scale)

@@ -1,13 +1,13 @@
-"""The identifier's methods side by side, on the same trials of a ship that is known."""
+"""The identifier's methods side by side, on the same segments of a ship that is known."""
 
 from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from analysis.identification.comparison.paper_scheme import NINE, papers_states, regression, solved
+from analysis.identification.comparison.paper_scheme import NINE, paper_states, regression, solved
 from analysis.identification.comparison.parameter_ekf import augmented
 from analysis.identification.output_error import OutputError, output_error
-from analysis.identification.segment import Trial
+from analysis.identification.segment import Segment
 from analysis.regression.coefficients import Coefficient, identify
 from analysis.regression.weak_form import weak_form
 from shiplog.ships import ship_model
@@ -34,7 +34,7 @@ Found = Mapping[str, float]
 
 
 def methods(
-    sail: Callable[[str, int], Trial], bound: Callable[[str], FloatArray], truth: Coefficients
+    sail: Callable[[str, int], Segment], bound: Callable[[str], FloatArray], truth: Coefficients
 ) -> None:
     """Print the section.
 
@@ -61,7 +61,7 @@ def _row(founds: list[Found]) -> Iterator[str]:
         yield f"{median:.2g}" if np.isfinite(median) else "–"
 
 
-def _by_each(trial: Trial, truth: Coefficients, seed: int) -> Iterator[tuple[str, Found]]:
+def _by_each(trial: Segment, truth: Coefficients, seed: int) -> Iterator[tuple[str, Found]]:
     """Each method's name, and its errors of this trial in per cent of the truth."""
     model = ship_model("burylin")
     free, true = output_error([trial], model), np.array(truth[:9])
@@ -81,12 +81,12 @@ def _by_each(trial: Trial, truth: Coefficients, seed: int) -> Iterator[tuple[str
     yield "output error, tied, T3 known", _errors(trial, truth, _nine(tied))
 
 
-def _paper(trial: Trial, prior: Coefficients) -> FloatArray:
-    states = papers_states(trial.signals, prior)
+def _paper(trial: Segment, prior: Coefficients) -> FloatArray:
+    states = paper_states(trial.signals, prior)
     return np.concatenate([solved(rows) for rows in regression(trial.signals, prior, states)])
 
 
-def _integral(trial: Trial, truth: Coefficients) -> FloatArray:
+def _integral(trial: Segment, truth: Coefficients) -> FloatArray:
     found: dict[str, Coefficient] = {}
     for rows in weak_form(trial.signals, truth):  # of the truth the alphas alone are used
         found |= identify(rows)[0].coefficients
@@ -97,7 +97,7 @@ def _nine(fit: OutputError) -> FloatArray:
     return np.array(fit.problem.model.coefficients(fit.parameters)[:9])
 
 
-def _errors(trial: Trial, truth: Coefficients, found: FloatArray) -> Found:
+def _errors(trial: Segment, truth: Coefficients, found: FloatArray) -> Found:
     """In per cent of the truth, and how far the found model's run is off the true one's."""
     true, model = np.array(truth[:9]), ship_model("burylin")
     speed = float(np.sqrt(-truth.h * trial.signals["rpm"][0] / truth.g))

@@ -9,9 +9,15 @@ from scipy.optimize import least_squares
 
 from analysis.identification.initial_guess import starts
 from analysis.identification.least_squares import OUTLYING
-from analysis.identification.output_error import OutputError, first_spreads, fit, output_error, pose
+from analysis.identification.output_error import (
+    OutputError,
+    first_residual_stds,
+    fit,
+    output_error,
+    pose,
+)
 from analysis.identification.problem import Nuisance
-from analysis.identification.segment import Trial
+from analysis.identification.segment import Segment
 from shiplog.ships import ship_model
 from shiplog.types import FloatArray
 
@@ -24,7 +30,7 @@ TOLERANCE, DIFFERENCE = 1e-7, (1e-4,)  # tighter costs more, looser drowns the d
 LONGEST_STEP = 2.0  # s, that the peer does not step over a rudder's kink
 
 
-def speed(sail: Callable[[float, str], Trial]) -> None:
+def speed(sail: Callable[[float, str], Segment]) -> None:
     """Print the section; `sail` gives a trial of so many seconds under a noise of that name."""
     short, long, white = sail(SECONDS, "paper"), sail(HOUR, "paper"), sail(SECONDS, "white")
     ours = _ours(white)
@@ -60,7 +66,7 @@ def _met(met: bool) -> str:
     return "met" if met else "**missed**"
 
 
-def _ours(trial: Trial) -> OutputError:
+def _ours(trial: Segment) -> OutputError:
     return fit(pose([trial], ship_model("burylin"), nuisance=Nuisance.none()), waves=False)
 
 
@@ -69,14 +75,14 @@ def _stds(ours: OutputError) -> FloatArray:
     return np.sqrt(np.diag(np.linalg.inv(ours.minimum.information[:count, :count])))
 
 
-def peer(trial: Trial, ours: OutputError) -> FloatArray:
+def peer(trial: Segment, ours: OutputError) -> FloatArray:
     """The nine coefficients and the first three states, found the straightforward way."""
     problem, dt = ours.problem, trial.dt_secs
     delta, rpm = trial.signals["rudder"], trial.signals["rpm"]
     slope = np.append(np.diff(delta), 0.0) / dt
     time, alphas = trial.signals.time_secs - trial.signals.time_secs[0], problem.values[9:]
-    weights = 1 / ours.spreads[0].effective
-    start = starts(problem, first_spreads(problem))[0][:12]  # as ours begins
+    weights = 1 / ours.residual_stds[0].effective
+    start = starts(problem, first_residual_stds(problem))[0][:12]  # as ours begins
     known = np.isfinite(problem.measured(0))
 
     def simulated(z: FloatArray) -> FloatArray:

@@ -7,14 +7,14 @@ from pathlib import Path
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import Channel, LogWriter, TrialLog, load_vessel
-from shiplog.ships.paper import INPUTS, OUTPUTS
+from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
 
 from .measure import SkippedError
 
-NAMES = (*OUTPUTS, *INPUTS)
+NAMES = (*PAPER_OUTPUTS, *PAPER_INPUTS)
 RATE_HZ = 10.0
 _BYTES_PER_HOUR = 4.4e6  # of such a log; a little more than it takes
-_SLAB_SECS = 3600.0  # of a log that is written piece by piece
+_CHUNK_SECS = 3600.0  # of a log that is written piece by piece
 
 
 def day_of_trial(hours: float) -> TrialLog:
@@ -34,13 +34,13 @@ def write_repeated(day: TrialLog, hours: float, path: Path) -> Path:
     Written in pieces, so that its length does not show in the memory taken.
     """
     length = len(day["yaw_rate"]) - 1  # the last sample of a day is the first of the next
-    slab, whole = int(_SLAB_SECS * RATE_HZ), round(3600 * hours * RATE_HZ)
+    chunk, whole = int(_CHUNK_SECS * RATE_HZ), round(3600 * hours * RATE_HZ)
     period_ns = round(length / RATE_HZ * 1e9)
     with LogWriter(path, metadata=day.metadata, vessel_toml=day.vessel_toml) as writer:
         at = 0
         while at < whole:
             days, first = divmod(at, length)
-            count = min(slab, length - first, whole - at)
+            count = min(chunk, length - first, whole - at)
             writer.write(*(_part(channel, first, count, days * period_ns) for channel in day))
             at += count
     return path

@@ -22,7 +22,7 @@ import rerun as rr
 from mcap.reader import make_reader
 from scipy.linalg import expm
 
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from shiplog import Signals
 from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
@@ -121,11 +121,11 @@ def on_one_clock(columns: dict[str, tuple[list[float], list[float]]]) -> Signals
     return Signals(round(start * 1e9), DT, values)
 
 
-def noise_of(signals: Signals) -> Noise:
+def noise_of(signals: Signals) -> NoiseModel:
     """White noise shows in the third differences; the paper's ratio."""
     outputs = np.column_stack((signals["yaw_rate"], signals["speed"]))
     stds = np.std(np.diff(outputs, 3, axis=0), axis=0) / np.sqrt(20)
-    return Noise(stds, np.full(2, 0.01 / 400))
+    return NoiseModel(stds, np.full(2, 0.01 / 400))
 
 
 def observe(signals: Signals, c: Coefficients) -> FloatArray:

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 STAGES = {
     # stage: the modules whose time is its own; of the others it is their caller's
     "read": ("reader", "log_file", "scan", "messages", "mcap_summary"),
-    "check": ("survey", "quality", "stuck", "doubts", "rudder_sign", "gyro_bias"),
+    "check": ("log_stats", "quality", "stuck", "doubts", "rudder_sign", "gyro_bias"),
     "one clock": ("clock", "inputs"),
-    "gauge": ("gauge", "first_model"),
+    "signal_stats": ("signal_stats", "first_model"),
     "filter": ("pseudo_input", "three_state", "smoother", "tuning", "residuals"),
     "disturbance": ("disturbance", "ship_observer"),
     "coefficients": ("weak_form", "sliding", "identification", "two_stack", "newey_west"),

@@ -186,13 +186,13 @@ def _draw(found: dict[str, IdentifiedShip], path: Path) -> None:
         1, 3, figsize=(11, 3.9), constrained_layout=True, width_ratios=(1.25, 1, 1)
     )
     measured = _circle(found["MARIN"])
-    time = measured.trial.signals.time_secs
+    time = measured.segment.signals.time_secs
     length = VESSEL.length or 1.0
     until = int(np.searchsorted(time, 1000.0))
     grey = {"color": "#8d99ae", "lw": 4, "label": "measured"}
     track.plot(*(measured.measured_track[:until, ::-1].T / length), **grey)
-    rate.plot(time[:until], np.degrees(measured.trial.measured[:until, 0]), **grey)
-    speed.plot(time[:until], measured.trial.measured[:until, 1], **grey)
+    rate.plot(time[:until], np.degrees(measured.segment.measured[:until, 0]), **grey)
+    speed.plot(time[:until], measured.segment.measured[:until, 1], **grey)
     for said, each in found.items():
         line = {"color": colours[said], "lw": 1.4, "label": f"from {said}'s zig-zags"}
         if said == "both":

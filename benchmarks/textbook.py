@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from shiplog import Signals
 from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
@@ -44,7 +44,7 @@ class Input(NamedTuple):
     n_dot: float
 
 
-def filter_in_numpy(signals: Signals, c: Coefficients, noise: Noise) -> Filtered:
+def filter_in_numpy(signals: Signals, c: Coefficients, noise: NoiseModel) -> Filtered:
     """Correct, store, predict."""
     x, P, F, Q, R, measured = design(signals, c, noise)
     dt, count = signals.dt_secs, len(measured)
@@ -72,7 +72,7 @@ def filter_in_numpy(signals: Signals, c: Coefficients, noise: Noise) -> Filtered
     return found
 
 
-def design(signals: Signals, c: Coefficients, noise: Noise) -> Design:
+def design(signals: Signals, c: Coefficients, noise: NoiseModel) -> Design:
     """Start, matrices and measurements."""
     dt, r = signals.dt_secs, noise.measurement_std**2
     measured = np.column_stack([signals["yaw_rate"], signals["speed"]])

@@ -3,7 +3,7 @@
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from shiplog import Signals
 from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
@@ -25,7 +25,7 @@ class ShipFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy has no
         self.x = runge_kutta(self.c, self.x, u, self.dt)
 
 
-def filter_in_filterpy(signals: Signals, c: Coefficients, noise: Noise) -> Filtered:
+def filter_in_filterpy(signals: Signals, c: Coefficients, noise: NoiseModel) -> Filtered:
     """Update, store, predict."""
     ship = ShipFilter(c, signals.dt_secs)
     ship.x, ship.P, ship.F, ship.Q, ship.R, measured = design(signals, c, noise)

@@ -23,7 +23,7 @@ from analysis.filters.wave_fit import Wave
 from analysis.replay.replay import Analysis, analyse
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
-from recorders.simulated.trajectory import Gust, Unrest, WaveMoment
+from recorders.simulated.trajectory import Gust, RandomForcing, WaveMoment
 from shiplog import Channel, TrialLog, Vessel, load_vessel, read
 from shiplog.ships.paper import rudder_effect
 from shiplog.tables.foreign import read_table
@@ -188,7 +188,7 @@ def truth_of(log: str) -> TrialLog:
 # ---- a ship pushed at random
 
 
-UNREST = Unrest(rudder=radians(1.0), force=2e-3)
+UNREST = RandomForcing(rudder=radians(1.0), force=2e-3)
 
 
 def pushed() -> None:
@@ -197,8 +197,8 @@ def pushed() -> None:
     say("## A ship pushed at random: is the doubt what it says?")
     say(
         f"{len(SEEDS)} zig-zags 20/20 under white sensor noise, of a ship that gusts and sea push"
-        " at random (`--unrest 1,2`: a white yaw moment whose mean over a second is worth 1° of"
-        " rudder, a white surge force of 2 mm/s²). The filters are told how much:"
+        " at random (`--random-forcing 1,2`: a white yaw moment whose mean over a second is worth"
+        " 1° of rudder, a white surge force of 2 mm/s²). The filters are told how much:"
         f" `filter.yaw_bandwidth` = {number(yaw, 3)}, `filter.surge_bandwidth` ="
         f" {number(surge, 3)} rad/s; the pseudo-input filter, which has no such noise, takes its"
         " ratio from the log. Errors are in units of the extended filter's. The last columns are"
@@ -209,7 +209,7 @@ def pushed() -> None:
     runs = [
         simulate(
             VESSEL, "zigzag-20-20", duration_secs=300.0, seed=seed, sensors=suite("white"),
-            unrest=UNREST,
+            random_forcing=UNREST,
         )
         for seed in SEEDS
     ]  # fmt: skip
@@ -265,12 +265,12 @@ def excerpt(trial: SimulatedTrial) -> None:
 
 @cache
 def bandwidths() -> tuple[float, float]:
-    """What the unrest is to the filters: (q / R)^(1/4) and (q / R)^(1/2)."""
+    """What the random_forcing is to the filters: (q / R)^(1/4) and (q / R)^(1/2)."""
     c, rpm = VESSEL.coefficients, VESSEL.approach_rpm
     per_rudder = c.d * rudder_effect(c, sqrt(c.h * rpm / -c.g), rpm)
     trial = simulate(VESSEL, "zigzag-20-20", duration_secs=300.0, sensors=suite("white"))
     found = analyse(log_of(trial))
-    R = found.noise.measurement_std**2 * found.usual.interval_secs
+    R = found.noise.measurement_std**2 * found.stats.interval_secs
     q = np.array([(per_rudder * UNREST.rudder) ** 2, UNREST.force**2])
     yaw, surge = q / R
     return float(yaw**0.25), float(surge**0.5)
@@ -342,7 +342,12 @@ WAVE = Wave(frequency=0.6, damping=0.1, std=radians(0.02), evidence=nan)
 def waves() -> None:
     """A wave on the gyro, told from the turning and not."""
     trial = simulate(
-        VESSEL, "zigzag-20-20", duration_secs=600.0, seed=5, sensors=suite("white"), unrest=UNREST
+        VESSEL,
+        "zigzag-20-20",
+        duration_secs=600.0,
+        seed=5,
+        sensors=suite("white"),
+        random_forcing=UNREST,
     )
     log = log_of(trial)
     gyro = log["yaw_rate"]
@@ -381,7 +386,7 @@ def waves() -> None:
 
 
 def told() -> Settings:
-    """The bandwidths that the unrest is worth."""
+    """The bandwidths that the random_forcing is worth."""
     yaw, surge = bandwidths()
     return {"filter.yaw_bandwidth": yaw, "filter.surge_bandwidth": surge}
 

@@ -23,12 +23,12 @@ def record(
     source: Source,
     path: str | os.PathLike[str],
     *,
-    on_slab: Callable[[int], None] = lambda _: None,
+    on_chunk: Callable[[int], None] = lambda _: None,
 ) -> Recorded:
     """Write all that `source` yields to `path`.
 
-    `on_slab` is told the samples written so far. While recording, the log grows beside its final
-    name with `.part` behind it, readable up to the last slab even if the process is killed. Ctrl-C
+    `on_chunk` is told the samples written so far. While recording, the log grows beside its final
+    name with `.part` behind it, readable up to the last chunk even if the process is killed. Ctrl-C
     ends the recording, not the log. If the source fails, what was received stays in the `.part`
     file, finished, and the error says so; `path` then is as it was before.
     """
@@ -45,10 +45,10 @@ def record(
     writer = LogWriter(part, metadata=source.metadata, vessel_toml=source.vessel_toml)
     try:
         with writer:
-            for slab in source.slabs():
-                writer.write(*slab)
+            for chunk in source.chunks():
+                writer.write(*chunk)
                 writer.flush()
-                on_slab(writer.samples)
+                on_chunk(writer.samples)
     except KeyboardInterrupt:
         interrupted = True
     except ShiplogError as error:

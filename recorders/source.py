@@ -19,6 +19,6 @@ class Source(Protocol):
         """The vessel file to keep with the log, if the source knows one."""
         ...
 
-    def slabs(self) -> Iterator[tuple[Channel, ...]]:
-        """What was received, slab by slab, each later than the one before."""
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
+        """What was received, chunk by chunk, each later than the one before."""
         ...

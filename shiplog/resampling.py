@@ -11,7 +11,7 @@ from math import floor, inf
 
 import numpy as np
 
-from shiplog.checks.channel_stats import ChannelSurvey, Survey, survey_log
+from shiplog.checks.channel_stats import ChannelStats, LogStats, compute_log_stats
 from shiplog.checks.interpolate import known_samples
 
 from .errors import LogError, UsageError
@@ -20,7 +20,7 @@ from .units import CATALOGUE
 
 MAX_SAMPLES = 20_000_000  # of a grid that hardly anything stands on: beyond it the times are wrong
 SPARSEST = 20  # instants of such a grid to a sample
-MOST_INSTANTS = 1 << 18  # of a slab: a silence of days comes in several
+MOST_INSTANTS = 1 << 18  # of a chunk: a silence of days comes in several
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Clock:
     start_ns: int
     dt_secs: float
     count: int
-    channels: Mapping[str, ChannelSurvey]
+    channels: Mapping[str, ChannelStats]
 
     @property
     def end_ns(self) -> int:
@@ -54,13 +54,13 @@ def resample(
     channels have no time in common.
     """
     return joined(
-        on_clock(log.slabs(), set_clock(log, survey_log(log), dt_secs, channels, optional))
+        on_clock(log.chunks(), set_clock(log, compute_log_stats(log), dt_secs, channels, optional))
     )
 
 
 def set_clock(
     log: Log,
-    found: Survey,
+    found: LogStats,
     dt_secs: float | None = None,
     channels: tuple[str, ...] | None = None,
     optional: tuple[str, ...] = (),
@@ -87,17 +87,17 @@ def set_clock(
     return Clock(start_ns, dt, int(steps) + 1, used | also)
 
 
-def on_clock(slabs: Iterable[tuple[Channel, ...]], clock: Clock) -> Iterator[Signals]:
-    """A log that comes in slabs on the clock, in consecutive slabs from first instant to last.
+def on_clock(chunks: Iterable[tuple[Channel, ...]], clock: Clock) -> Iterator[Signals]:
+    """A log that comes in chunks on the clock, in consecutive chunks from first instant to last.
 
-    The slabs that come must follow one another in the order of reception.
+    The chunks that come must follow one another in the order of reception.
     """
     placing = {name: _placing(channel, clock) for name, channel in clock.channels.items()}
     done, received_ns = 0, np.iinfo(np.int64).min
-    for slab in slabs:
-        received_ns = max([received_ns, *(int(c.received_ns.max()) for c in slab if len(c))])
+    for chunk in chunks:
+        received_ns = max([received_ns, *(int(c.received_ns.max()) for c in chunk if len(c))])
         for place in placing.values():
-            place.add(slab)
+            place.add(chunk)
         ready = min(place.ready(received_ns) for place in placing.values())
         while done < ready:
             end = min(done + MOST_INSTANTS, ready)
@@ -106,7 +106,7 @@ def on_clock(slabs: Iterable[tuple[Channel, ...]], clock: Clock) -> Iterator[Sig
             done = end
 
 
-def _require_samples(log: Log, name: str, channel: ChannelSurvey) -> None:
+def _require_samples(log: Log, name: str, channel: ChannelStats) -> None:
     if channel.fields:
         raise UsageError(
             f"channel {name!r} has components ({', '.join(channel.fields)}), "
@@ -122,7 +122,7 @@ def _require_samples(log: Log, name: str, channel: ChannelSurvey) -> None:
         )
 
 
-def _common_span(log: Log, channels: list[ChannelSurvey]) -> tuple[int, int]:
+def _common_span(log: Log, channels: list[ChannelStats]) -> tuple[int, int]:
     """From where all are known, on a sample of the first, to where the inputs cease."""
     begun = max(channel.known_span_ns[0] for channel in channels)
     inputs: list[int] = []
@@ -138,10 +138,10 @@ def _common_span(log: Log, channels: list[ChannelSurvey]) -> tuple[int, int]:
     return start, end
 
 
-def _first_sample(log: Log, leader: ChannelSurvey, begun: int) -> int:
+def _first_sample(log: Log, leader: ChannelStats, begun: int) -> int:
     """The first instant from `begun` on at which something was measured; `begun` if never."""
-    for slab in log.slabs():
-        channel = leader.of(slab)
+    for chunk in log.chunks():
+        channel = leader.of(chunk)
         if channel is not None:
             known = channel.measured_ns[np.isfinite(channel.values)]
             if np.any(known >= begun):
@@ -149,7 +149,7 @@ def _first_sample(log: Log, leader: ChannelSurvey, begun: int) -> int:
     return begun
 
 
-def _placing(channel: ChannelSurvey, clock: Clock) -> "_Binning | _Interpolation":
+def _placing(channel: ChannelStats, clock: Clock) -> "_Binning | _Interpolation":
     kind = CATALOGUE.get(channel.name)
     between = kind is not None and (kind.commanded or kind.circular)
     return (_Interpolation if between else _Binning)(channel, clock)
@@ -158,14 +158,14 @@ def _placing(channel: ChannelSurvey, clock: Clock) -> "_Binning | _Interpolation
 class _Placing:
     """Known samples of a channel on their way to the clock."""
 
-    def __init__(self, channel: ChannelSurvey, clock: Clock) -> None:
+    def __init__(self, channel: ChannelStats, clock: Clock) -> None:
         self._channel, self._clock = channel, clock
         self._times, self._values = np.zeros(0), np.zeros(0)  # that are not done with
         self._seen = 0
 
-    def add(self, slab: tuple[Channel, ...]) -> None:
+    def add(self, chunk: tuple[Channel, ...]) -> None:
         """Take the next samples."""
-        channel = self._channel.of(slab)
+        channel = self._channel.of(chunk)
         if channel is not None:
             times, values = known_samples(channel, self._clock.start_ns)
             if not ascending(times):
@@ -217,7 +217,7 @@ class _Binning(_Placing):
 class _Interpolation(_Placing):
     """Linear between samples, NaN inside a gap and beyond the ends."""
 
-    def __init__(self, channel: ChannelSurvey, clock: Clock) -> None:
+    def __init__(self, channel: ChannelStats, clock: Clock) -> None:
         super().__init__(channel, clock)
         self._last, self._turns = 0.0, 0.0  # of angles: the last, and the full turns so far
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import LogError
 from .units import did_you_mean
 
-SLAB_SAMPLES = 1 << 16  # of the fastest channel, about: what fits the processor's cache
+CHUNK_SAMPLES = 1 << 16  # of the fastest channel, about: what fits the processor's cache
 
 FloatArray = NDArray[np.floating[Any]]
 TimeArray = NDArray[np.int64]
@@ -98,7 +98,7 @@ class Named(Protocol):
 C_co = TypeVar("C_co", bound=Named, covariant=True)
 
 
-class ByName(Generic[C_co]):
+class ChannelsByName(Generic[C_co]):
     """Channels, or what is said of them, found by name.
 
     `log["yaw_rate"]` is the first source of that quantity in the file, `log["yaw_rate/gyro"]`
@@ -163,15 +163,15 @@ class Log(Protocol):
     @property
     def data_lost(self) -> bool: ...  # noqa: D102
 
-    def slabs(self) -> Iterator[tuple[Channel, ...]]:
-        """The samples in slabs, those of each topic in the order in which they were received."""
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
+        """The samples in chunks, those of each topic in the order in which they were received."""
 
     def preferring(self, sources: Mapping[str, str]) -> Self:
         """The same log with one source only for each name given, the one given."""
 
 
 @dataclass(frozen=True, eq=False)
-class TrialLog(ByName[Channel]):
+class TrialLog(ChannelsByName[Channel]):
     """A recorded trial, as it was: each channel with its own times."""
 
     name: str
@@ -196,12 +196,12 @@ class TrialLog(ByName[Channel]):
         others = [channel for channel in self.channels if channel.name not in sources]
         return replace(self, channels=(*preferred, *others))
 
-    def slabs(self) -> Iterator[tuple[Channel, ...]]:
-        """The samples in slabs of some hours, each channel cut at the same times of reception."""
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
+        """The samples in chunks of some hours, each channel cut at the same times of reception."""
         leader = max(self.channels, key=len, default=None)
-        times = [] if leader is None else leader.received_ns[SLAB_SAMPLES::SLAB_SAMPLES].tolist()
+        times = [] if leader is None else leader.received_ns[CHUNK_SAMPLES::CHUNK_SAMPLES].tolist()
         if not all(ascending(c.received_ns) and ascending(c.measured_ns) for c in self.channels):
-            times = []  # in no order: one slab
+            times = []  # in no order: one chunk
         cuts = [[0, *np.searchsorted(c.received_ns, times), len(c)] for c in self.channels]
         for number in range(len(times) + 1):
             yield tuple(
@@ -243,7 +243,7 @@ def one_channel(parts: Sequence[Channel]) -> Channel:
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """Channels on one uniform clock, or a slab of them. NaN: not measured.
+    """Channels on one uniform clock, or a chunk of them. NaN: not measured.
 
     Sample k was at `start_ns` + (first + k)·dt.
     """
@@ -251,7 +251,7 @@ class Signals:
     start_ns: int
     dt_secs: float
     values: Mapping[str, FloatArray]  # each (n,)
-    first: int = 0  # the number of the slab's first sample
+    first: int = 0  # the number of the chunk's first sample
 
     def __post_init__(self) -> None:
         views = {name: frozen(values, np.float64) for name, values in self.values.items()}
@@ -285,8 +285,8 @@ class Signals:
         return replace(self, values=values, first=self.first + start)
 
 
-def joined(slabs: Iterable[Signals]) -> Signals:
-    """Consecutive slabs, one at least, as one."""
-    parts = list(slabs)
+def joined(chunks: Iterable[Signals]) -> Signals:
+    """Consecutive chunks, one at least, as one."""
+    parts = list(chunks)
     values = {name: np.concatenate([part[name] for part in parts]) for name in parts[0].values}
     return replace(parts[0], values=values)

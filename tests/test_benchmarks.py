@@ -242,4 +242,4 @@ def test_the_straightforward_fit_finds_what_ours_does() -> None:
     z = ours.minimum.unknowns.copy()
     z[:12] = identification_speed.peer(trial, ours)
     apart = ours.problem.predicted(z, 0) - ours.problem.predicted(ours.minimum.unknowns, 0)
-    assert np.max(np.abs(apart / ours.spreads[0].usual)) < 0.2  # of the noise of one sample
+    assert np.max(np.abs(apart / ours.residual_stds[0].usual)) < 0.2  # of the noise of one sample

@@ -122,11 +122,11 @@ def test_a_gust_and_a_wave_are_put_into_the_simulation() -> None:
 
 def test_an_unrest_is_put_into_the_simulation_in_degrees_and_millimetres() -> None:
     simulate = "record simulate pull-out --duration 900 --noise none -o u.mcap --truth t.mcap"
-    assert main([*simulate.split(), "--unrest", "0.5,8"]) == FINE
+    assert main([*simulate.split(), "--random-forcing", "0.5,8"]) == FINE
     force = read("t.mcap")["surge_disturbance"].values[:9000].reshape(-1, 10).mean(axis=1)
     assert force.std() == pytest.approx(8e-3, rel=0.1)
     both = read("t.mcap")["yaw_disturbance"].values
-    assert main([*simulate.split(), "--unrest=0.5"]) == FINE
+    assert main([*simulate.split(), "--random-forcing=0.5"]) == FINE
     assert np.array_equal(read("t.mcap")["yaw_disturbance"].values, both)
     assert not read("t.mcap")["surge_disturbance"].values.any()
 
@@ -156,7 +156,7 @@ def test_a_damaged_log_replays_but_says_that_data_were_lost(
     zigzag: SimulatedTrial, capsys: pytest.CaptureFixture[str]
 ) -> None:
     writer = LogWriter("bad.mcap", vessel_toml=zigzag.vessel_toml)
-    for slab in zigzag.slabs():
+    for chunk in zigzag.chunks():
         for start in range(0, 5001, 1000):
             cut = slice(start, start + 1000)
             writer.write(
@@ -165,7 +165,7 @@ def test_a_damaged_log_replays_but_says_that_data_were_lost(
                         c.name, c.source, c.unit, c.measured_ns[cut], c.received_ns[cut],
                         c.values[cut], c.fields,
                     )
-                    for c in slab
+                    for c in chunk
                 )
             )  # fmt: skip
             writer.flush()
@@ -310,14 +310,14 @@ def test_an_unwritable_output_is_refused(
         "record simulate spiral --gust=2@-5 -o x.mcap",
         "record simulate spiral --gust=2@1e9 -o x.mcap",
         "record simulate spiral --gust=2@10+-3 -o x.mcap",
-        "record simulate spiral --unrest much -o x.mcap",
-        "record simulate spiral --unrest=0.2, -o x.mcap",
-        "record simulate spiral --unrest=0.2,5,1 -o x.mcap",
-        "record simulate spiral --unrest= -o x.mcap",
-        "record simulate spiral --unrest=-0.2 -o x.mcap",
-        "record simulate spiral --unrest=0.2,-5 -o x.mcap",
-        "record simulate spiral --unrest=nan -o x.mcap",
-        "record simulate spiral --unrest=1e999 -o x.mcap",
+        "record simulate spiral --random-forcing much -o x.mcap",
+        "record simulate spiral --random-forcing=0.2, -o x.mcap",
+        "record simulate spiral --random-forcing=0.2,5,1 -o x.mcap",
+        "record simulate spiral --random-forcing= -o x.mcap",
+        "record simulate spiral --random-forcing=-0.2 -o x.mcap",
+        "record simulate spiral --random-forcing=0.2,-5 -o x.mcap",
+        "record simulate spiral --random-forcing=nan -o x.mcap",
+        "record simulate spiral --random-forcing=1e999 -o x.mcap",
         "record simulate spiral --sensor yaw_rate.spikes=2 -o x.mcap",
         "record simulate spiral --sensor yaw_rate.spikes=0.1 -o x.mcap",
         "record simulate spiral --seed=-1 -o x.mcap",

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from analysis.filters.base import STATES
-from analysis.regression.coefficients import Identification
+from analysis.regression.coefficients import CoefficientFit
 from analysis.regression.sliding import History
 from analysis.replay.replay import Analysis
 from shiplog import Channel, TrialLog
-from shiplog.ships.paper import COEFFICIENT_UNITS, OUTPUTS
+from shiplog.ships.paper import COEFFICIENT_UNITS, PAPER_OUTPUTS
 from shiplog.types import FloatArray, TimeArray
 
 BLOCK_SECS = 4.0
@@ -81,7 +81,7 @@ def _assumed(analysis: Analysis) -> Iterator[Channel]:
     for name, value in analysis.vessel.paper._asdict().items():
         yield _single(analysis, name, "model", value)
     noise = analysis.noise
-    for i, name in enumerate(OUTPUTS):
+    for i, name in enumerate(PAPER_OUTPUTS):
         yield _single(analysis, f"{name}_noise", "assumed", float(noise.measurement_std[i]))
         yield _single(analysis, f"{name}_ratio", "assumed", float(noise.process_ratio[i]))
 
@@ -91,7 +91,7 @@ def _estimated(analysis: Analysis) -> Iterator[Channel]:
     for i, name in enumerate(STATES):
         yield _blocks(analysis, name, "estimate", estimates.states[:, i])
         yield _blocks(analysis, name, "std", estimates.stds[:, i])
-    for i, name in enumerate(OUTPUTS):
+    for i, name in enumerate(PAPER_OUTPUTS):
         yield _blocks(analysis, name, "innovation", estimates.innovations[:, i])
         judged = analysis.residuals[i]
         yield _single(analysis, f"{name}_rms", "verdict", judged.rms)
@@ -104,7 +104,7 @@ def _estimated(analysis: Analysis) -> Iterator[Channel]:
         yield _single(analysis, f"{kind}_disturbance", "std", course.std)
 
 
-def _identified(analysis: Analysis, found: Identification, history: History) -> Iterator[Channel]:
+def _identified(analysis: Analysis, found: CoefficientFit, history: History) -> Iterator[Channel]:
     at = history.time_secs
     for i, (name, whole) in enumerate(found.coefficients.items()):
         yield _single(analysis, name, "whole", whole.value)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.signals.signal_stats import Gauge
+from analysis.signals.signal_stats import SignalStats
 from shiplog.compiled import compiled
 from shiplog.ships.paper import (
     Coefficients,
@@ -69,9 +69,9 @@ def ship_observer(
     return ShipObserver(yaw, surge, turning, following, chord=model.wave is not None)
 
 
-def starting(observer: ShipObserver, usual: Gauge) -> ObserverState:
+def starting(observer: ShipObserver, stats: SignalStats) -> ObserverState:
     """The first values measured, and no disturbance."""
-    w, v = usual.first.tolist()
+    w, v = stats.first.tolist()
     moment, force = (np.zeros(each.mean.shape[1]) for each in (observer.yaw, observer.surge))
     return ObserverState(w, 0.0, v, moment, force, (0.0, 0.0))
 
@@ -87,7 +87,7 @@ def observe(
     n: FloatArray,
     dt: float,
 ) -> tuple[FloatArray, ObserverState]:
-    """Rows of v, yaw's slow part and wave, surge's likewise, (5, n), and the next slab's start.
+    """Rows of v, yaw's slow part and wave, surge's likewise, (5, n), and the next chunk's start.
 
     `delta` and `n` are one longer than the rest.
     """

@@ -12,13 +12,13 @@ from math import degrees, inf, pi, sqrt
 
 import numpy as np
 
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.signals.hold import last_inputs
 from analysis.signals.moments import Moments
-from analysis.signals.signal_stats import Gauge, gauge
-from shiplog.checks.quantiles import Thinned
+from analysis.signals.signal_stats import SignalStats, signal_stats
+from shiplog.checks.quantiles import Quantiles
 from shiplog.errors import UsageError
-from shiplog.ships.paper import INPUTS, Coefficients, rudder_effects, yaw_stiffness
+from shiplog.ships.paper import PAPER_INPUTS, Coefficients, rudder_effects, yaw_stiffness
 from shiplog.types import FloatArray, Signals
 from shiplog.vessel.settings import (
     DisturbanceSettings,
@@ -59,7 +59,7 @@ class Disturbance:
 
 
 @dataclass(frozen=True)
-class Course:
+class DisturbanceSummary:
     """A disturbance over a trial, its first transient left out.
 
     The standard deviation is what sensor noise leaves once an observer has settled, the ship
@@ -84,7 +84,7 @@ class Course:
 
 
 class ForceObserver:
-    """Observes a yaw moment and a surge force in slabs, each of the kinds that `settings` names.
+    """Observes a yaw moment and a surge force in chunks, each of the kinds that `settings` names.
 
     `wave_frequency`, rad/s, is needed where a wave is one of them. Where nothing is measured, a
     constant is held, a ramp goes on for a while (`design.force_observer`), a wave turns on. The
@@ -97,24 +97,24 @@ class ForceObserver:
     def __init__(
         self,
         model: Coefficients,
-        noise: Noise,
-        usual: Gauge,
+        noise: NoiseModel,
+        stats: SignalStats,
         settings: DisturbanceSettings = CONSTANT,
         wave_frequency: float | None = None,
     ) -> None:
         self._model = model
-        wanted = wanted_forces(settings, wave_frequency, usual)
-        turning = yaw_stiffness(model, usual.turning)
+        wanted = wanted_forces(settings, wave_frequency, stats)
+        turning = yaw_stiffness(model, stats.turning)
         yaw = force_observer(yaw_plant(model, turning), *wanted["yaw"])
-        surge = force_observer(surge_plant(model, usual.ahead), *wanted["surge"])
+        surge = force_observer(surge_plant(model, stats.ahead), *wanted["surge"])
         forces = yaw.force, surge.force
         self._observer = ship_observer(model, turning, *forces, *wanted["yaw"])
-        self._state = starting(self._observer, usual)
+        self._state = starting(self._observer, stats)
         # a ship without way has a rudder that does nothing: its angle is then not a number
-        self._least_steering = 1e-3 * abs(model.d) * usual.steering
-        self._steering = Thinned()
+        self._least_steering = 1e-3 * abs(model.d) * stats.steering
+        self._steering = Quantiles()
         self._stds: dict[str, float] = {}
-        self._courses: dict[str, _CourseWatch] = {}
+        self._courses: dict[str, _SummaryCollector] = {}
         names = ("yaw", "rudder", "surge", "yaw_wave", "surge_wave")
         for name in names:
             output, design = (1, surge) if name.startswith("surge") else (0, yaw)
@@ -122,19 +122,19 @@ class ForceObserver:
                 continue
             std = design.stds[int(name.endswith("wave"))]
             self._stds[name] = float(std * noise.measurement_std[output])
-            watch = _CourseWatch(design.settling_secs, usual.count, usual.dt_secs)
+            watch = _SummaryCollector(design.settling_secs, stats.count, stats.dt_secs)
             self._courses[name] = watch
 
-    def step(self, slab: Signals, following: Mapping[str, float]) -> Disturbance:
-        """Observe the next slab; `following` are the inputs at the instant after it."""
-        delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
+    def step(self, chunk: Signals, following: Mapping[str, float]) -> Disturbance:
+        """Observe the next chunk; `following` are the inputs at the instant after it."""
+        delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
         rows, self._state = observe(
-            self._model, self._observer, self._state, slab["yaw_rate"], slab["speed"], delta, n,
-            slab.dt_secs,
+            self._model, self._observer, self._state, chunk["yaw_rate"], chunk["speed"], delta, n,
+            chunk.dt_secs,
         )  # fmt: skip
         rows[~(np.abs(rows) < LOST)] = np.nan
         v, yaw, yaw_wave, surge, surge_wave = rows
-        steering = self._model.d * rudder_effects(self._model, v, slab["rpm"])
+        steering = self._model.d * rudder_effects(self._model, v, chunk["rpm"])
         self._steering.add(np.abs(steering))
         works = np.abs(steering) > self._least_steering
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -150,7 +150,7 @@ class ForceObserver:
             watch.add(getattr(found, name))
         return found
 
-    def result(self) -> dict[str, Course]:
+    def result(self) -> dict[str, DisturbanceSummary]:
         """What was observed, once all was: `yaw`, `rudder`, `surge`, and the waves asked for."""
         usual = self._steering.median()
         stds = self._stds | {"rudder": self._stds["yaw"] / usual if usual > 0 else np.nan}
@@ -163,17 +163,17 @@ class ForceObserver:
 def observe_disturbance(
     signals: Signals,
     model: Coefficients,
-    noise: Noise,
+    noise: NoiseModel,
     settings: DisturbanceSettings = CONSTANT,
     wave_frequency: float | None = None,
-) -> tuple[Disturbance, dict[str, Course]]:
+) -> tuple[Disturbance, dict[str, DisturbanceSummary]]:
     """The disturbance in signals that are all there, and what comes of it; as `ForceObserver`."""
-    observing = ForceObserver(model, noise, gauge(signals, model), settings, wave_frequency)
+    observing = ForceObserver(model, noise, signal_stats(signals, model), settings, wave_frequency)
     found = observing.step(signals, last_inputs(signals))
     return found, observing.result()
 
 
-class _CourseWatch:
+class _SummaryCollector:
     """Looks at one disturbance as it is observed."""
 
     def __init__(self, settling_secs: float, count: int, dt: float) -> None:
@@ -191,10 +191,10 @@ class _CourseWatch:
         self._skipped = max(self._skipped - len(values), 0)
         self._last = np.concatenate((self._last, values))[-self._tail :]
 
-    def result(self, std: float, unit: str) -> Course:
+    def result(self, std: float, unit: str) -> DisturbanceSummary:
         """What all of them come to."""
         settled, last = self._settled, self._last[np.isfinite(self._last)]
-        return Course(
+        return DisturbanceSummary(
             unit=unit,
             mean=settled.mean,
             rms=float(np.sqrt(settled.mean_square)),
@@ -207,7 +207,7 @@ class _CourseWatch:
 
 
 def wanted_forces(
-    settings: DisturbanceSettings, wave_frequency: float | None, usual: Gauge
+    settings: DisturbanceSettings, wave_frequency: float | None, stats: SignalStats
 ) -> dict[str, tuple[ForceModel, Sampling]]:
     """What is to be observed in `yaw` and in `surge`, and of what samples.
 
@@ -219,33 +219,33 @@ def wanted_forces(
         raise UsageError("; ".join(faults))
     degree = 1 if "ramp" in settings.models else 0 if "constant" in settings.models else None
     wave = _wave(wave_frequency) if "wave" in settings.models else None
-    blind = _blind(wave, usual) if wave is not None else ()
+    blind = _blind(wave, stats) if wave is not None else ()
     wanted = {}
     frequencies = {"yaw": settings.yaw_frequency, "surge": settings.surge_frequency}
     for output, (name, frequency) in enumerate(frequencies.items()):
-        interval = float(usual.interval_secs[output])
-        longest = float(usual.longest_steps[output]) * usual.dt_secs
+        interval = float(stats.interval_secs[output])
+        longest = float(stats.longest_steps[output]) * stats.dt_secs
         model = ForceModel(degree, wave, settings.spectrum, frequency)
         if name in blind and len(blind) < len(frequencies):
             model = ForceModel(degree or 0, None, settings.spectrum, frequency)
         _require_told(name, model, interval)
-        wanted[name] = model, Sampling(interval, longest, usual.dt_secs)
+        wanted[name] = model, Sampling(interval, longest, stats.dt_secs)
     return wanted
 
 
-def blindness(wave_frequency: float, usual: Gauge) -> list[str]:
+def blindness(wave_frequency: float, stats: SignalStats) -> list[str]:
     """Where a wave is not observed because the sensor is too slow for it, in words."""
     return [
         f"no wave is observed in {name}: samples every {secs:.3g} s show none of "
         f"{wave_frequency:.3g} rad/s"
-        for name, secs in zip(("yaw", "surge"), usual.interval_secs, strict=True)
-        if name in _blind(wave_frequency, usual)
+        for name, secs in zip(("yaw", "surge"), stats.interval_secs, strict=True)
+        if name in _blind(wave_frequency, stats)
     ]
 
 
-def _blind(wave: float, usual: Gauge) -> tuple[str, ...]:
+def _blind(wave: float, stats: SignalStats) -> tuple[str, ...]:
     """Of yaw and surge, whose samples do not show a wave."""
-    names = zip(("yaw", "surge"), usual.interval_secs, strict=True)
+    names = zip(("yaw", "surge"), stats.interval_secs, strict=True)
     return tuple(name for name, interval in names if wave * interval >= QUICKEST_WAVE)
 
 

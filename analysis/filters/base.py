@@ -41,24 +41,24 @@ class Trace:
 
 
 class Filter(Protocol):
-    """A filter that takes a trial in slabs; the inputs must be known throughout."""
+    """A filter that takes a trial in chunks; the inputs must be known throughout."""
 
     @property
     def outputs(self) -> FloatArray:
         """What is measured of its states: C, (2, s)."""
         ...
 
-    def step(self, slab: Signals, following: Mapping[str, float]) -> Estimates:
-        """Filter the next slab; `following` are the inputs at the instant after it."""
+    def step(self, chunk: Signals, following: Mapping[str, float]) -> Estimates:
+        """Filter the next chunk; `following` are the inputs at the instant after it."""
         ...
 
-    def trace(self, slab: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
+    def trace(self, chunk: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
         """As `step`, and how it came about."""
         ...
 
     def told(
         self,
-        slab: Signals,
+        chunk: Signals,
         following: Mapping[str, float],
         states: FloatArray,
         covariances: FloatArray,

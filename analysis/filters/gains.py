@@ -14,19 +14,19 @@ from analysis.design.observability import ComplexArray
 from analysis.design.quality import quality_filter
 from analysis.design.riccati import kalman_gain
 from analysis.design.shaping import augment_with_shaping, wave_filter
-from analysis.signals.signal_stats import Gauge
+from analysis.signals.signal_stats import SignalStats
 from shiplog.compiled import compiled
 from shiplog.ships.paper import Coefficients, yaw_stiffness
 from shiplog.types import FloatArray
 from shiplog.vessel.settings import FilterSettings
 
-from .noise_model import Noise
+from .noise_model import NoiseModel
 
 FORGETTING = 0.2  # of a wave's frequency: how fast its error decays, where poles are stated
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
+class LinearAxis:
     """x' = A x + G white noise of intensity Q, measured by C with white noise of intensity R."""
 
     A: FloatArray  # (k, k)
@@ -37,31 +37,33 @@ class Channel:
     interval_secs: float  # from sample to sample
 
 
-def channels(c: Coefficients, noise: Noise, usual: Gauge) -> tuple[Channel, Channel]:
+def channels(
+    c: Coefficients, noise: NoiseModel, stats: SignalStats
+) -> tuple[LinearAxis, LinearAxis]:
     """Yaw, of w, w' and the wave's two states if there is one, and surge, of v.
 
     Linear about the usual turning and the usual speed. Sampled noise of variance σ² is of the
     intensity σ² times the interval; the wave stands in the measurement.
     """
-    R = noise.measurement_std**2 * usual.interval_secs
+    R = noise.measurement_std**2 * stats.interval_secs
     q = noise.process_ratio * R
-    A = np.array([[0.0, 1.0], [yaw_stiffness(c, usual.turning), c.a]])
+    A = np.array([[0.0, 1.0], [yaw_stiffness(c, stats.turning), c.a]])
     G, C, Q = np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]]), q[:1, None]
     if noise.wave is not None:
         shaping = wave_filter(noise.wave.std**2, noise.wave.frequency, noise.wave.damping)
         whole = augment_with_shaping(A, G, C, np.ones(1), shaping, at="output", noise=G)
         A, G, C = whole.A, whole.G, whole.C
         Q = np.diag([q[0], 1.0])
-    surge = np.array([[2 * c.g * usual.ahead]])
+    surge = np.array([[2 * c.g * stats.ahead]])
     one = np.ones((1, 1))
-    yaw_secs, surge_secs = usual.interval_secs
+    yaw_secs, surge_secs = stats.interval_secs
     return (
-        Channel(A, G, C, Q, float(R[0]), float(yaw_secs)),
-        Channel(surge, one, one, q[1:, None], float(R[1]), float(surge_secs)),
+        LinearAxis(A, G, C, Q, float(R[0]), float(yaw_secs)),
+        LinearAxis(surge, one, one, q[1:, None], float(R[1]), float(surge_secs)),
     )
 
 
-def discrete_gain(settings: FilterSettings, channel: Channel) -> tuple[FloatArray, ComplexArray]:
+def discrete_gain(settings: FilterSettings, channel: LinearAxis) -> tuple[FloatArray, ComplexArray]:
     """The gain (k,) by which a sample corrects the state, and the poles (k,) from sample to sample.
 
     Raises `UsageError` where there is none.
@@ -71,7 +73,7 @@ def discrete_gain(settings: FilterSettings, channel: Channel) -> tuple[FloatArra
     return gain, np.exp(poles * channel.interval_secs)
 
 
-def _poles(settings: FilterSettings, channel: Channel) -> ComplexArray:
+def _poles(settings: FilterSettings, channel: LinearAxis) -> ComplexArray:
     """The continuous ones, 1/s."""
     A, G, C, Q = channel.A, channel.G, channel.C, channel.Q
     R = np.array([[channel.R]])

@@ -8,7 +8,7 @@ from .wave_fit import Wave
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class NoiseModel:
     """What the filter is told of noise.
 
     The process noise, as a share of the measurement's, is in the pseudo-input filter the paper's

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from analysis.design.discrete import discretise
 from analysis.design.pseudo_input_system import pseudo_input_matrices
-from analysis.signals.signal_stats import Gauge
+from analysis.signals.signal_stats import SignalStats
 from shiplog.compiled import compiled
 from shiplog.ships.paper import (
-    INPUTS,
-    OUTPUTS,
+    PAPER_INPUTS,
+    PAPER_OUTPUTS,
     Coefficients,
     rudder_effect,
     rudder_effect_rate,
@@ -25,7 +25,7 @@ from shiplog.vessel.settings import FilterSettings
 
 from .base import OUTPUT_STATES, STATES, Estimates, Trace
 from .kernels import BELIEVED, GATED, correct, propagate, weigh
-from .noise_model import Noise
+from .noise_model import NoiseModel
 
 
 class MotionState(NamedTuple):
@@ -39,7 +39,7 @@ class MotionState(NamedTuple):
 
 
 class PseudoInputFilter:
-    """The five-state model of the identification paper, filtering yaw rate and speed in slabs.
+    """The five-state model of the identification paper, filtering yaw rate and speed in chunks.
 
     The mean is propagated by the exact nonlinear derivative (A x + B u with corrected
     pseudo-inputs, `design.pseudo_input_matrices`), the covariance by A, as the paper has it. Where
@@ -49,30 +49,30 @@ class PseudoInputFilter:
     """
 
     def __init__(
-        self, model: Coefficients, noise: Noise, usual: Gauge, settings: FilterSettings
+        self, model: Coefficients, noise: NoiseModel, stats: SignalStats, settings: FilterSettings
     ) -> None:
         A, _ = pseudo_input_matrices(model, 1.0)
         self.outputs = np.eye(len(STATES))[list(OUTPUT_STATES)]
         self._model, self._r, self._gate = model, noise.measurement_std**2, settings.gate
         self._jumps = not settings.as_printed
-        per_state = np.repeat(noise.process_ratio * self._r * usual.interval_secs, (3, 2))
-        F, Q = discretise(A, np.diag(per_state), usual.dt_secs)
+        per_state = np.repeat(noise.process_ratio * self._r * stats.interval_secs, (3, 2))
+        F, Q = discretise(A, np.diag(per_state), stats.dt_secs)
         self._F, self._Q = np.ascontiguousarray(F), np.ascontiguousarray(Q)
-        self._x, self._P = _start(model, usual)
-        self._off = np.zeros(len(OUTPUTS), np.int64)
+        self._x, self._P = _start(model, stats)
+        self._off = np.zeros(len(PAPER_OUTPUTS), np.int64)
         self._last_rate = np.zeros(1)  # of the rudder
 
-    def step(self, slab: Signals, following: Mapping[str, float]) -> Estimates:
-        """Filter the next slab; `following` are the inputs at the instant after it."""
-        return self._run(slab, following, keep=False)[0]
+    def step(self, chunk: Signals, following: Mapping[str, float]) -> Estimates:
+        """Filter the next chunk; `following` are the inputs at the instant after it."""
+        return self._run(chunk, following, keep=False)[0]
 
-    def trace(self, slab: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
+    def trace(self, chunk: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
         """As `step`, and how it came about."""
-        return self._run(slab, following, keep=True)
+        return self._run(chunk, following, keep=True)
 
     def told(
         self,
-        slab: Signals,  # noqa: ARG002 - the states are the filter's own
+        chunk: Signals,  # noqa: ARG002 - the states are the filter's own
         following: Mapping[str, float],  # noqa: ARG002
         states: FloatArray,
         covariances: FloatArray,
@@ -82,13 +82,13 @@ class PseudoInputFilter:
         return states, np.sqrt(np.maximum(variances, 0.0)), None
 
     def _run(
-        self, slab: Signals, following: Mapping[str, float], *, keep: bool
+        self, chunk: Signals, following: Mapping[str, float], *, keep: bool
     ) -> tuple[Estimates, Trace]:
-        measured = np.column_stack([slab[name] for name in OUTPUTS])
-        delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
+        measured = np.column_stack([chunk[name] for name in PAPER_OUTPUTS])
+        delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
         rows, innovations, gated, trace = _filter(
             self._model, self._x, self._P, self._F, self._Q, measured, self._r, self._gate,
-            self.outputs, delta, n, slab.dt_secs, self._last_rate, self._jumps, self._off, keep,
+            self.outputs, delta, n, chunk.dt_secs, self._last_rate, self._jumps, self._off, keep,
         )  # fmt: skip
         count = len(STATES)
         told = Estimates(
@@ -100,13 +100,13 @@ class PseudoInputFilter:
         return told, Trace(x, P, F, K, e, S)
 
 
-def _start(c: Coefficients, usual: Gauge) -> tuple[FloatArray, FloatArray]:
+def _start(c: Coefficients, stats: SignalStats) -> tuple[FloatArray, FloatArray]:
     """The first values measured, their rates from the model at rest; as unsure as they vary."""
-    w, v = usual.first
-    delta, n = (usual.head[name][0] for name in INPUTS)
+    w, v = stats.first
+    delta, n = (stats.head[name][0] for name in PAPER_INPUTS)
     w_ddot = yaw_acceleration_rate(c, w, 0.0, v, n, delta, 0.0)
     start = np.array([w, 0.0, w_ddot, v, surge_acceleration(c, w, v, n)])
-    dw, dv = usual.spread + 1e-9
+    dw, dv = stats.spread + 1e-9
     rate = abs(c.a) + 1e-3
     spread = np.array([dw, rate * dw, rate**2 * dw, dv, 1e-2 * dv])
     return start, np.diag(spread**2)
@@ -136,7 +136,7 @@ def _filter(
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], _Kept]:
     """Rows of states and variances, (n, 10), of innovations and theirs, (n, 4), what was gated.
 
-    And, if it is to be kept, a trace. `x`, `P`, `last_rate` and `off` go on to the next slab;
+    And, if it is to be kept, a trace. `x`, `P`, `last_rate` and `off` go on to the next chunk;
     `delta` and `n` are one longer.
     """
     count, size = len(measured), len(x)

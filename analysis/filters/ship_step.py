@@ -121,7 +121,7 @@ def tell_all(
     n: FloatArray,
     dt: float,
 ) -> FloatArray:
-    """`tell` of a slab, (n, 10); `delta` is one longer."""
+    """`tell` of a chunk, (n, 10); `delta` is one longer."""
     rows = np.empty((len(states), 10))
     for k in range(len(states)):
         rate = (delta[k + 1] - delta[k]) / dt

@@ -8,8 +8,8 @@ Bryson-Frazier); Rauch, Tung and Striebel, "Maximum likelihood estimates of line
 1965.
 
 A trial longer than memory is gone through twice, forward each time. The first time tells of each
-slab how it takes an adjoint from its end to its start; from these follow the adjoints at the ends
-of all slabs, and with the one at its end each slab is smoothed by itself the second time.
+chunk how it takes an adjoint from its end to its start; from these follow the adjoints at the ends
+of all chunks, and with the one at its end each chunk is smoothed by itself the second time.
 """
 
 from collections.abc import Mapping
@@ -36,10 +36,10 @@ class Adjoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """How a slab takes an adjoint from its end to before its start: Φ' λ + b, Φ' Λ Φ + B."""
+    """How a chunk takes an adjoint from its end to before its start: Φ' λ + b, Φ' Λ Φ + B."""
 
     across: FloatArray  # Φ, (s, s)
-    own: Adjoint  # b and B: what the slab itself says
+    own: Adjoint  # b and B: what the chunk itself says
 
     def back(self, end: Adjoint) -> Adjoint:
         return Adjoint(
@@ -49,21 +49,21 @@ class _Way:
 
 
 class SmoothingPass:
-    """Takes the traces of a trial's slabs in their order, the first time."""
+    """Takes the traces of a trial's chunks in their order, the first time."""
 
     def __init__(self, outputs: FloatArray) -> None:
         self._C = np.ascontiguousarray(outputs)
         self._ways: list[_Way] = []
 
     def add(self, trace: Trace) -> None:
-        """Take the next slab's."""
+        """Take the next chunk's."""
         size = self._C.shape[1]
         nothing = Adjoint(np.zeros(size), np.zeros((size, size)))
         *_, start, across = _back(self._C, *_parts(trace), *nothing)
         self._ways.append(_Way(across, Adjoint(*start)))
 
     def result(self) -> list[Adjoint]:
-        """The adjoint at the end of each slab, in their order."""
+        """The adjoint at the end of each chunk, in their order."""
         size = self._C.shape[1]
         ends = [Adjoint(np.zeros(size), np.zeros((size, size)))]  # after the last there is nothing
         for way in reversed(self._ways[1:]):
@@ -72,7 +72,7 @@ class SmoothingPass:
 
 
 def smooth(trace: Trace, outputs: FloatArray, end: Adjoint) -> tuple[FloatArray, FloatArray]:
-    """The smoothed states (n, s) and their covariances (n, s, s) of a slab."""
+    """The smoothed states (n, s) and their covariances (n, s, s) of a chunk."""
     C = np.ascontiguousarray(outputs)
     slopes, curvatures, *_ = _back(C, *_parts(trace), *end)
     return _smoothed(trace.states, trace.covariances, slopes, curvatures)
@@ -80,15 +80,15 @@ def smooth(trace: Trace, outputs: FloatArray, end: Adjoint) -> tuple[FloatArray,
 
 def smoothed(
     filtering: Filter,
-    slab: Signals,
+    chunk: Signals,
     following: Mapping[str, float],
     estimates: Estimates,
     trace: Trace,
     end: Adjoint,
 ) -> Estimates:
-    """A slab's estimates with its states smoothed; the innovations are the filter's own."""
+    """A chunk's estimates with its states smoothed; the innovations are the filter's own."""
     found = smooth(trace, filtering.outputs, end)
-    states, stds, wave = filtering.told(slab, following, *found)
+    states, stds, wave = filtering.told(chunk, following, *found)
     return replace(estimates, states=states, stds=stds, wave=wave)
 
 
@@ -106,7 +106,7 @@ def _back(
     slope: FloatArray,
     curvature: FloatArray,
 ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray], FloatArray]:
-    """The adjoints at every instant of a slab, (n, s) and (n, s, s), from those after its end.
+    """The adjoints at every instant of a chunk, (n, s) and (n, s, s), from those after its end.
 
     And the one before its first measurement, and Φ, by which the end's came there.
     """

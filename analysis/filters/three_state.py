@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm, solve_discrete_lyapunov
 
 from analysis.design.discrete import discretise
-from analysis.signals.signal_stats import Gauge
+from analysis.signals.signal_stats import SignalStats
 from shiplog.compiled import compiled
 from shiplog.ships.paper import (
-    INPUTS,
-    OUTPUTS,
+    PAPER_INPUTS,
+    PAPER_OUTPUTS,
     Coefficients,
     yaw_stiffness,
 )
@@ -27,9 +27,9 @@ from shiplog.types import FloatArray, Signals
 from shiplog.vessel.settings import FilterSettings
 
 from .base import Estimates, Trace
-from .gains import Channel, channels, discrete_gain, ticked_gain
+from .gains import LinearAxis, channels, discrete_gain, ticked_gain
 from .kernels import BELIEVED, GATED, correct, propagate, weigh
-from .noise_model import Noise
+from .noise_model import NoiseModel
 from .ship_step import linearise, predict, tell, tell_all
 
 BEST, FIXED, TICKED = range(3)  # gains
@@ -40,7 +40,7 @@ NEARLY = 1.5  # times the gain designed for ever, which the best one need not qu
 
 
 class ThreeStateFilter:
-    """Filters yaw rate and speed in slabs; the inputs must be known throughout.
+    """Filters yaw rate and speed in chunks; the inputs must be known throughout.
 
     `settings.chosen` is one of `extended`, `steady-state`, `quality` and `per-tick`.
     Source: the extended Kalman filter is Jazwinski's, "Stochastic processes and filtering theory",
@@ -48,30 +48,30 @@ class ThreeStateFilter:
     """
 
     def __init__(
-        self, model: Coefficients, noise: Noise, usual: Gauge, settings: FilterSettings
+        self, model: Coefficients, noise: NoiseModel, stats: SignalStats, settings: FilterSettings
     ) -> None:
-        yaw, surge = channels(model, noise, usual)
+        yaw, surge = channels(model, noise, stats)
         self._model, self._r, self._gate = model, noise.measurement_std**2, settings.gate
-        self._wave = _wave_block(yaw, usual.dt_secs)
+        self._wave = _wave_block(yaw, stats.dt_secs)
         size = _STATES + len(self._wave.F)
-        self.outputs = np.zeros((len(OUTPUTS), size))
+        self.outputs = np.zeros((len(PAPER_OUTPUTS), size))
         of_yaw = [0, 1, *range(_STATES, size)]
         self.outputs[0, of_yaw] = yaw.C[0]
         self.outputs[1, 2] = 1.0
-        self._Q = _process_noise(model, noise, usual, self._wave)
+        self._Q = _process_noise(model, noise, stats, self._wave)
         self._gain = _GAINS[settings.chosen]
-        self._x, self._P = _start(model, usual, self._wave)
-        self._ages = np.zeros(len(OUTPUTS))
-        self._off = np.zeros(len(OUTPUTS), np.int64)
-        self._fixed = np.zeros((len(OUTPUTS), size))
+        self._x, self._P = _start(model, stats, self._wave)
+        self._ages = np.zeros(len(PAPER_OUTPUTS))
+        self._off = np.zeros(len(PAPER_OUTPUTS), np.int64)
+        self._fixed = np.zeros((len(PAPER_OUTPUTS), size))
         self._poles = np.zeros(size, np.complex128)
-        self._interval = usual.interval_secs
-        self._forgetting = np.zeros(len(OUTPUTS))
+        self._interval = stats.interval_secs
+        self._forgetting = np.zeros(len(PAPER_OUTPUTS))
         if self._gain != BEST:
             self._design(settings, yaw, surge)
         self._wave_between = np.ascontiguousarray(expm(yaw.A[2:, 2:] * yaw.interval_secs))
 
-    def _design(self, settings: FilterSettings, yaw: Channel, surge: Channel) -> None:
+    def _design(self, settings: FilterSettings, yaw: LinearAxis, surge: LinearAxis) -> None:
         of_yaw = [0, 1, *range(_STATES, len(self._fixed[0]))]
         for output, channel, states in ((0, yaw, of_yaw), (1, surge, [2])):
             gain, poles = discrete_gain(settings, channel)
@@ -79,38 +79,38 @@ class ThreeStateFilter:
             slowest = float(np.abs(poles).max())
             self._forgetting[output] = -channel.interval_secs / np.log(max(slowest, TINY))
 
-    def step(self, slab: Signals, following: Mapping[str, float]) -> Estimates:
-        """Filter the next slab; `following` are the inputs at the instant after it."""
-        return self._run(slab, following, keep=False)[0]
+    def step(self, chunk: Signals, following: Mapping[str, float]) -> Estimates:
+        """Filter the next chunk; `following` are the inputs at the instant after it."""
+        return self._run(chunk, following, keep=False)[0]
 
-    def trace(self, slab: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
+    def trace(self, chunk: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
         """As `step`, and how it came about."""
-        return self._run(slab, following, keep=True)
+        return self._run(chunk, following, keep=True)
 
     def told(
         self,
-        slab: Signals,
+        chunk: Signals,
         following: Mapping[str, float],
         states: FloatArray,
         covariances: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
         """w, w', w'', v, v' (n, 5), their standard deviations, and the wave."""
-        delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
-        rows = tell_all(self._model, states, covariances, delta, n, slab.dt_secs)
+        delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
+        rows = tell_all(self._model, states, covariances, delta, n, chunk.dt_secs)
         return rows[:, :5], np.sqrt(rows[:, 5:]), self._seen_wave(states)
 
     def _run(
-        self, slab: Signals, following: Mapping[str, float], *, keep: bool
+        self, chunk: Signals, following: Mapping[str, float], *, keep: bool
     ) -> tuple[Estimates, Trace]:
-        measured = np.column_stack([slab[name] for name in OUTPUTS])
-        delta, n = (np.append(slab[name], following[name]) for name in INPUTS)
+        measured = np.column_stack([chunk[name] for name in PAPER_OUTPUTS])
+        delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
         correction = _Correction(
             self.outputs, self._r, self._gate, self._gain, self._fixed, self._poles,
             self._interval, self._forgetting, self._wave_between,
         )  # fmt: skip
         states, rows, innovations, gated, trace = _filter(
             self._model, self._x, self._P, self._Q, self._wave.F, correction, measured, delta, n,
-            slab.dt_secs, self._off, self._ages, keep,
+            chunk.dt_secs, self._off, self._ages, keep,
         )  # fmt: skip
         told = Estimates(
             rows[:, :5], np.sqrt(rows[:, 5:]), innovations[:, :2], np.sqrt(innovations[:, 2:]),
@@ -130,7 +130,7 @@ class _Block(NamedTuple):
     Q: FloatArray  # (k, k)
 
 
-def _wave_block(yaw: Channel, dt: float) -> _Block:
+def _wave_block(yaw: LinearAxis, dt: float) -> _Block:
     """The wave's states are the yaw channel's beyond w and w'."""
     A, G = yaw.A[2:, 2:], yaw.G[2:]
     if not len(A):
@@ -139,25 +139,27 @@ def _wave_block(yaw: Channel, dt: float) -> _Block:
     return _Block(np.ascontiguousarray(F), Q)
 
 
-def _process_noise(c: Coefficients, noise: Noise, usual: Gauge, wave: _Block) -> FloatArray:
+def _process_noise(
+    c: Coefficients, noise: NoiseModel, stats: SignalStats, wave: _Block
+) -> FloatArray:
     """What is added to the covariance from one instant to the next, (s, s)."""
-    speed = usual.ahead
+    speed = stats.ahead
     A = np.array(
         [
             [0.0, 1.0, 0.0],
-            [yaw_stiffness(c, usual.turning), c.a, 0.0],
+            [yaw_stiffness(c, stats.turning), c.a, 0.0],
             [0.0, 0.0, 2 * c.g * speed],
         ]
     )
-    q = noise.process_ratio * noise.measurement_std**2 * usual.interval_secs
-    _, Q = discretise(A, np.diag([0.0, *q]), usual.dt_secs)
+    q = noise.process_ratio * noise.measurement_std**2 * stats.interval_secs
+    _, Q = discretise(A, np.diag([0.0, *q]), stats.dt_secs)
     return np.ascontiguousarray(block_diag(Q, wave.Q))
 
 
-def _start(c: Coefficients, usual: Gauge, wave: _Block) -> tuple[FloatArray, FloatArray]:
+def _start(c: Coefficients, stats: SignalStats, wave: _Block) -> tuple[FloatArray, FloatArray]:
     """The first values measured, not turning faster; as unsure as they vary."""
-    w, v = usual.first
-    dw, dv = usual.spread + 1e-9
+    w, v = stats.first
+    dw, dv = stats.spread + 1e-9
     stds = np.array([dw, (abs(c.a) + 1e-3) * dw, dv])
     of_wave = solve_discrete_lyapunov(wave.F, wave.Q) if len(wave.F) else wave.Q
     return (
@@ -202,7 +204,7 @@ def _filter(
     """The states (n, s), rows of what is told and its variances, (n, 10), of innovations, (n, 4).
 
     And what was gated, and, if it is to be kept, the rest of a trace. `x`, `P`, `off` and `ages`
-    go on to the next slab; `delta` and `n` are one longer.
+    go on to the next chunk; `delta` and `n` are one longer.
     """
     count, size = len(measured), len(x)
     xs, rows, told = np.empty((count, size)), np.empty((count, 10)), np.empty((count, 4))

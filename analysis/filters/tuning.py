@@ -6,13 +6,13 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from analysis.signals.hold import last_inputs
-from analysis.signals.signal_stats import Gauge, gauge
+from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog.ships.paper import Coefficients
 from shiplog.vessel.settings import FilterSettings
 
 from .base import Estimates
 from .factory import make_filter
-from .noise_model import Noise
+from .noise_model import NoiseModel
 from .wave_fit import Wave, fit_wave
 
 PAPER_RATIO = 0.01 / 400  # Burylin's Q over his R, 1/s^2: no default trusts the model more
@@ -21,7 +21,7 @@ SPIKE = 8.0
 HIGHEST_RATIO = 1e8  # beyond it an estimate is what was measured
 
 
-def noise_of(usual: Gauge, model: Coefficients, settings: FilterSettings) -> Noise:
+def noise_of(stats: SignalStats, model: Coefficients, settings: FilterSettings) -> NoiseModel:
     """The noise a vessel file states, and from the log what it leaves open.
 
     The measurement noise shows in the third differences of a signal, where the ship's motion does
@@ -30,10 +30,10 @@ def noise_of(usual: Gauge, model: Coefficients, settings: FilterSettings) -> Noi
     the spectrum of what a slow filter leaves.
     """
     given = (settings.yaw_rate_std, settings.speed_std)
-    stds = np.array([a if b is None else b for a, b in zip(usual.noise, given, strict=True)])
+    stds = np.array([a if b is None else b for a, b in zip(stats.noise, given, strict=True)])
     stated, least, most = _ratios(settings)
-    noise = Noise(stds, np.array(least), (given[0] is None, given[1] is None))
-    of_head = gauge(usual.head, model)
+    noise = NoiseModel(stds, np.array(least), (given[0] is None, given[1] is None))
+    of_head = signal_stats(stats.head, model)
     if settings.wave:
         noise = replace(noise, wave=_told_wave(of_head, model, noise, settings))
     for output, ratio in enumerate(stated):
@@ -69,9 +69,9 @@ def _ratios(settings: FilterSettings) -> tuple[_Stated, _Pair, _Pair]:
 
 
 def _likeliest(
-    usual: Gauge,
+    stats: SignalStats,
     model: Coefficients,
-    noise: Noise,
+    noise: NoiseModel,
     settings: FilterSettings,
     output: int,
     bounds: _Pair,
@@ -81,7 +81,7 @@ def _likeliest(
     def unlikelihood(log_ratio: float) -> float:
         ratios = noise.process_ratio.copy()
         ratios[output] = 10.0**log_ratio
-        estimates = _head_filtered(usual, model, replace(noise, process_ratio=ratios), settings)
+        estimates = _head_filtered(stats, model, replace(noise, process_ratio=ratios), settings)
         e, s = estimates.innovations[:, output], estimates.innovation_stds[:, output]
         surprise = np.minimum((e / s) ** 2, settings.gate**2)
         score = float(np.nansum(surprise + 2 * np.log(s)))
@@ -97,36 +97,38 @@ def _likeliest(
 
 
 def wave_in(
-    usual: Gauge, model: Coefficients, noise: Noise, settings: FilterSettings
+    stats: SignalStats, model: Coefficients, noise: NoiseModel, settings: FilterSettings
 ) -> Wave | None:
     """The wave in the yaw rate, whether it stands out or not; None of too few samples."""
     _, least, _ = _ratios(settings)
     slow = replace(noise, process_ratio=np.array(least), wave=None)
-    return _wave(gauge(usual.head, model), model, slow, settings)
+    return _wave(signal_stats(stats.head, model), model, slow, settings)
 
 
 def _told_wave(
-    usual: Gauge, model: Coefficients, noise: Noise, settings: FilterSettings
+    stats: SignalStats, model: Coefficients, noise: NoiseModel, settings: FilterSettings
 ) -> Wave | None:
     """The wave that is to be told from the turning: one that is stated, or that stands out."""
-    wave = _wave(usual, model, noise, settings)
+    wave = _wave(stats, model, noise, settings)
     stated = settings.wave_frequency is not None and settings.wave_std is not None
     return wave if wave is not None and (stated or wave.stands_out) else None
 
 
-def _wave(usual: Gauge, model: Coefficients, noise: Noise, settings: FilterSettings) -> Wave | None:
+def _wave(
+    stats: SignalStats, model: Coefficients, noise: NoiseModel, settings: FilterSettings
+) -> Wave | None:
     """The wave in what the slowest filter leaves of the yaw rate.
 
     Its gate is open, for a filter that knows of no wave would not believe the crests; spikes are
     what is far beyond all else.
     """
     believing = replace(settings, gate=EVERYTHING)
-    left = _head_filtered(usual, model, noise, believing).innovations[:, 0]
+    left = _head_filtered(stats, model, noise, believing).innovations[:, 0]
     usually = 1.4826 * float(np.nanmedian(np.abs(left)))
     return fit_wave(
         np.where(np.abs(left) <= SPIKE * usually, left, np.nan),
-        usual.dt_secs,
-        float(usual.intervals[0]),
+        stats.dt_secs,
+        float(stats.intervals[0]),
         frequency=settings.wave_frequency,
         damping=settings.wave_damping,
         std=settings.wave_std,
@@ -134,8 +136,8 @@ def _wave(usual: Gauge, model: Coefficients, noise: Noise, settings: FilterSetti
 
 
 def _head_filtered(
-    usual: Gauge, model: Coefficients, noise: Noise, settings: FilterSettings
+    stats: SignalStats, model: Coefficients, noise: NoiseModel, settings: FilterSettings
 ) -> Estimates:
     kind = "pseudo-input" if settings.chosen == "pseudo-input" else "extended"
     judging = replace(settings, kind=kind, smooth=False)
-    return make_filter(model, noise, usual, judging).step(usual.head, last_inputs(usual.head))
+    return make_filter(model, noise, stats, judging).step(stats.head, last_inputs(stats.head))

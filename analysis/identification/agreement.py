@@ -15,7 +15,7 @@ from scipy.stats import chi2
 
 from shiplog.types import FloatArray
 
-from .least_squares import Minimum, Spread, eliminated, minimise, total_cost
+from .least_squares import Minimum, ResidualStd, eliminated, minimise, total_cost
 from .output_error import OutputError, settled
 from .problem import Problem, residuals
 from .segment import LEAST_SECS
@@ -76,15 +76,15 @@ class _Part:
     name: str
     problem: Problem
     unknowns: FloatArray
-    spreads: tuple[Spread, ...]
+    residual_stds: tuple[ResidualStd, ...]
 
 
 def _runs(fit: OutputError) -> list[_Part]:
     problem, z = fit.problem, fit.minimum.unknowns
     return [
         _Part(
-            problem.trials[run[0]].name, *problem.of_trials(run, z),
-            tuple(fit.spreads[i] for i in run),
+            problem.segments[run[0]].name, *problem.of_segments(run, z),
+            tuple(fit.residual_stds[i] for i in run),
         )
         for run in problem.runs
     ]  # fmt: skip
@@ -92,16 +92,18 @@ def _runs(fit: OutputError) -> list[_Part]:
 
 def _halves(fit: OutputError) -> list[_Part]:
     """None where they are too short."""
-    trials, z = fit.problem.trials, fit.minimum.unknowns
-    if min(len(trial) // 2 * trial.dt_secs for trial in trials) < LEAST_SECS:
+    segments, z = fit.problem.segments, fit.minimum.unknowns
+    if min(len(segment) // 2 * segment.dt_secs for segment in segments) < LEAST_SECS:
         return []
     halves = []
     for name, share in zip(HALVES, (0.0, 0.5), strict=True):
-        cuts = [_half(len(trial), share) for trial in trials]
-        cut = [trial.part(*at) for trial, at in zip(trials, cuts, strict=True)]
-        problem = replace(fit.problem, trials=tuple(cut))
-        spreads = (s.part(*at) for s, at in zip(fit.spreads, cuts, strict=True))
-        halves.append(_Part(name, problem, _begun_anew(problem, z) if share else z, tuple(spreads)))
+        cuts = [_half(len(segment), share) for segment in segments]
+        cut = [segment.part(*at) for segment, at in zip(segments, cuts, strict=True)]
+        problem = replace(fit.problem, segments=tuple(cut))
+        residual_stds = (s.part(*at) for s, at in zip(fit.residual_stds, cuts, strict=True))
+        halves.append(
+            _Part(name, problem, _begun_anew(problem, z) if share else z, tuple(residual_stds))
+        )
     return halves
 
 
@@ -110,9 +112,9 @@ def _half(count: int, share: float) -> tuple[int, int]:
 
 
 def _begun_anew(problem: Problem, z: FloatArray) -> FloatArray:
-    """The unknowns but for the states that the trials begin in: those are of other instants."""
+    """The unknowns but for the states that the segments begin in: those are of other instants."""
     begun, start = z.copy(), problem.start()
-    for i in range(len(problem.trials)):
+    for i in range(len(problem.segments)):
         at = problem.own_slice(i).start
         states = slice(at, at + len(problem.model.state))
         begun[states] = start[states]
@@ -132,12 +134,12 @@ class _Alone:
 def _alone(part: _Part) -> _Alone:
     alone, shared = part.problem, part.unknowns[: len(part.problem.free)]
     pinned = replace(alone, values=alone.parameters(part.unknowns), free=())
-    first = minimise(pinned, part.unknowns[len(shared) :], part.spreads)
-    loose = minimise(alone, np.concatenate((shared, first.unknowns)), part.spreads)
+    first = minimise(pinned, part.unknowns[len(shared) :], part.residual_stds)
+    loose = minimise(alone, np.concatenate((shared, first.unknowns)), part.residual_stds)
     own = settled(alone, loose)
-    there = minimise(pinned, first.unknowns, own.spreads)
-    by_own = _lost(alone, shared, there, own.minimum, own.spreads)
-    by_all = _lost(alone, shared, first, loose, part.spreads)
+    there = minimise(pinned, first.unknowns, own.residual_stds)
+    by_own = _lost(alone, shared, there, own.minimum, own.residual_stds)
+    by_all = _lost(alone, shared, first, loose, part.residual_stds)
     free = _freedom(own)
     whole = own.minimum.information + np.diag(alone.prior[1])
     return _Alone(
@@ -147,11 +149,15 @@ def _alone(part: _Part) -> _Alone:
 
 
 def _lost(
-    alone: Problem, shared: FloatArray, pinned: Minimum, free: Minimum, spreads: Sequence[Spread]
+    alone: Problem,
+    shared: FloatArray,
+    pinned: Minimum,
+    free: Minimum,
+    residual_stds: Sequence[ResidualStd],
 ) -> float:
     """What a run loses by the parameters that all share, as squared stds for each parameter."""
     z = np.concatenate((shared, pinned.unknowns))
-    lost = total_cost(alone, z, residuals(alone, z), spreads) - free.cost
+    lost = total_cost(alone, z, residuals(alone, z), residual_stds) - free.cost
     return max(2 * lost, 0.0) / len(shared) if np.isfinite(lost) else np.nan
 
 
@@ -164,7 +170,7 @@ def _freedom(fit: OutputError) -> float:
     problem = fit.problem
     independent = sum(
         float(np.sum((spread.usual / spread.effective)[problem.known(i)] ** 2))
-        for i, spread in enumerate(fit.spreads)
+        for i, spread in enumerate(fit.residual_stds)
     )
     told = fit.minimum.information
     precision = np.diag(problem.prior[1])

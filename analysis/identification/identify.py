@@ -5,23 +5,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from analysis.identification.comparison.history import Courses, two_priors
-from analysis.identification.comparison.paper_scheme import papers_scheme
+from analysis.identification.comparison.history import ParameterHistory, two_priors
+from analysis.identification.comparison.paper_scheme import paper_scheme
 from analysis.identification.comparison.parameter_ekf import augmented
 from analysis.identification.comparison.windows import windows
 from shiplog.errors import LogError, UsageError
 from shiplog.ships import LADDER, Model, ship_model
-from shiplog.ships.motion import OUTPUTS
+from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray, Log
 from shiplog.vessel.vessel import Vessel
 
 from .advice import Ties, ties_of, told_by
 from .model_selection import Candidate, compare
 from .output_error import OutputError, output_error, pose
-from .prior_sensitivity import Echo, second_run
+from .prior_sensitivity import PriorSensitivity, prior_sensitivity
 from .problem import residuals
 from .runs import contradictions, distinct_runs, ship_of
-from .segment import Trial
+from .segment import Segment
 from .uncertainty import Uncertainty, uncertainty
 from .validation import Validation, rms_of, validate
 
@@ -30,7 +30,7 @@ ALPHAS = ("alpha1", "alpha2", "alpha3")
 UNEXPLAINED = 0.2  # of what was measured, in the rms: a fit that leaves more says little
 CONTRADICTING = 3.0  # times what noise explains: runs that differ so much are not one ship's
 
-Tell = Callable[..., None]  # of the step, and of the share of it that is done
+ProgressCallback = Callable[..., None]  # of the step, and of the share of it that is done
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,8 @@ class IdentifiedShip:
     model: Model
     fit: OutputError
     uncertainty: Uncertainty
-    echo: Echo
-    courses: tuple[Courses, ...]  # of other methods, for comparison
+    echo: PriorSensitivity
+    courses: tuple[ParameterHistory, ...]  # of other methods, for comparison
     runs: tuple[RunFit, ...]
     validations: tuple[Validation, ...]
     candidates: tuple[Candidate, ...]  # the best first; empty where the model was named
@@ -78,7 +78,7 @@ class IdentifiedShip:
     @property
     def told(self) -> tuple[str, ...]:
         """The parameters that these logs do tell."""
-        return tuple(n for n in self.uncertainty.names if n not in self.uncertainty.vague)
+        return tuple(n for n in self.uncertainty.names if n not in self.uncertainty.unidentifiable)
 
 
 def identify(
@@ -88,7 +88,7 @@ def identify(
     validation_logs: Sequence[Log] = (),
     known: Mapping[str, float] | None = None,
     vessel: Vessel | None = None,
-    on_step: Tell = lambda *_: None,
+    on_progress: ProgressCallback = lambda *_: None,
 ) -> IdentifiedShip:
     """Fit a model of `shiplog.ships` to logs of one ship, all at once.
 
@@ -106,27 +106,27 @@ def identify(
     model = model or ("burylin-tied" if "T3" in stated else "burylin")
     considered = [ship_model(name) for name in (LADDER if model == AUTO else (model,))]
     _require_known(considered, stated)
-    on_step("read")
+    on_progress("read")
     runs, held_out = distinct_runs(logs, validation_logs)
     ship = ship_of([*runs, *held_out], vessel)
-    trials = [trial for run in runs for trial in run.trials]
+    segments = [segment for run in runs for segment in run.segments]
     length = ship.length if ship else None
     candidates: list[Candidate] = []
     if model == AUTO:
-        candidates = _compared(trials, considered, stated, ship, length, on_step)
+        candidates = _compared(segments, considered, stated, ship, length, on_progress)
         fit = _best(candidates)
     else:
-        on_step(f"fit {model}")
+        on_progress(f"fit {model}")
         settled = _settled(considered[0], stated, ship)
-        fit = output_error(trials, considered[0], known=settled, length=length)
-    on_step("uncertainty")
+        fit = output_error(segments, considered[0], known=settled, length=length)
+    on_progress("uncertainty")
     found = uncertainty(fit)
-    on_step("echo")
-    echo = second_run(fit, found)
+    on_progress("echo")
+    echo = prior_sensitivity(fit, found)
     found = replace(found, prior_share=np.fmax(found.prior_share, echo.shares))
     priors = two_priors(found, fit.problem.bounds)
-    courses = augmented(fit, priors), windows(fit), papers_scheme(fit, priors)
-    on_step("validation")
+    courses = augmented(fit, priors), windows(fit), paper_scheme(fit, priors)
+    on_progress("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
     every = [*runs, *held_out]
     warnings = [w for run in every for w in run.warnings]
@@ -143,7 +143,7 @@ def identify(
         tuple(candidates), ties_of(fit), ship, length is not None,
         {n: v for n, v in zip(fit.problem.model.names, fit.parameters.tolist(), strict=True)
          if n not in found.names},
-        {name: told_by(name) for name in found.vague},
+        {name: told_by(name) for name in found.unidentifiable},
         tuple(warnings), any(run.data_lost for run in every),
     )  # fmt: skip
 
@@ -185,18 +185,18 @@ def _settled(model: Model, known: Mapping[str, float], ship: Vessel | None) -> d
 
 
 def _compared(
-    trials: Sequence[Trial],
+    segments: Sequence[Segment],
     models: Sequence[Model],
     known: Mapping[str, float],
     ship: Vessel | None,
     length: float | None,
-    on_step: Tell,
+    on_progress: ProgressCallback,
 ) -> list[Candidate]:
-    pose(trials, models[0], length=length)  # what nothing can be identified from is said at once
+    pose(segments, models[0], length=length)  # what nothing can be identified from is said at once
     found: list[Candidate] = []
     for i, model in enumerate(models):
-        on_step(f"cross-validate {model.name}", i / len(models))
-        found += compare(trials, [model], known=_settled(model, known, ship), length=length)
+        on_progress(f"cross-validate {model.name}", i / len(models))
+        found += compare(segments, [model], known=_settled(model, known, ship), length=length)
     return sorted(found, key=lambda candidate: (candidate.fit is None, candidate.score))
 
 
@@ -210,7 +210,7 @@ def _best(candidates: Sequence[Candidate]) -> OutputError:
 def _run_fits(fit: OutputError) -> Iterator[RunFit]:
     problem, z = fit.problem, fit.minimum.unknowns
     left = residuals(problem, z)
-    for i, trial in enumerate(problem.trials):
+    for i, segment in enumerate(problem.segments):
         own = z[problem.own_slice(i)]
         at = len(problem.model.state)
         has_offset = problem.nuisance.rudder_std > 0
@@ -218,7 +218,7 @@ def _run_fits(fit: OutputError) -> Iterator[RunFit]:
         waves = biases + len(problem.biases)
         omegas = own[waves :: 1 + 2 * len(problem.outputs)]
         yield RunFit(
-            trial.name, (len(trial) - 1) * trial.dt_secs,
+            segment.name, (len(segment) - 1) * segment.dt_secs,
             {output: rms_of(left[i][:, c]) for c, output in enumerate(problem.outputs)},
             float(own[at]) if has_offset else 0.0,
             {problem.outputs[c]: float(own[biases + k])
@@ -230,24 +230,24 @@ def _run_fits(fit: OutputError) -> Iterator[RunFit]:
 def _unexplained(fit: OutputError) -> Iterator[str]:
     """The runs of which the fit leaves much, white noise aside."""
     problem = fit.problem
-    for trial, left, spread in zip(
-        problem.trials, residuals(problem, fit.minimum.unknowns), fit.spreads, strict=True
+    for segment, left, spread in zip(
+        problem.segments, residuals(problem, fit.minimum.unknowns), fit.residual_stds, strict=True
     ):
         for c, output in enumerate(problem.outputs):
-            measured = trial.measured[:, OUTPUTS.index(output)]
+            measured = segment.measured[:, MODEL_OUTPUTS.index(output)]
             white = max(float(np.mean(spread.usual[:, c] ** 2)) - fit.noises[c].slow ** 2, 0.0)
             stays = np.sqrt(max(rms_of(left[:, c]) ** 2 - white, 0.0))
             size = float(np.nanstd(measured)) if np.isfinite(measured).any() else 0.0
             if stays > UNEXPLAINED * size and stays**2 > white:
                 yield (
-                    f"{trial.name}: the fit leaves {100 * stays / size:.0f} % of the "
+                    f"{segment.name}: the fit leaves {100 * stays / size:.0f} % of the "
                     f"{output.replace('_', ' ')} unexplained: "
                     "a contrary rudder, wrong units, another ship, or a model that is not hers"
                 )
 
 
 def _doubts(
-    fit: OutputError, found: Uncertainty, echo: Echo, validations: Sequence[Validation]
+    fit: OutputError, found: Uncertainty, echo: PriorSensitivity, validations: Sequence[Validation]
 ) -> Iterator[str]:
     """What makes a fit hard to believe."""
     if not fit.minimum.settled:
@@ -262,15 +262,15 @@ def _doubts(
     apart = found.agreement.contradiction
     if apart > CONTRADICTING:
         alone = len(fit.problem.runs) == 1
-        who = f"the halves of {fit.problem.trials[0].name}" if alone else "the logs"
+        who = f"the halves of {fit.problem.segments[0].name}" if alone else "the logs"
         odd = f", {found.agreement.odd} the others" if found.agreement.odd else ""
         yield (
             f"{who} contradict each other{odd}, {apart:.0f} times what their noise explains: "
             "another ship, loading or depth, or a model that is not hers; the intervals allow for "
             "it"
         )
-    if set(found.vague) == set(found.names):
+    if set(found.unidentifiable) == set(found.names):
         yield "nothing is identifiable from these logs: no value of the model is to be believed"
     for validation in validations:
         if validation.ran_away:
-            yield f"{validation.trial.name}: the simulated ship runs away: no prediction of it"
+            yield f"{validation.segment.name}: the simulated ship runs away: no prediction of it"

@@ -10,24 +10,24 @@ import numpy as np
 
 from analysis.regression.sliding import Regression
 from analysis.regression.weak_form import CHANNELS, Equation, Rows, weak_form
-from shiplog.ships.motion import OUTPUTS
+from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
 
-from .least_squares import Spread, total_cost
+from .least_squares import ResidualStd, total_cost
 from .problem import Problem, residuals
 
 YAW_FORMS = (("a", "b1", "b2", "b3", "d", "e"), ("a", "b1", "b2", "d", "e"), ("a", "b1", "d", "e"))
 SURGE_FORMS = (("f", "g", "h"), ("f", "h"))
 
 
-def starts(problem: Problem, spreads: Sequence[Spread]) -> list[FloatArray]:
+def starts(problem: Problem, residual_stds: Sequence[ResidualStd]) -> list[FloatArray]:
     """Unknowns to begin with, those that fit best first."""
     given = problem.start()
     found = [given]
     if problem.model.kind is Coefficients:
         found.append(_moved(problem, given, _by_weak_form(problem)))
-    costs = [total_cost(problem, z, residuals(problem, z), spreads) for z in found]
+    costs = [total_cost(problem, z, residuals(problem, z), residual_stds) for z in found]
     return [found[i] for i in np.argsort(costs, kind="stable")]
 
 
@@ -41,12 +41,12 @@ def _moved(problem: Problem, start: FloatArray, values: dict[str, float]) -> Flo
 
 
 def _by_weak_form(problem: Problem) -> dict[str, float]:
-    """The paper's coefficients, as far as the rows of all trials tell them; 0 for b2, b3 if not."""
+    """The paper's coefficients by the rows of all segments; 0 for an undetermined b2 or b3."""
     model = problem.model.coefficients(problem.values)
     pairs = [
-        weak_form(trial.signals, model)
-        for trial in problem.trials
-        if all(trial.has(name) for name in CHANNELS if name in OUTPUTS)
+        weak_form(segment.signals, model)
+        for segment in problem.segments
+        if all(segment.has(name) for name in CHANNELS if name in MODEL_OUTPUTS)
     ]
     found: dict[str, float] = {}
     for rows, forms in (([p[0] for p in pairs], YAW_FORMS), ([p[1] for p in pairs], SURGE_FORMS)):

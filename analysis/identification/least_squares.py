@@ -1,4 +1,4 @@
-"""Levenberg and Marquardt's least squares over several trials, with limits, priors and outliers.
+"""Levenberg and Marquardt's least squares over several segments, with limits, priors and outliers.
 
 Each residual is weighed by its own standard deviation; beyond three of what is usual it counts by
 its size and no longer by its square (the pseudo-Huber loss). Marquardt, "An algorithm for
@@ -25,15 +25,15 @@ STEEPEST = 1e12  # of damping: no step is short enough
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
-    """How far a trial's residuals may be off, (n, c)."""
+class ResidualStd:
+    """How far a segment's residuals may be off, (n, c)."""
 
     effective: FloatArray  # the std that each counts with, for neighbours that are off together
     usual: FloatArray  # the std it has by itself, by which an outlier is told
 
-    def part(self, start: int, stop: int) -> "Spread":
+    def part(self, start: int, stop: int) -> "ResidualStd":
         """Of the samples from `start` to before `stop`."""
-        return Spread(self.effective[start:stop], self.usual[start:stop])
+        return ResidualStd(self.effective[start:stop], self.usual[start:stop])
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Minimum:
 
     unknowns: FloatArray  # (m,)
     information: FloatArray  # (m, m) the data's, without the priors
-    jacobians: tuple[FloatArray, ...]  # of each trial, (n, c, k), there or very near
+    jacobians: tuple[FloatArray, ...]  # of each segment, (n, c, k), there or very near
     cost: float
     rounds: int
     settled: bool
@@ -51,7 +51,7 @@ class Minimum:
 def minimise(
     problem: Problem,
     start: FloatArray,
-    spreads: Sequence[Spread],
+    residual_stds: Sequence[ResidualStd],
     jacobians: Sequence[FloatArray] | None = None,
 ) -> Minimum:
     """The unknowns that fit best, from `start` on, where the `jacobians` are known if they are."""
@@ -59,11 +59,11 @@ def minimise(
     _, precision = problem.prior
     z, damping, settled = np.clip(start, lowest, highest), 1e-3, False
     left = residuals(problem, z)
-    cost, rounds = total_cost(problem, z, left, spreads), 0
+    cost, rounds = total_cost(problem, z, left, residual_stds), 0
     if not np.isfinite(cost):
         return Minimum(z, np.zeros((len(z), len(z))), (), cost, 0, settled=False)
     jacobians = _jacobians(problem, z) if jacobians is None else jacobians
-    gradient, information = linearised(problem, z, left, spreads, jacobians)
+    gradient, information = linearised(problem, z, left, residual_stds, jacobians)
     while rounds < MOST_ROUNDS and damping < STEEPEST:
         rounds += 1
         hessian = information + np.diag(precision)
@@ -75,20 +75,20 @@ def minimise(
                 break
         moved = np.clip(z + step, lowest, highest)
         new_left = residuals(problem, moved)
-        new_cost = total_cost(problem, moved, new_left, spreads)
+        new_cost = total_cost(problem, moved, new_left, residual_stds)
         if new_cost < cost:
             z, left, cost, damping = moved, new_left, new_cost, max(damping / 10, 1e-9)
             if decrease > STALE:
                 jacobians = _jacobians(problem, z)
-            gradient, information = linearised(problem, z, left, spreads, jacobians)
+            gradient, information = linearised(problem, z, left, residual_stds, jacobians)
         else:
             damping *= 10 if damping > 1e-6 else 1e3
     return Minimum(z, information, tuple(jacobians), cost, rounds, settled)
 
 
 def _jacobians(problem: Problem, z: FloatArray) -> list[FloatArray]:
-    """Of each trial, zero where nothing was measured: there a ship may even stand."""
-    found = [problem.jacobian(z, i) for i in range(len(problem.trials))]
+    """Of each segment, zero where nothing was measured: there a ship may even stand."""
+    found = [problem.jacobian(z, i) for i in range(len(problem.segments))]
     return [np.where(problem.known(i)[:, :, None], each, 0.0) for i, each in enumerate(found)]
 
 
@@ -111,7 +111,10 @@ def _step(
 
 
 def total_cost(
-    problem: Problem, z: FloatArray, left: Sequence[FloatArray], spreads: Sequence[Spread]
+    problem: Problem,
+    z: FloatArray,
+    left: Sequence[FloatArray],
+    residual_stds: Sequence[ResidualStd],
 ) -> float:
     """Half the sum of squares, outliers for less, and of the priors; inf where a ship runs away.
 
@@ -119,7 +122,7 @@ def total_cost(
     """
     centre, precision = problem.prior
     total = float(np.sum(precision * (z - centre) ** 2)) / 2
-    for i, (off, spread) in enumerate(zip(left, spreads, strict=True)):
+    for i, (off, spread) in enumerate(zip(left, residual_stds, strict=True)):
         known = problem.known(i)
         edge = OUTLYING * spread.usual[known]
         with np.errstate(over="ignore"):  # a ship about to run away: the cost is inf
@@ -132,22 +135,22 @@ def linearised(
     problem: Problem,
     z: FloatArray,
     left: Sequence[FloatArray],
-    spreads: Sequence[Spread],
+    residual_stds: Sequence[ResidualStd],
     jacobians: Sequence[FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
     """The gradient of the cost, (m,), and the data's information matrix, (m, m)."""
     centre, precision = problem.prior
     gradient = precision * (z - centre)
-    for i, (spread, jacobian) in enumerate(zip(spreads, jacobians, strict=True)):
+    for i, (spread, jacobian) in enumerate(zip(residual_stds, jacobians, strict=True)):
         at, (off, weight) = problem.places(i), weighed(left[i], spread)
         gradient[at] -= jacobian.reshape(-1, len(at)).T @ (weight * off).reshape(-1)
-    return gradient, information(problem, left, spreads, jacobians)
+    return gradient, information(problem, left, residual_stds, jacobians)
 
 
 def information(
     problem: Problem,
     left: Sequence[FloatArray],
-    spreads: Sequence[Spread],
+    residual_stds: Sequence[ResidualStd],
     jacobians: Sequence[FloatArray],
     power: int = 1,
 ) -> FloatArray:
@@ -157,15 +160,15 @@ def information(
     its minimum moves with the data; with 0 Fisher's information of noise without outliers.
     """
     found = np.zeros((problem.size, problem.size))
-    for i, (spread, jacobian) in enumerate(zip(spreads, jacobians, strict=True)):
+    for i, (spread, jacobian) in enumerate(zip(residual_stds, jacobians, strict=True)):
         at, (_, weight) = problem.places(i), weighed(left[i], spread, power)
         flat = jacobian.reshape(-1, len(at))
         found[np.ix_(at, at)] += (flat * weight.reshape(-1, 1)).T @ flat
     return found
 
 
-def weighed(left: FloatArray, spread: Spread, power: int = 1) -> tuple[FloatArray, FloatArray]:
-    """A trial's residuals, zero where nothing was measured, and their weights: (n, c) each."""
+def weighed(left: FloatArray, spread: ResidualStd, power: int = 1) -> tuple[FloatArray, FloatArray]:
+    """A segment's residuals, zero where nothing was measured, and their weights: (n, c) each."""
     known = np.isfinite(left)
     off = np.where(known, left, 0.0)
     share = 1 / np.sqrt(1 + (off / (OUTLYING * spread.usual)) ** 2)

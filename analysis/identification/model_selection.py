@@ -14,15 +14,15 @@ import numpy as np
 
 from shiplog.errors import LogError, UsageError
 from shiplog.ships import Model
-from shiplog.ships.motion import OUTPUTS
+from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
 from .least_squares import minimise
-from .output_error import OutputError, first_spreads, output_error, settled
+from .output_error import OutputError, first_residual_stds, output_error, settled
 from .prediction import JUDGED, misfit
-from .segment import Trial
+from .segment import Segment
 
-JUDGED_COLUMNS = [OUTPUTS.index(name) for name in JUDGED]  # all models alike
+JUDGED_COLUMNS = [MODEL_OUTPUTS.index(name) for name in JUDGED]  # all models alike
 WORST = 10.0  # of a relative error: a ship that runs away is no worse than ten times off
 
 
@@ -42,7 +42,7 @@ class Candidate:
 
 
 def compare(
-    trials: Sequence[Trial],
+    segments: Sequence[Segment],
     models: Sequence[Model],
     **settings: Any,  # noqa: ANN401
 ) -> list[Candidate]:
@@ -50,34 +50,36 @@ def compare(
 
     Raises `UsageError` where there are fewer than two runs to tell them apart by.
     """
-    if len({trial.name for trial in trials}) < 2:
+    if len({segment.name for segment in segments}) < 2:
         raise UsageError(
             "a model is chosen by runs it has not seen: give two logs or more, or name the model"
         )
-    return sorted((_candidate(trials, model, settings) for model in models), key=lambda c: c.score)
+    return sorted(
+        (_candidate(segments, model, settings) for model in models), key=lambda c: c.score
+    )
 
 
-def _candidate(trials: Sequence[Trial], model: Model, settings: Mapping[str, Any]) -> Candidate:
+def _candidate(segments: Sequence[Segment], model: Model, settings: Mapping[str, Any]) -> Candidate:
     try:
-        fitted = output_error(trials, model, **settings)
+        fitted = output_error(segments, model, **settings)
     except LogError:
-        return Candidate(model, None, np.full((len(trials), len(OUTPUTS)), np.inf))
+        return Candidate(model, None, np.full((len(segments), len(MODEL_OUTPUTS)), np.inf))
     misfits = [row for run in fitted.problem.runs for row in _left_out(fitted, run)]
     return Candidate(model, fitted, np.array(misfits))
 
 
 def _left_out(whole: OutputError, run: Sequence[int]) -> list[FloatArray]:
-    """How far off the trials of a run is a fit to the others, which knows nothing of it.
+    """How far off the segments of a run is a fit to the others, which knows nothing of it.
 
     Its search begins where the whole fit is; its noise is its own, a swell counts as noise.
     """
-    kept = [i for i in range(len(whole.problem.trials)) if i not in run]
+    kept = [i for i in range(len(whole.problem.segments)) if i not in run]
     calm = replace(whole.problem, waves=())
-    rest, _ = calm.of_trials(kept, calm.start())
+    rest, _ = calm.of_segments(kept, calm.start())
     start = rest.start()
     start[: len(rest.free)] = whole.minimum.unknowns[: len(rest.free)]
-    minimum = minimise(rest, start, first_spreads(rest))
+    minimum = minimise(rest, start, first_residual_stds(rest))
     if not np.isfinite(minimum.cost):
-        return [np.full(len(OUTPUTS), np.inf)] * len(run)
+        return [np.full(len(MODEL_OUTPUTS), np.inf)] * len(run)
     others = settled(rest, minimum)
-    return [misfit(others, whole.problem.trials[i]) for i in run]
+    return [misfit(others, whole.problem.segments[i]) for i in run]

@@ -6,13 +6,13 @@ from math import pi
 
 import numpy as np
 
-from shiplog.ships.motion import OUTPUTS
+from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.ships.path import path_of
 from shiplog.types import FloatArray, Signals
 
 from .least_squares import minimise
-from .output_error import OutputError, first_spreads
-from .segment import Trial
+from .output_error import OutputError, first_residual_stds
+from .segment import Segment
 
 JUDGED = ("yaw_rate", "speed", "heading")  # every model predicts them
 ZIGZAG_STEP_SECS = 0.5
@@ -32,33 +32,33 @@ class Turn:
     steady_speed: float  # through the water, there
 
 
-def predict(fit: OutputError, trial: Trial) -> FloatArray:
-    """A fit's open-loop run under a trial's rudder and revolutions, (n, 4), SI.
+def predict(fit: OutputError, segment: Segment) -> FloatArray:
+    """A fit's open-loop run under a segment's rudder and revolutions, (n, 4), SI.
 
-    It begins as the trial began; nothing else of what was measured is used.
+    It begins as the segment began; nothing else of what was measured is used.
     """
-    problem = replace(fit.problem, trials=(trial,), waves=())
+    problem = replace(fit.problem, segments=(segment,), waves=())
     state = problem.start()[len(problem.free) :][: len(problem.model.state)]
     return problem.model.simulate(
-        fit.parameters, state, trial.path, len(trial), scale=problem.scale
+        fit.parameters, state, segment.path, len(segment), scale=problem.scale
     )
 
 
-def misfit(fit: OutputError, trial: Trial) -> FloatArray:
-    """How far a fit is off a trial it never saw, (4,): rms over the std of what was measured.
+def misfit(fit: OutputError, segment: Segment) -> FloatArray:
+    """How far a fit is off a segment it never saw, (4,): rms over the std of what was measured.
 
-    The trial's own unknowns are fitted to it, the parameters are not: no rudder's zero and no
+    The segment's own unknowns are fitted to it, the parameters are not: no rudder's zero and no
     sensor's bias of one run is known from another. Those of `JUDGED` are told of every model,
     fitted to them or not. NaN for what was not measured or the model does not predict; inf
     where the ship runs away.
     """
     whole = fit.problem
-    judged = tuple(o for o in OUTPUTS if o in (*whole.outputs, *JUDGED) and trial.has(o))
+    judged = tuple(o for o in MODEL_OUTPUTS if o in (*whole.outputs, *JUDGED) and segment.has(o))
     problem = replace(
-        whole, trials=(trial,), outputs=judged, values=fit.parameters, free=(), waves=()
+        whole, segments=(segment,), outputs=judged, values=fit.parameters, free=(), waves=()
     )
-    minimum = minimise(problem, problem.start(), first_spreads(problem))
-    found = np.full(len(OUTPUTS), np.nan)
+    minimum = minimise(problem, problem.start(), first_residual_stds(problem))
+    found = np.full(len(MODEL_OUTPUTS), np.nan)
     off = problem.measured(0) - problem.predicted(minimum.unknowns, 0)
     for at, column in enumerate(problem.columns):
         known = np.isfinite(problem.measured(0)[:, at])

@@ -20,7 +20,7 @@ ELSEWHERE = 2.0  # of cost, in squared standard deviations over two: another min
 
 
 @dataclass(frozen=True, eq=False)
-class Echo:
+class PriorSensitivity:
     """A second run of a fit."""
 
     shares: FloatArray  # (p,) of each value, how much is prior; NaN where the run ended elsewhere
@@ -32,19 +32,19 @@ class Echo:
         return not abs(self.worse_by) < ELSEWHERE
 
 
-def second_run(fit: OutputError, told: Uncertainty) -> Echo:
+def prior_sensitivity(fit: OutputError, told: Uncertainty) -> PriorSensitivity:
     """Fit once more, each prior moved by its standard deviation, each start by much."""
     problem, p = fit.problem, len(told.names)
     moved = _with_other_priors(problem)
     start = fit.minimum.unknowns.copy()
     start[:p] = two_priors(told, moved.bounds)[0]
-    again = minimise(moved, start, fit.spreads)
-    there = minimise(moved, fit.minimum.unknowns, fit.spreads, fit.minimum.jacobians)
+    again = minimise(moved, start, fit.residual_stds)
+    there = minimise(moved, fit.minimum.unknowns, fit.residual_stds, fit.minimum.jacobians)
     worse_by = again.cost - there.cost if np.isfinite(again.cost) else np.inf
     before = np.abs(moved.prior[0] - problem.prior[0])[:p]
     before = np.where(before > 0, before, np.abs(start - fit.minimum.unknowns)[:p])
     changed = np.abs(again.unknowns - fit.minimum.unknowns)[:p]
-    echo = Echo(changed / np.where(before > 0, before, np.inf), float(worse_by))
+    echo = PriorSensitivity(changed / np.where(before > 0, before, np.inf), float(worse_by))
     return replace(echo, shares=np.full(p, np.nan)) if echo.elsewhere else echo
 
 

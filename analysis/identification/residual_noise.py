@@ -14,7 +14,7 @@ LAGS = 5  # of which it is taken
 
 
 @dataclass(frozen=True)
-class Noise:
+class ResidualNoise:
     """Of one output: white noise, some of it in proportion to the output, and a slow part.
 
     A sample's variance is `white`^2 + (`relative` y)^2 + `slow`^2; the slow part stays off for
@@ -35,7 +35,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """What a fit leaves of one output of a trial, sample by sample as they were measured."""
+    """What a fit leaves of one output of a segment, sample by sample as they were measured."""
 
     off: FloatArray  # (k,)
     level: FloatArray  # (k,) as predicted
@@ -56,8 +56,8 @@ def interval_secs(values: FloatArray, dt: float) -> float:
 
 def noise_of(
     every: Sequence[Left], *, proportional: bool, least: float, share: float = LEAST_SHARE
-) -> Noise:
-    """The noise of one output, of what is left of it in each trial.
+) -> ResidualNoise:
+    """The noise of one output, of what is left of it in each segment.
 
     What changes from sample to sample is white; what stays is slow. `least` is a std below which
     no instrument is believed, nor is any sample to have less than a `share` of the usual.
@@ -68,7 +68,7 @@ def noise_of(
     white = max(white, share * usual, least)
     stds = [np.sqrt(white**2 + (relative * left.level) ** 2) for left in every]
     slow, secs = _slow(every, stds)
-    return Noise(white, relative, slow, secs)
+    return ResidualNoise(white, relative, slow, secs)
 
 
 def _white(every: Sequence[Left], *, proportional: bool) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from itertools import count
 
 import numpy as np
 
-from shiplog.checks.channel_stats import Survey, survey_log
+from shiplog.checks.channel_stats import LogStats, compute_log_stats
 from shiplog.checks.data_quality import faults
 from shiplog.checks.rudder_sign import rudder_sign_warning
 from shiplog.errors import LogError, UsageError
@@ -15,7 +15,7 @@ from shiplog.types import FloatArray, Log
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, IdentifierSettings
 from shiplog.vessel.vessel import Vessel, parse_vessel
 
-from .segment import Trial, trials_of, usual
+from .segment import Segment, segments_of, usual
 
 NEEDED = ("yaw_rate", "speed", "rudder", "rpm")
 ALSO = ("sway", "heading")
@@ -27,7 +27,7 @@ class Run:
     """A log: the pieces of it in which the inputs are known, and where the ship was in each."""
 
     name: str
-    trials: tuple[Trial, ...]
+    segments: tuple[Segment, ...]
     positions: tuple[FloatArray | None, ...]  # (n, 2) m north and east, where they were measured
     vessel: Vessel | None  # that the log carries
     warnings: tuple[str, ...]
@@ -40,7 +40,7 @@ def run_of(log: Log) -> Run:
     Raises `LogError` where a channel is missing or where rudder and revolutions are not known
     together long enough.
     """
-    found = survey_log(log, strict=True)
+    found = compute_log_stats(log, strict=True)
     missing = [name for name in NEEDED if name not in found]
     if missing:
         has = ", ".join(sorted({channel.name for channel in found}))
@@ -48,13 +48,13 @@ def run_of(log: Log) -> Run:
             f"no channel {missing[0]!r} in {log.name}; it has {has or 'none'}; "
             f"an identification needs {', '.join(NEEDED)}"
         )
-    trials = trials_of(resample(log, None, NEEDED, ALSO), log.name)
+    segments = segments_of(resample(log, None, NEEDED, ALSO), log.name)
     carried = log.vessel_toml
     vessel = parse_vessel(carried, f"vessel.toml in {log.name}") if carried is not None else None
-    places = tuple(_positions(log, trial) for trial in trials) if "position" in found else ()
+    places = tuple(_positions(log, segment) for segment in segments) if "position" in found else ()
     said = (*log.warnings, *_doubts(log, found))
     return Run(
-        log.name, trials, places or (None,) * len(trials), vessel,
+        log.name, segments, places or (None,) * len(segments), vessel,
         tuple(warning if log.name in warning else f"{log.name}: {warning}" for warning in said),
         log.data_lost,
     )  # fmt: skip
@@ -81,9 +81,9 @@ def distinct_runs(logs: Sequence[Log], held_out: Sequence[Log]) -> tuple[list[Ru
 
 
 def _same(run: Run, other: Run) -> bool:
-    return len(run.trials) == len(other.trials) and all(
+    return len(run.segments) == len(other.segments) and all(
         np.array_equal(a.measured, b.measured, equal_nan=True)
-        for a, b in zip(run.trials, other.trials, strict=True)
+        for a, b in zip(run.segments, other.segments, strict=True)
     )
 
 
@@ -93,10 +93,10 @@ def _numbered(name: str, number: int) -> str:
 
 
 def _renamed(run: Run, name: str) -> Run:
-    return replace(run, name=name, trials=tuple(replace(t, name=name) for t in run.trials))
+    return replace(run, name=name, segments=tuple(replace(t, name=name) for t in run.segments))
 
 
-def _doubts(log: Log, found: Survey) -> Iterator[str]:
+def _doubts(log: Log, found: LogStats) -> Iterator[str]:
     also = tuple(name for name in ("heading", "position") if name in found)
     yield from faults(found, (*NEEDED, *also))
     contrary = rudder_sign_warning(log)
@@ -104,9 +104,9 @@ def _doubts(log: Log, found: Survey) -> Iterator[str]:
         yield contrary
 
 
-def _positions(log: Log, trial: Trial) -> FloatArray | None:
-    """Where the ship was at a trial's samples, between the fixes in straight lines, (n, 2)."""
-    parts = [c for slab in log.slabs() for c in slab if c.name == "position"]
+def _positions(log: Log, segment: Segment) -> FloatArray | None:
+    """Where the ship was at a segment's samples, between the fixes in straight lines, (n, 2)."""
+    parts = [c for chunk in log.chunks() for c in chunk if c.name == "position"]
     if not parts:
         return None
     source = parts[0].source
@@ -114,10 +114,10 @@ def _positions(log: Log, trial: Trial) -> FloatArray | None:
     at = np.concatenate([part.measured_ns for part in fixes])
     values = np.concatenate([part.values for part in fixes])
     known = np.isfinite(values).all(axis=1)
-    secs = (at[known] - trial.signals.start_ns) * 1e-9
+    secs = (at[known] - segment.signals.start_ns) * 1e-9
     if len(secs) < 2:
         return None
-    time = trial.signals.time_secs
+    time = segment.signals.time_secs
     lines = [np.interp(time, secs, column, np.nan, np.nan) for column in values[known].T]
     return np.column_stack(lines)
 
@@ -151,8 +151,10 @@ def _bare(vessel: Vessel) -> Vessel:
 
 def contradictions(runs: Sequence[Run]) -> Iterator[str]:
     """What makes runs look like those of different ships."""
-    under_way = [run for run in runs if usual(run.trials, "rpm") > 0]
-    paces = {run.name: usual(run.trials, "speed") / usual(run.trials, "rpm") for run in under_way}
+    under_way = [run for run in runs if usual(run.segments, "rpm") > 0]
+    paces = {
+        run.name: usual(run.segments, "speed") / usual(run.segments, "rpm") for run in under_way
+    }
     if len(paces) < 2:
         return
     fast, slow = max(paces, key=lambda n: paces[n]), min(paces, key=lambda n: paces[n])

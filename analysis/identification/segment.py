@@ -1,4 +1,4 @@
-"""A trial as an identifier takes it: what the ship was given, and what was measured of her."""
+"""A segment as an identifier takes it: what the ship was given, and what was measured of her."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,8 +7,8 @@ import numpy as np
 
 from shiplog.checks.channel_stats import longest_step_secs
 from shiplog.errors import LogError
-from shiplog.ships.motion import OUTPUTS, Path
-from shiplog.ships.paper import INPUTS
+from shiplog.ships.motion import MODEL_OUTPUTS, Path
+from shiplog.ships.paper import PAPER_INPUTS
 from shiplog.ships.path import path_of
 from shiplog.types import FloatArray, Signals
 
@@ -16,13 +16,13 @@ LEAST_SECS = 60.0  # of a piece: a shorter one says nothing of a ship
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class Segment:
     """A run, or a piece of one, throughout which rudder and revolutions are known."""
 
     name: str
     signals: Signals
     path: Path
-    measured: FloatArray  # (n, 4) in the order of OUTPUTS; NaN where not measured
+    measured: FloatArray  # (n, 4) in the order of MODEL_OUTPUTS; NaN where not measured
 
     def __len__(self) -> int:
         """The number of samples."""
@@ -35,21 +35,21 @@ class Trial:
 
     def has(self, output: str) -> bool:
         """Whether an output was measured at all."""
-        return bool(np.isfinite(self.measured[:, OUTPUTS.index(output)]).sum() > 1)
+        return bool(np.isfinite(self.measured[:, MODEL_OUTPUTS.index(output)]).sum() > 1)
 
-    def part(self, start: int, stop: int) -> "Trial":
+    def part(self, start: int, stop: int) -> "Segment":
         """Its samples from `start` to before `stop`."""
         signals = self.signals.part(start, stop)
-        return Trial(self.name, signals, path_of(signals), self.measured[start:stop])
+        return Segment(self.name, signals, path_of(signals), self.measured[start:stop])
 
 
-def trials_of(signals: Signals, name: str) -> tuple[Trial, ...]:
+def segments_of(signals: Signals, name: str) -> tuple[Segment, ...]:
     """The pieces of a run in which rudder and revolutions are known, each of `LEAST_SECS` or more.
 
     Between an input's samples it is interpolated, over its gaps not. Raises `LogError` where no
     piece is left.
     """
-    inputs = {channel: _bridged(signals[channel], signals.dt_secs) for channel in INPUTS}
+    inputs = {channel: _bridged(signals[channel], signals.dt_secs) for channel in PAPER_INPUTS}
     known = np.isfinite(inputs["rudder"]) & np.isfinite(inputs["rpm"])
     whole = Signals(signals.start_ns, signals.dt_secs, {**signals.values, **inputs}, signals.first)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], known, [0]))))
@@ -66,10 +66,10 @@ def trials_of(signals: Signals, name: str) -> tuple[Trial, ...]:
     return tuple(_trial(whole.part(*piece), name) for piece in pieces)
 
 
-def _trial(signals: Signals, name: str) -> Trial:
+def _trial(signals: Signals, name: str) -> Segment:
     missing = np.full(len(signals), np.nan)
-    columns = [signals.values.get(output, missing) for output in OUTPUTS]
-    return Trial(name, signals, path_of(signals), np.column_stack(columns))
+    columns = [signals.values.get(output, missing) for output in MODEL_OUTPUTS]
+    return Segment(name, signals, path_of(signals), np.column_stack(columns))
 
 
 def _bridged(values: FloatArray, dt: float) -> FloatArray:
@@ -84,10 +84,11 @@ def _bridged(values: FloatArray, dt: float) -> FloatArray:
     return filled
 
 
-def usual(trials: Sequence[Trial], channel: str) -> float:
-    """The greatest of what the trials began with, over their first ten seconds: of speed or rpm."""
+def usual(segments: Sequence[Segment], channel: str) -> float:
+    """The largest initial speed or rpm among the segments, over their first ten seconds."""
     firsts = [
-        np.abs(trial.signals[channel][: max(2, round(10 / trial.dt_secs))]) for trial in trials
+        np.abs(segment.signals[channel][: max(2, round(10 / segment.dt_secs))])
+        for segment in segments
     ]
     known = [np.nanmedian(first) for first in firsts if np.isfinite(first).any()]
     return float(max(known, default=np.nan))

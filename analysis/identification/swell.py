@@ -7,9 +7,9 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
-LEAST_CYCLES = 4.0  # in a trial: of a slower one it cannot be told what it is
+LEAST_CYCLES = 4.0  # in a segment: of a slower one it cannot be told what it is
 SHORTEST_SECS = 2.0  # of a period; a faster one harms no fit
-OVERSAMPLED = 4  # frequencies to each that the trial's length resolves
+OVERSAMPLED = 4  # frequencies to each that the segment's length resolves
 MOST = 0.5  # of what stays off: where a wave is less, it is not a wave alone
 SURE = 40.0  # of a peak in a periodogram of chi-squared numbers: one in a hundred million
 
@@ -17,7 +17,7 @@ SURE = 40.0  # of a peak in a periodogram of chi-squared numbers: one in a hundr
 def frequency_of(
     residuals: FloatArray, usual: FloatArray, dt: float, slow: Sequence[float] = ()
 ) -> float | None:
-    """The frequency, in rad/s, of the wave that stands out most in a trial's residuals, if any.
+    """The frequency, in rad/s, of the wave that stands out most in a segment's residuals, if any.
 
     Both are (n, c), the residuals with NaN; each output's are weighed by their usual std. Of an
     output's `slow` part, a std, a wave must be able to explain the half. The

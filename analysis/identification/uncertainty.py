@@ -24,7 +24,7 @@ from .problem import Problem, residuals
 
 LEAST_RUNS = 4  # for a jackknife
 LEAST_WINDOW_SECS = 5.0  # over which neighbours are taken together, at the least
-VAGUE = 0.25  # relative std of a parameter that these data cannot tell,
+UNIDENTIFIABLE = 0.25  # relative std of a parameter that these data cannot tell,
 NEGLIGIBLE = 0.05  # unless the std is so small a part of what it is of ships in general,
 ECHO = 0.5  # and how much of it may be what was believed before
 NOTHING = 1e-200  # of information: its inverse is still a number
@@ -60,12 +60,12 @@ class Uncertainty:
         return np.asarray(self.covariance / np.outer(scale, scale))
 
     @property
-    def vague(self) -> tuple[str, ...]:
+    def unidentifiable(self) -> tuple[str, ...]:
         """The parameters that are not identifiable from these data.
 
         One that is small beside what it is of other ships is told by that measure.
         """
-        sure = self.std <= np.maximum(VAGUE * np.abs(self.values), NEGLIGIBLE * self.sizes)
+        sure = self.std <= np.maximum(UNIDENTIFIABLE * np.abs(self.values), NEGLIGIBLE * self.sizes)
         told = sure & (self.prior_share <= ECHO)
         return tuple(name for name, is_told in zip(self.names, told, strict=True) if not is_told)
 
@@ -79,7 +79,7 @@ def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
     problem, z = fit.problem, fit.minimum.unknowns
     p = len(problem.free)
     left = residuals(problem, z)
-    curvature = information(problem, left, fit.spreads, fit.minimum.jacobians, power=3)
+    curvature = information(problem, left, fit.residual_stds, fit.minimum.jacobians, power=3)
     inverse = _inverse(problem, curvature)
     share = np.diag(inverse)[:p] * problem.prior[1][:p]
     bound = _stds(_inverse(problem, _white_information(fit, left)))[:p]
@@ -124,7 +124,7 @@ def _stds(covariance: FloatArray) -> FloatArray:
 
 def _white_information(fit: OutputError, left: Sequence[FloatArray]) -> FloatArray:
     """Fisher's information if each sample were off by itself."""
-    white = [replace(spread, effective=spread.usual) for spread in fit.spreads]
+    white = [replace(spread, effective=spread.usual) for spread in fit.residual_stds]
     return information(fit.problem, left, white, fit.minimum.jacobians, power=0)
 
 
@@ -132,10 +132,10 @@ def _sandwich(fit: OutputError, left: Sequence[FloatArray], inverse: FloatArray)
     """White's covariance, neighbouring scores summed over windows as Newey and West have it."""
     problem, middle = fit.problem, np.diag(fit.problem.prior[1])
     longest = max(noise.slow_secs for noise in fit.noises)
-    for i, spread in enumerate(fit.spreads):
+    for i, spread in enumerate(fit.residual_stds):
         off, weight = weighed(left[i], spread)
         scores = np.einsum("ncq,nc->nq", fit.minimum.jacobians[i], weight * off)
-        together = max(longest, LEAST_WINDOW_SECS) / problem.trials[i].dt_secs
+        together = max(longest, LEAST_WINDOW_SECS) / problem.segments[i].dt_secs
         window = int(min(max(together, 1), len(scores) / 2))
         sums = np.cumsum(scores, axis=0)
         ends = np.vstack((sums, np.tile(sums[-1], (window, 1))))
@@ -152,9 +152,9 @@ def _left_out(fit: OutputError) -> FloatArray:
     """The parameters without each run in turn, (r, p), of the fits that came to an end."""
     problem, found = fit.problem, []
     for run in problem.runs:
-        kept = [i for i in range(len(problem.trials)) if i not in run]
-        rest, start = problem.of_trials(kept, fit.minimum.unknowns)
-        minimum = minimise(rest, start, [fit.spreads[i] for i in kept])
+        kept = [i for i in range(len(problem.segments)) if i not in run]
+        rest, start = problem.of_segments(kept, fit.minimum.unknowns)
+        minimum = minimise(rest, start, [fit.residual_stds[i] for i in kept])
         if minimum.settled:
             found.append(minimum.unknowns[: len(problem.free)])
     return np.array(found).reshape(-1, len(problem.free))

@@ -1,4 +1,4 @@
-"""A fit against runs it never saw: simulated open loop, in the units of a trial.
+"""A fit against runs it never saw: simulated open loop, in the units of a segment.
 
 The ship begins as the run began, and then hears of nothing but rudder and revolutions.
 """
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.manoeuvres.indices import Figure, figures_of, first_order
-from shiplog.ships.motion import OUTPUTS
+from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
 from .output_error import OutputError
 from .prediction import made_good, predict
 from .runs import Run
-from .segment import Trial
+from .segment import Segment
 
 FIXES_SECS = 5.0, 60.0  # of fixes before the rudder moves, at least and at most, tell a course
 ASTRAY = 0.03  # of their length, off the way sailed: more is no course
@@ -24,8 +24,8 @@ ASTRAY = 0.03  # of their length, off the way sailed: more is no course
 class Validation:
     """A run, and what the fit says of it."""
 
-    trial: Trial
-    simulated: FloatArray  # (n, 4) in the order of OUTPUTS, NaN where the ship ran away
+    segment: Segment
+    simulated: FloatArray  # (n, 4) in the order of MODEL_OUTPUTS, NaN where the ship ran away
     track: FloatArray  # (n, 2) m north and east from the start, as simulated,
     measured_track: FloatArray  # and as measured: by the fixes, or else by speed and heading
     rms: dict[str, float]  # rad/s, m/s, rad, m: of each output measured, and of the track
@@ -40,41 +40,41 @@ class Validation:
 def validate(fit: OutputError, run: Run) -> list[Validation]:
     """A fit against each piece of a run."""
     return [
-        _validation(fit, trial, fixes)
-        for trial, fixes in zip(run.trials, run.positions, strict=True)
+        _validation(fit, segment, fixes)
+        for segment, fixes in zip(run.segments, run.positions, strict=True)
     ]
 
 
-def _validation(fit: OutputError, trial: Trial, fixes: FloatArray | None) -> Validation:
-    course = 0.0 if fixes is None or trial.has("heading") else first_course(trial, fixes)
+def _validation(fit: OutputError, segment: Segment, fixes: FloatArray | None) -> Validation:
+    course = 0.0 if fixes is None or segment.has("heading") else first_course(segment, fixes)
     if course is None:  # the fixes are north and east of a ship that headed nobody knows where
         course, fixes = 0.0, None
-    measured = known_throughout(trial, course)
-    simulated = predict(fit, _headed(trial, measured))
-    track, sailed = made_good(simulated, trial.dt_secs), made_good(measured, trial.dt_secs)
+    measured = known_throughout(segment, course)
+    simulated = predict(fit, _headed(segment, measured))
+    track, sailed = made_good(simulated, segment.dt_secs), made_good(measured, segment.dt_secs)
     if fixes is not None:
         sailed = _from_first_fix(fixes, sailed if np.isnan(track).any() else track)
-    off = simulated - trial.measured
+    off = simulated - segment.measured
     predicted = (*fit.problem.model.outputs, "heading")
     rms = {
         name: rms_of(off[:, i])
-        for i, name in enumerate(OUTPUTS)
-        if trial.has(name) and name in predicted
+        for i, name in enumerate(MODEL_OUTPUTS)
+        if segment.has(name) and name in predicted
     }
     rms["track"] = rms_of(np.hypot(*(track - sailed).T))
-    figures = tuple(figures_of(trial, measured, sailed, simulated, track))
-    return Validation(trial, simulated, track, sailed, rms, figures)
+    figures = tuple(figures_of(segment, measured, sailed, simulated, track))
+    return Validation(segment, simulated, track, sailed, rms, figures)
 
 
-def known_throughout(trial: Trial, course: float = 0.0) -> FloatArray:
+def known_throughout(segment: Segment, course: float = 0.0) -> FloatArray:
     """What was measured, its holes filled in.
 
     A heading nobody measured is the turning summed up, from the `course` she began on.
     """
-    columns = [_filled_in(column) for column in trial.measured.T]
-    if not trial.has("heading"):
+    columns = [_filled_in(column) for column in segment.measured.T]
+    if not segment.has("heading"):
         rate = columns[0]
-        turned = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2)) * trial.dt_secs
+        turned = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2)) * segment.dt_secs
         columns[3] = course + turned
     return np.column_stack(columns)
 
@@ -84,32 +84,32 @@ def _filled_in(values: FloatArray) -> FloatArray:
     return np.interp(np.arange(len(values)), at, values[at]) if len(at) > 1 else 0.0 * values
 
 
-def first_course(trial: Trial, fixes: FloatArray) -> float | None:
+def first_course(segment: Segment, fixes: FloatArray) -> float | None:
     """The course a ship without heading began on, in rad: that which lays her way on the fixes.
 
     Only those before the rudder moves are looked at, for in a turn she drifts. None where they are
     too few, or where no course lays one on the other.
     """
-    order = first_order(trial.signals["rudder"], trial.dt_secs)
-    least, most = (round(secs / trial.dt_secs) for secs in FIXES_SECS)
-    before = len(trial) if order is None else order + 1
+    order = first_order(segment.signals["rudder"], segment.dt_secs)
+    least, most = (round(secs / segment.dt_secs) for secs in FIXES_SECS)
+    before = len(segment) if order is None else order + 1
     known = np.flatnonzero(np.isfinite(fixes[:before]).all(axis=1))[:most]
     if len(known) <= least:
         return None
-    sailed = made_good(known_throughout(trial), trial.dt_secs)[known]
+    sailed = made_good(known_throughout(segment), segment.dt_secs)[known]
     way, seen = ((each - each.mean(axis=0)) @ [1, 1j] for each in (sailed, fixes[known]))
     course = float(np.angle(np.vdot(way, seen)))
     off = rms_of(np.abs(way * np.exp(1j * course) - seen))
     return course if off < ASTRAY * abs(way[-1] - way[0]) else None
 
 
-def _headed(trial: Trial, measured: FloatArray) -> Trial:
-    """The trial with a heading to begin with."""
-    if trial.has("heading"):
-        return trial
-    given = trial.measured.copy()
+def _headed(segment: Segment, measured: FloatArray) -> Segment:
+    """The segment with a heading to begin with."""
+    if segment.has("heading"):
+        return segment
+    given = segment.measured.copy()
     given[:, 3] = measured[:, 3]
-    return Trial(trial.name, trial.signals, trial.path, given)
+    return Segment(segment.name, segment.signals, segment.path, given)
 
 
 def _from_first_fix(fixes: FloatArray, track: FloatArray) -> FloatArray:

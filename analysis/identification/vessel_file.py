@@ -15,10 +15,10 @@ from shiplog.ships.paper import COEFFICIENT_UNITS, YAW_COEFFICIENTS, Coefficient
 from shiplog.vessel.model_section import PAPERS
 from shiplog.vessel.vessel import Vessel
 
-from .identify import ALPHAS, IdentifiedShip, Tell
+from .identify import ALPHAS, IdentifiedShip, ProgressCallback
 from .output_error import USUAL_LENGTH, OutputError, output_error
 from .segment import usual
-from .uncertainty import ECHO, VAGUE, Uncertainty, uncertainty
+from .uncertainty import ECHO, UNIDENTIFIABLE, Uncertainty, uncertainty
 
 SECTIONS = {"yaw": YAW_COEFFICIENTS, "surge": ("f", "g", "h")}
 ANGLES = {"b2": 1, "b3": 2, "f": 2}  # how often an angle stands in their denominators
@@ -33,7 +33,7 @@ WITHOUT_PAPERS = (
 )
 
 
-def vessel_toml(found: IdentifiedShip, on_step: Tell = lambda _: None) -> str:
+def vessel_toml(found: IdentifiedShip, on_progress: ProgressCallback = lambda _: None) -> str:
     """The text of the vessel file, each value with its 95 % interval or a caution.
 
     Raises `LogError` where nobody knows anything of the yaw or of the surge: the logs tell nothing
@@ -48,7 +48,7 @@ def vessel_toml(found: IdentifiedShip, on_step: Tell = lambda _: None) -> str:
         own = [*_head(found), *_paper(found.fit, found.uncertainty, _angle_unit(found.vessel))]
         return _text([*own, *_rudder(found.vessel, found.fit)])
     own = [*_head(found), *_model(found)]
-    on_step("fit the paper's model beside it")
+    on_progress("fit the paper's model beside it")
     paper = _beside(found)
     if paper is None:
         return _text([*own, *WITHOUT_PAPERS, *_rudder(found.vessel)])
@@ -71,7 +71,7 @@ def _untold(model: Model, found: Uncertainty) -> Iterator[str]:
 
     By the noise alone: a model that is not the ship has wider intervals, and may be near enough.
     """
-    told = (found.coloured <= VAGUE * np.abs(found.values)) & (found.prior_share <= ECHO)
+    told = (found.coloured <= UNIDENTIFIABLE * np.abs(found.values)) & (found.prior_share <= ECHO)
     for part in ("yaw", "surge"):
         own = np.array([(name in SURGE) == (part == "surge") for name in found.names], bool)
         priors = [model.parameter(name).prior_std for name in np.array(found.names)[own]]
@@ -86,24 +86,24 @@ def _beside(found: IdentifiedShip) -> tuple[OutputError, Uncertainty] | None:
     second order has nothing to hold on to in a ship of the first: a pole that the rudder never
     shows may lie anywhere, and a rudder that acts to the contrary side with it.
     """
-    trials = found.fit.problem.trials
+    segments = found.fit.problem.segments
     fits = [c.fit for c in found.candidates if c.model.name == "burylin" and c.fit is not None]
     known = found.vessel.coefficients if found.vessel is not None else None
     try:
         fit = fits[0] if fits else output_error(
-            trials, ship_model("burylin"),
+            segments, ship_model("burylin"),
             known={name: getattr(known, name) for name in ALPHAS} if known is not None else {},
         )  # fmt: skip
     except LogError:
         return None
     told, c = uncertainty(fit), _coefficients(fit)
-    works = rudder_effect(c, usual(trials, "speed"), usual(trials, "rpm")) * c.d > 0 > c.a
+    works = rudder_effect(c, usual(segments, "speed"), usual(segments, "rpm")) * c.d > 0 > c.a
     return (fit, told) if works else None
 
 
 def _head(found: IdentifiedShip) -> Iterator[str]:
-    ship, trials = found.vessel, found.fit.problem.trials
-    logs = ", ".join(dict.fromkeys(trial.name for trial in trials))
+    ship, segments = found.vessel, found.fit.problem.segments
+    logs = ", ".join(dict.fromkeys(segment.name for segment in segments))
     name = f"{ship.name if ship else 'ship'}, identified"
     yield f"# {found.model.title}, identified from {logs}"
     yield f"name = {_quoted(name)}"
@@ -111,7 +111,7 @@ def _head(found: IdentifiedShip) -> Iterator[str]:
         yield f"length = {ship.length!r}"
     elif found.model.dimensionless:
         yield f"length = {USUAL_LENGTH!r}  # m, ASSUMED, for nobody gave it: the scale of [model]"
-    yield f"approach_rpm = {round(usual(trials, 'rpm'), 3)!r}"
+    yield f"approach_rpm = {round(usual(segments, 'rpm'), 3)!r}"
     yield f'angle_unit = "{_angle_unit(ship)}"'
 
 
@@ -167,7 +167,7 @@ def _remarks(
     echo = dict(zip(found.names, found.prior_share > ECHO, strict=True))
 
     def remark(name: str) -> str:
-        if name in found.vague:
+        if name in found.unidentifiable:
             known = "believed before, for the most" if echo[name] else "a value that fits them"
             return f"NOT IDENTIFIABLE from these logs: {known}"
         if name in half:

@@ -1,4 +1,4 @@
-"""The figures of a manoeuvre, measured and simulated, in a trial's units.
+"""The figures of a manoeuvre, measured and simulated, in a segment's units.
 
 They count from the instant at which the rudder leaves its rest by `OFF_REST`, in the measured run
 and in the simulated one alike: other rules change an advance by some per cent. Headings count from
@@ -16,7 +16,7 @@ from scipy.ndimage import median_filter
 from scipy.signal import savgol_filter
 
 from analysis.identification.prediction import Turn, reached, turn
-from analysis.identification.segment import Trial
+from analysis.identification.segment import Segment
 from shiplog.types import FloatArray
 
 OFF_REST = radians(0.5)
@@ -72,7 +72,7 @@ def first_order(rudder: FloatArray, dt: float) -> int | None:
 
 
 def figures_of(
-    trial: Trial,
+    segment: Segment,
     measured: FloatArray,
     sailed: FloatArray,
     simulated: FloatArray,
@@ -82,8 +82,8 @@ def figures_of(
 
     Outputs are (n, 4), positions (n, 2) in m; measured ones must be known throughout.
     """
-    dt = trial.dt_secs
-    rudder = median_filter(trial.signals["rudder"], 1 + 2 * round(SPIKE_SECS / 2 / dt))
+    dt = segment.dt_secs
+    rudder = median_filter(segment.signals["rudder"], 1 + 2 * round(SPIKE_SECS / 2 / dt))
     order = first_order(rudder, dt)
     if order is None or not np.isfinite(simulated).all():
         return

@@ -62,7 +62,7 @@ class Blocks(NamedTuple):
         )
 
 
-class Split(NamedTuple):
+class ChangeFit(NamedTuple):
     """A regression with columns that change between two blocks."""
 
     at: int  # the first block after the change
@@ -75,16 +75,16 @@ class Split(NamedTuple):
     spread: float  # of the instants tried, what makes the largest of them larger
 
 
-def changed(blocks: Blocks) -> Split | None:
+def changed(blocks: Blocks) -> ChangeFit | None:
     """The change that the blocks tell most surely, if they tell any."""
     candidates = [i for i, name in enumerate(blocks.names) if name != SLIPSTREAM]
-    splits = [split for i in candidates if (split := split_at_best(blocks, (i,))) is not None]
+    splits = [split for i in candidates if (split := best_change(blocks, (i,))) is not None]
     best = min(splits, key=lambda split: split.chances[-1], default=None)
     if best is None or not is_sure(blocks, best):
         return None
     for _ in candidates:
         more = [
-            split_at_best(blocks, (*best.columns, i)) for i in candidates if i not in best.columns
+            best_change(blocks, (*best.columns, i)) for i in candidates if i not in best.columns
         ]
         told = [split for split in more if split is not None]
         added = min(told, key=lambda split: split.chances[-1], default=None)
@@ -95,24 +95,24 @@ def changed(blocks: Blocks) -> Split | None:
     return None if all(small) else best
 
 
-def share_of(split: Split, c: int) -> float:
+def share_of(split: ChangeFit, c: int) -> float:
     """How much of itself the c-th column changed by."""
     difference = split.values[len(split.values) - len(split.columns) + c]
     return float(abs(difference / split.values[split.columns[c]]))
 
 
-def _without_idle(blocks: Blocks, split: Split) -> Split:
+def _without_idle(blocks: Blocks, split: ChangeFit) -> ChangeFit:
     """The split without columns of which it cannot be said that they had to change."""
     while len(split.columns) > 1 and split.chances.max() > DOUBT:
         idle = int(np.argmax(split.chances))
-        fewer = split_at_best(blocks, (*split.columns[:idle], *split.columns[idle + 1 :]))
+        fewer = best_change(blocks, (*split.columns[:idle], *split.columns[idle + 1 :]))
         if fewer is None:
             break
         split = fewer
     return split
 
 
-def split_at_best(blocks: Blocks, columns: tuple[int, ...]) -> Split | None:
+def best_change(blocks: Blocks, columns: tuple[int, ...]) -> ChangeFit | None:
     """The likeliest instant at which these columns changed; None where none can be told.
 
     Where nothing is known of the rudder, how much of it is slipstream is found by turns.
@@ -131,7 +131,7 @@ def split_at_best(blocks: Blocks, columns: tuple[int, ...]) -> Split | None:
     return split
 
 
-def _split_as_given(blocks: Blocks, columns: tuple[int, ...]) -> Split | None:
+def _split_as_given(blocks: Blocks, columns: tuple[int, ...]) -> ChangeFit | None:
     dated = _dated(blocks, columns)
     if dated is None:
         return None
@@ -158,7 +158,7 @@ def _split_as_given(blocks: Blocks, columns: tuple[int, ...]) -> Split | None:
     inflation = independent / freedom
     stds = np.sqrt(inflation * run_squares(influences[:, p:], blocks.run))
     chances = 2 * t.sf(np.abs(values[p:]) / np.maximum(stds, TINY), degrees)
-    return Split(at, columns, values, influences, inflation, degrees, chances, spread)
+    return ChangeFit(at, columns, values, influences, inflation, degrees, chances, spread)
 
 
 def _dated(blocks: Blocks, columns: tuple[int, ...]) -> tuple[int, float] | None:
@@ -210,7 +210,7 @@ def run_squares(influences: FloatArray, run: int) -> FloatArray:
     return np.asarray(((sums[run:] - sums[:-run]) ** 2).sum(0) / run)
 
 
-def is_sure(blocks: Blocks, split: Split) -> bool:
+def is_sure(blocks: Blocks, split: ChangeFit) -> bool:
     """Whether the last column changed, though every instant and every column was tried."""
     candidates = sum(name != SLIPSTREAM for name in blocks.names)
     chance = largest_of_instants(float(split.chances[-1]), split.spread)

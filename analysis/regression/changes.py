@@ -18,13 +18,13 @@ from shiplog.types import FloatArray
 from .change_test import (
     DOUBT,
     Blocks,
-    Split,
+    ChangeFit,
+    best_change,
     changed,
     inverse_of,
     is_sure,
     run_squares,
     share_of,
-    split_at_best,
 )
 from .sliding import WORST_INFLATION
 from .weak_form import SLIPSTREAM, Equation, Rows, WeakForm, with_constant, with_slipstream
@@ -72,8 +72,8 @@ class Change:
         )
 
 
-class ShipWatch:
-    """Looks for changes in the coefficients of both equations, whose rows come in slabs.
+class ShipChangeTest:
+    """Looks for changes in the coefficients of both equations, whose rows come in chunks.
 
     A steady yaw moment may come and go. Where the model is a `guessed` one, nothing is known of
     the slipstream: whatever the speed and the revolutions may do to the rudder is allowed for, and
@@ -84,8 +84,8 @@ class ShipWatch:
         yaw, count = equations.yaw.with_constant(), equations.row_count
         self._guessed = guessed
         rudder = yaw.with_slipstream() if guessed else yaw
-        self._yaw = ChangeWatch(rudder, count, least=LEAST_GUESSED if guessed else LEAST_SHARE)
-        self._surge = ChangeWatch(equations.surge, count)
+        self._yaw = ChangeTest(rudder, count, least=LEAST_GUESSED if guessed else LEAST_SHARE)
+        self._surge = ChangeTest(equations.surge, count)
 
     def add(self, yaw: Rows, surge: Rows) -> None:
         """The next rows."""
@@ -99,8 +99,8 @@ class ShipWatch:
         return tuple(sorted(found, key=lambda change: change.at_secs))
 
 
-class ChangeWatch:
-    """Looks for changes in one equation's coefficients, `count` rows in all, in slabs.
+class ChangeTest:
+    """Looks for changes in one equation's coefficients, `count` rows in all, in chunks.
 
     A `constant` among the regressors may change, too, and nothing is said of it: that is a
     disturbance. Where there is a slipstream (`with_slipstream`) it changes as d does. No change
@@ -199,7 +199,7 @@ def _sought(blocks: Blocks, start: int, stop: int, depth: int) -> list[int]:
     return [*earlier, at, *_sought(blocks, at + clear, stop, depth - 1)]
 
 
-def _told(blocks: Blocks, split: Split) -> list[Change]:
+def _told(blocks: Blocks, split: ChangeFit) -> list[Change]:
     """The changes of a split that are a coefficient's, and not too small."""
     instead = _instead(blocks, split) if len(split.columns) == 1 else ()
     return [
@@ -209,7 +209,7 @@ def _told(blocks: Blocks, split: Split) -> list[Change]:
     ]
 
 
-def _change(blocks: Blocks, split: Split, c: int, instead: tuple[str, ...]) -> Change:
+def _change(blocks: Blocks, split: ChangeFit, c: int, instead: tuple[str, ...]) -> Change:
     i, edges = split.columns[c], blocks.edges_secs
     j = len(blocks.names) + c
     before, difference = split.values[i], split.values[j]
@@ -233,13 +233,13 @@ def _change(blocks: Blocks, split: Split, c: int, instead: tuple[str, ...]) -> C
     )
 
 
-def _instead(blocks: Blocks, split: Split) -> tuple[str, ...]:
+def _instead(blocks: Blocks, split: ChangeFit) -> tuple[str, ...]:
     """The coefficients that might have changed alone: beside one the found one is in doubt."""
     found = []
     for i, name in enumerate(blocks.names):
         if name not in COEFFICIENT_UNITS or i in split.columns:
             continue
-        alone, both = split_at_best(blocks, (i,)), split_at_best(blocks, (i, *split.columns))
+        alone, both = best_change(blocks, (i,)), best_change(blocks, (i, *split.columns))
         doubted = both is None or both.chances[-1] > DOUBT
         if alone is not None and is_sure(blocks, alone) and doubted:
             found.append(name)

@@ -5,14 +5,14 @@ from functools import cached_property
 
 import numpy as np
 
-from analysis.signals.concat import stacked
+from analysis.signals.concat import concatenate
 from shiplog.ships.paper import COEFFICIENT_UNITS
 from shiplog.types import FloatArray
 
 from .sliding import WINDOW_SECS, Errors, History, Regression, Solution, Windows
 from .weak_form import Equation, Rows, with_constant
 
-ROWS = 1 << 13  # a slab
+ROWS = 1 << 13  # a chunk
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Coefficient:
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class CoefficientFit:
     """One equation's coefficients from the whole trial, and how well its windows could tell."""
 
     coefficients: dict[str, Coefficient]
@@ -41,7 +41,7 @@ class Identification:
 
 
 class Identifier:
-    """Identifies one equation from rows in slabs, which come twice: to `add`, then to `step`.
+    """Identifies one equation from rows in chunks, which come twice: to `add`, then to `step`.
 
     With `constant`, a constant is estimated beside the coefficients of the whole trial: a steady
     moment, or the rudder's zero. A gyro's bias it takes up in part only, for that stands in w|w|
@@ -87,14 +87,14 @@ class Identifier:
         self._blank += int(np.isnan(history.values).all(axis=1).sum())
         return history
 
-    def result(self) -> Identification:
+    def result(self) -> CoefficientFit:
         """What all rows come to, when they have come twice."""
         whole = self._errors.result()
         coefficients = {  # a constant after them is left out
             name: Coefficient(float(value), float(std), COEFFICIENT_UNITS[name])
             for name, value, std in zip(self._names, whole.values, whole.stds, strict=False)
         }
-        return Identification(
+        return CoefficientFit(
             coefficients,
             whole.condition,
             np.concatenate(self._ends),
@@ -105,7 +105,7 @@ class Identifier:
 
 def identify(
     rows: Rows, *, constant: bool = False, window_secs: float = WINDOW_SECS
-) -> tuple[Identification, History]:
+) -> tuple[CoefficientFit, History]:
     """The coefficients over the whole trial and over each window, of rows that are all there.
 
     As `Identifier`. A trial shorter than the window is one window.
@@ -113,6 +113,6 @@ def identify(
     count = len(rows.target)
     identifier = Identifier(rows.equation, count, constant=constant, window_secs=window_secs)
     identifier.add(rows)
-    slabs = [rows.part(start, start + ROWS) for start in range(0, max(count, 1), ROWS)]
-    history = stacked([identifier.step(slab) for slab in slabs])
+    chunks = [rows.part(start, start + ROWS) for start in range(0, max(count, 1), ROWS)]
+    history = concatenate([identifier.step(chunk) for chunk in chunks])
     return identifier.result(), history

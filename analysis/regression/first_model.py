@@ -1,6 +1,6 @@
 """A first model, from the log itself, for a ship of which nothing is known."""
 
-from analysis.signals.signal_stats import Gauge
+from analysis.signals.signal_stats import SignalStats
 from shiplog.errors import LogError
 from shiplog.ships.paper import SURGE_COEFFICIENTS, Coefficients
 from shiplog.vessel.vessel import Vessel
@@ -18,7 +18,7 @@ YAW_FORMS = (("a", "b1", "b2", "d", "e"), ("a", "b1", "d", "e"), ("a", "d", "e")
 SURGE_FORMS = (SURGE_COEFFICIENTS, ("f", "h"))
 
 
-def fit_first_model(yaw: Identifier, surge: Identifier, usual: Gauge, name: str) -> Vessel:
+def fit_first_model(yaw: Identifier, surge: Identifier, stats: SignalStats, name: str) -> Vessel:
     """A vessel whose coefficients are those of the whole log, by least squares in weak form.
 
     b3 is left out, for on a real ship it cannot be told from b2; and b2 and b1 where the log
@@ -33,7 +33,7 @@ def fit_first_model(yaw: Identifier, surge: Identifier, usual: Gauge, name: str)
             f"the log carries no model, and too little moves in it to fit one of "
             f"{' and '.join(unknown)}; give the ship's with --vessel: {name}"
         )
-    return Vessel(f"fitted to {name}", BARE._replace(**found), approach_rpm=usual.rpm)
+    return Vessel(f"fitted to {name}", BARE._replace(**found), approach_rpm=stats.rpm)
 
 
 def _richest(rows: Identifier, forms: tuple[tuple[str, ...], ...]) -> dict[str, float]:

@@ -4,7 +4,7 @@ Burylin's eq. (7) by least squares over a window that slides along the trial, ea
 its integral form (`weak_form`). Columns are scaled to unit length before anything is solved or
 any condition number is told.
 
-Rows may come in slabs, and how they are parted changes no result: `Windows` takes them once, the
+Rows may come in chunks, and how they are parted changes no result: `Windows` takes them once, the
 whole trial's fit twice, once for the values (`Regression`) and once for the errors (`Errors`).
 """
 
@@ -65,7 +65,7 @@ def fit(rows: Rows) -> Fit:
 
 
 class Windows:
-    """The history of a trial whose rows come in slabs."""
+    """The history of a trial whose rows come in chunks."""
 
     def __init__(self, equation: Equation, count: int, window_secs: float = WINDOW_SECS) -> None:
         """Of `count` rows in all."""
@@ -113,7 +113,7 @@ class Solution:
 
 
 class Regression:
-    """The first pass over a whole trial whose rows come in slabs: the values."""
+    """The first pass over a whole trial whose rows come in chunks: the values."""
 
     def __init__(self, equation: Equation) -> None:
         p = len(equation.names)
@@ -153,7 +153,7 @@ class Regression:
 
 
 class Errors:
-    """The second pass, over the same rows in slabs: the errors."""
+    """The second pass, over the same rows in chunks: the errors."""
 
     def __init__(self, solution: Solution) -> None:
         self._solution = solution

@@ -20,8 +20,8 @@ import numpy as np
 from shiplog.checks.channel_stats import longest_step_secs
 from shiplog.compiled import compiled
 from shiplog.ships.paper import (
-    INPUTS,
-    OUTPUTS,
+    PAPER_INPUTS,
+    PAPER_OUTPUTS,
     SURGE_COEFFICIENTS,
     YAW_COEFFICIENTS,
     Coefficients,
@@ -29,7 +29,7 @@ from shiplog.ships.paper import (
 )
 from shiplog.types import FloatArray, Signals
 
-CHANNELS = (*OUTPUTS, *INPUTS)
+CHANNELS = (*PAPER_OUTPUTS, *PAPER_INPUTS)
 BUMP_SECS = 60.0  # long against the noise, short against the ship's turning
 STRIDE_SECS = 1.0
 LEAST_RUDDER = np.radians(2.0)  # a rudder that moves less tells nothing of yaw,
@@ -96,7 +96,7 @@ def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
 
 
 class WeakForm:
-    """Makes rows of signals that come in slabs, `count` instants in all.
+    """Makes rows of signals that come in chunks, `count` instants in all.
 
     `intervals` (4,) are the usual numbers of instants from one sample of `CHANNELS` to the next.
     """
@@ -122,13 +122,13 @@ class WeakForm:
         """How many rows there will be in all."""
         return max(0, (self._count - self._width) // self._stride + 1)
 
-    def step(self, slab: Signals, fastest: float) -> tuple[Rows, Rows]:
-        """The rows of yaw and of surge that the next slab makes possible.
+    def step(self, chunk: Signals, fastest: float) -> tuple[Rows, Rows]:
+        """The rows of yaw and of surge that the next chunk makes possible.
 
         `fastest` is the greatest speed of the trial, m/s, as far as it is known: what is judged by
         it is judged by that of the last rows.
         """
-        self._kept = {n: np.concatenate((kept, slab[n])) for n, kept in self._kept.items()}
+        self._kept = {n: np.concatenate((kept, chunk[n])) for n, kept in self._kept.items()}
         end = self._first + len(self._kept["speed"])
         settled = end if end == self._count else end - self._reach
         until = max(self._row, (settled - self._width) // self._stride + 1)

@@ -19,7 +19,7 @@ from shiplog.types import FloatArray
 from .batched_qr import TINY, Solutions, merge, no_solutions, solve
 
 ABREAST = 56  # windows solved together; a power of two would have their rows in one line of cache
-SLAB = 8192  # rows taken at a time where all are there
+CHUNK = 8192  # rows taken at a time where all are there
 NOTHING = (0.0, np.inf, -np.inf)  # the tally of no rows
 
 
@@ -61,9 +61,9 @@ def slide(X: FloatArray, y: FloatArray, length: int) -> Slid:
     stacks, still = no_rows(length, p), np.zeros(len(y))
     values: list[FloatArray] = [np.empty((0, p))]
     conditions: list[FloatArray] = [np.empty(0)]
-    for start in range(0, len(y), SLAB):
-        slab = slice(start, start + SLAB)
-        found, tallies = push(stacks, X[slab], y[slab], still[slab])
+    for start in range(0, len(y), CHUNK):
+        chunk = slice(start, start + CHUNK)
+        found, tallies = push(stacks, X[chunk], y[chunk], still[chunk])
         kept = found.inflations > 0
         enough = np.isfinite(found.conditions) & (tallies[:, 0] >= kept.sum(axis=0))
         values.append(np.where(kept & enough, found.values, np.nan).T)
@@ -90,7 +90,7 @@ def no_rows(length: int, p: int) -> Stacks:
 def push(stacks: Stacks, X: FloatArray, y: FloatArray, excitation: FloatArray) -> Unjudged:
     """The windows that end in the next rows X (m, p), y (m,) and excitation (m,).
 
-    However the rows are parted into slabs, the windows are the same.
+    However the rows are parted into chunks, the windows are the same.
     """
     rows = np.column_stack((X, y)).astype(np.float64, copy=False)
     unknown = ~np.isfinite(rows).all(axis=1)

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from shiplog.checks.channel_stats import Survey
+from shiplog.checks.channel_stats import LogStats
 from shiplog.resampling import Clock
 
 ASTERN_SHARE = 0.01  # of the samples: a single one may be noise about rest
 
 
-def doubtful(found: Survey, needed: tuple[str, ...]) -> Iterator[str]:
+def doubtful(found: LogStats, needed: tuple[str, ...]) -> Iterator[str]:
     """Sources to choose from, and sensors that seem dead or to go astern."""
     for name in needed:
         sources = [channel.source for channel in found if channel.name == name]
@@ -25,7 +25,7 @@ def doubtful(found: Survey, needed: tuple[str, ...]) -> Iterator[str]:
             yield f"{name}: astern in places, where the model does not hold"
 
 
-def _dead(found: Survey) -> Iterator[str]:
+def _dead(found: LogStats) -> Iterator[str]:
     """Sensors that say the same throughout although the ship moved."""
     ranges = {name: np.ptp(found[name].extremes) for name in ("yaw_rate", "speed", "rudder")}
     turned = ranges["yaw_rate"] > np.radians(0.1)
@@ -36,7 +36,7 @@ def _dead(found: Survey) -> Iterator[str]:
         yield f"{found['rpm'].topic}: 0 throughout, though the ship goes; the model needs it"
 
 
-def silent_ends(found: Survey, clock: Clock, needed: tuple[str, ...]) -> Iterator[str]:
+def silent_ends(found: LogStats, clock: Clock, needed: tuple[str, ...]) -> Iterator[str]:
     """Parts of the log that are not replayed, or only predicted, for want of a channel."""
     first, last = clock.start_ns, clock.end_ns
     begun = {name: found[name].known_span_ns[0] for name in needed}

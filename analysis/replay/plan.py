@@ -11,21 +11,21 @@ from math import sqrt
 import numpy as np
 
 from analysis.disturbance.observer import blindness
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.filters.tuning import noise_of, wave_in
 from analysis.regression.coefficients import Identifier
 from analysis.regression.first_model import BARE, fit_first_model
 from analysis.regression.sliding import least_window_secs
 from analysis.regression.weak_form import WeakForm
 from analysis.signals.hold import InputHold
-from analysis.signals.signal_stats import Gauge, Gauger
+from analysis.signals.signal_stats import SignalStats, SignalStatsCollector
 from shiplog import Channel, LogError, Signals, Vessel
-from shiplog.checks.channel_stats import Survey, survey_log
+from shiplog.checks.channel_stats import LogStats, compute_log_stats
 from shiplog.checks.data_quality import faults
-from shiplog.checks.gyro_bias import GyroWatch
-from shiplog.checks.rudder_sign import RudderWatch
+from shiplog.checks.gyro_bias import GyroBiasCheck
+from shiplog.checks.rudder_sign import RudderSignCheck
 from shiplog.resampling import Clock, on_clock, set_clock
-from shiplog.ships.paper import INPUTS, OUTPUTS, Coefficients
+from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
 from shiplog.types import FloatArray, Log
 from shiplog.vessel.settings import SHORTEST_WINDOW_SECS, DisturbanceSettings, FilterSettings
 from shiplog.vessel.vessel import idle, parse_vessel, with_settings
@@ -35,45 +35,49 @@ from .channel_warnings import doubtful, silent_ends
 FITTED = "a first model, fitted to this log"
 FEWEST = 4  # samples of an output: their third difference shows its noise
 OF_WINDOWS = ("yaw", "surge")
-NEEDED = (*OUTPUTS, *INPUTS)
+NEEDED = (*PAPER_OUTPUTS, *PAPER_INPUTS)
 USUAL_SEA = 0.6  # rad/s, where no wave shows
 
-Tell = Callable[[str, float], None]  # the step, and the share of it that is done
+ProgressCallback = Callable[[str, float], None]  # the step, and the share of it that is done
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
     """What is known of a trial before it is replayed."""
 
-    survey: Survey
+    log_stats: LogStats
     clock: Clock
     vessel: Vessel
     model_origin: str  # where the model came from, in words
-    usual: Gauge
-    noise: Noise
+    stats: SignalStats
+    noise: NoiseModel
     observed: DisturbanceSettings  # the vessel's, with what the log tells of a wave
     warnings: tuple[str, ...]
 
     @property
     def name(self) -> str:
         """The log's."""
-        return self.survey.name
+        return self.log_stats.name
 
 
 class Planner:
     """Goes through a log twice; `yaw` and `surge` then know the whole trial's equations."""
 
     def __init__(
-        self, log: Log, vessel: Vessel | None, settings: Mapping[str, object], tell: Tell
+        self,
+        log: Log,
+        vessel: Vessel | None,
+        settings: Mapping[str, object],
+        tell: ProgressCallback,
     ) -> None:
         self._log, self._tell = log, tell
         self._warnings: list[str] = []
         vessel, origin = _stated_model(log, vessel, settings)
-        survey, clock = self._surveyed()
-        usual, self.yaw, self.surge = self._gauged(survey, clock, vessel)
+        log_stats, clock = self._log_stats_and_clock()
+        stats, self.yaw, self.surge = self._signal_stats_and_equations(log_stats, clock, vessel)
         tell("model", 0.0)
         if vessel.coefficients is None:
-            vessel, origin = self._with_first_model(vessel, usual), FITTED
+            vessel, origin = self._with_first_model(vessel, stats), FITTED
         elif vessel.model is not None:
             self._warnings.append(
                 f"filters are built on the paper's model: this is a replay by [yaw] and [surge] of "
@@ -81,16 +85,16 @@ class Planner:
                 "counts as disturbance"
             )
         self._warnings += idle(vessel)
-        noise = self._noise(vessel, survey, clock, usual)
-        observed = self._observed(vessel, usual, noise)
+        noise = self._noise(vessel, log_stats, clock, stats)
+        observed = self._observed(vessel, stats, noise)
         self.plan = Plan(
-            survey, clock, vessel, origin, usual, noise, observed, tuple(self._warnings)
+            log_stats, clock, vessel, origin, stats, noise, observed, tuple(self._warnings)
         )
 
-    def _surveyed(self) -> tuple[Survey, Clock]:
+    def _log_stats_and_clock(self) -> tuple[LogStats, Clock]:
         """The first time through the log."""
         self._tell("check", 0.0)
-        found = survey_log(self._log, strict=True)
+        found = compute_log_stats(self._log, strict=True)
         lacking = [name for name in NEEDED if name not in found]
         if lacking:
             has = ", ".join(sorted({channel.name for channel in found}))
@@ -102,39 +106,40 @@ class Planner:
         self._warnings += [*self._log.warnings, *faults(found, (*NEEDED, *also))]
         return found, set_clock(self._log, found, channels=NEEDED, optional=("heading",))
 
-    def _gauged(
-        self, found: Survey, clock: Clock, vessel: Vessel
-    ) -> tuple[Gauge, Identifier, Identifier]:
+    def _signal_stats_and_equations(
+        self, found: LogStats, clock: Clock, vessel: Vessel
+    ) -> tuple[SignalStats, Identifier, Identifier]:
         """The second time: what is usual, and the whole trial's yaw and surge equations.
 
         For these one must know how far apart samples stand on the clock, which is only told by
-        then. It is nearly always what the survey lets expect; where not, they are made once more.
+        then. It is nearly always what the log_stats lets expect; where not, they are made once
+        more.
         """
         alphas, window_secs = vessel.coefficients or BARE, vessel.identifier.window_secs
-        doubts = RudderWatch(found), GyroWatch(found)
-        holding, gauger = InputHold(clock), Gauger(alphas)
-        expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in OUTPUTS]
+        doubts = RudderSignCheck(found), GyroBiasCheck(found)
+        holding, collector = InputHold(clock), SignalStatsCollector(alphas)
+        expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in PAPER_OUTPUTS]
         intervals = np.maximum(np.round(expected), 1.0)
         equations = _Equations(alphas, clock, intervals, window_secs)
         watches = holding.add_raw, *(doubt.add for doubt in doubts)
         for signals in signals_of(self._log, clock, self._tell, "one clock", *watches):
-            gauger.add(holding.step(signals))
-            equations.add(signals, gauger.fastest)
-        usual = gauger.result()
-        if not np.array_equal(usual.intervals, equations.intervals):
-            equations = _Equations(alphas, clock, usual.intervals, window_secs)
+            collector.add(holding.step(signals))
+            equations.add(signals, collector.fastest)
+        stats = collector.result()
+        if not np.array_equal(stats.intervals, equations.intervals):
+            equations = _Equations(alphas, clock, stats.intervals, window_secs)
             for signals in signals_of(self._log, clock, self._tell, "one clock"):
-                equations.add(signals, usual.fastest)
-        _require_outputs(self._log, usual)
+                equations.add(signals, stats.fastest)
+        _require_outputs(self._log, stats)
         self._warnings += doubtful(found, NEEDED)
         self._warnings += [said for doubt in doubts if (said := doubt.result())]
         self._warnings += [*silent_ends(found, clock, NEEDED), *holding.said()]
         self._warnings += equations.said()
-        return usual, equations.yaw, equations.surge
+        return stats, equations.yaw, equations.surge
 
-    def _with_first_model(self, known: Vessel, usual: Gauge) -> Vessel:
+    def _with_first_model(self, known: Vessel, stats: SignalStats) -> Vessel:
         """What is known of a ship, with a model fitted to this log."""
-        first = fit_first_model(self.yaw, self.surge, usual, self._log.name)
+        first = fit_first_model(self.yaw, self.surge, stats, self._log.name)
         vessel, model = replace(known, coefficients=first.coefficients), first.paper
         if known.model is None:
             vessel = replace(vessel, name=first.name, approach_rpm=first.approach_rpm)
@@ -149,9 +154,11 @@ class Planner:
             )
         return vessel
 
-    def _noise(self, vessel: Vessel, found: Survey, clock: Clock, usual: Gauge) -> Noise:
+    def _noise(
+        self, vessel: Vessel, found: LogStats, clock: Clock, stats: SignalStats
+    ) -> NoiseModel:
         settings = _averaged(vessel.filter, found, clock.dt_secs)
-        noise = noise_of(usual, vessel.paper, settings)
+        noise = noise_of(stats, vessel.paper, settings)
         if settings.wave and noise.wave is None:
             self._warnings.append(
                 "no wave stands out of the yaw rate's residual: none is told from the ship's "
@@ -164,14 +171,16 @@ class Planner:
             )
         return noise
 
-    def _observed(self, vessel: Vessel, usual: Gauge, noise: Noise) -> DisturbanceSettings:
+    def _observed(
+        self, vessel: Vessel, stats: SignalStats, noise: NoiseModel
+    ) -> DisturbanceSettings:
         """What shall be observed, with the frequency of a wave if the file does not state it."""
         wanted = vessel.disturbance
         if "wave" not in wanted.models:
             return wanted
         frequency = wanted.wave_frequency or vessel.filter.wave_frequency
         if frequency is None:
-            wave = noise.wave or wave_in(usual, vessel.paper, noise, vessel.filter)
+            wave = noise.wave or wave_in(stats, vessel.paper, noise, vessel.filter)
             frequency = wave.frequency if wave is not None and wave.stands_out else None
         if frequency is None:
             frequency = USUAL_SEA
@@ -179,24 +188,24 @@ class Planner:
                 f"no wave stands out of the yaw rate's residual: one of {USUAL_SEA:g} rad/s is"
                 " observed, where the sea often is; state disturbance.wave_frequency"
             )
-        self._warnings += blindness(frequency, usual)
+        self._warnings += blindness(frequency, stats)
         return replace(wanted, wave_frequency=frequency)
 
 
 def signals_of(
     log: Log,
     clock: Clock,
-    tell: Tell,
+    tell: ProgressCallback,
     step: str,
     *watches: Callable[[tuple[Channel, ...]], None],
 ) -> Iterator[Signals]:
-    """A log on its clock; each slab of it is shown to the watches before it is placed."""
+    """A log on its clock; each chunk of it is shown to the watches before it is placed."""
 
     def watched() -> Iterator[tuple[Channel, ...]]:
-        for slab in log.slabs():
+        for chunk in log.chunks():
             for watch in watches:
-                watch(slab)
-            yield slab
+                watch(chunk)
+            yield chunk
 
     tell(step, 0.0)
     for signals in on_clock(watched(), clock):
@@ -205,7 +214,7 @@ def signals_of(
 
 
 class _Equations:
-    """The whole trial's equations of yaw and surge, from signals in slabs."""
+    """The whole trial's equations of yaw and surge, from signals in chunks."""
 
     def __init__(
         self, alphas: Coefficients, clock: Clock, intervals: FloatArray, window_secs: float
@@ -257,8 +266,8 @@ def _stated_model(
     return with_settings(Vessel("", None), settings), FITTED
 
 
-def _require_outputs(log: Log, usual: Gauge) -> None:
-    for name, count in zip(OUTPUTS, usual.measured, strict=True):
+def _require_outputs(log: Log, stats: SignalStats) -> None:
+    for name, count in zip(PAPER_OUTPUTS, stats.measured, strict=True):
         if count < FEWEST:
             raise LogError(
                 f"channel {name!r} has {count} samples while the others are there too, "
@@ -266,10 +275,10 @@ def _require_outputs(log: Log, usual: Gauge) -> None:
             )
 
 
-def _averaged(settings: FilterSettings, found: Survey, dt_secs: float) -> FilterSettings:
+def _averaged(settings: FilterSettings, found: LogStats, dt_secs: float) -> FilterSettings:
     """The noise stated for one sample, as it is in the mean of those that share an instant."""
     stds = []
-    for name, std in zip(OUTPUTS, (settings.yaw_rate_std, settings.speed_std), strict=True):
+    for name, std in zip(PAPER_OUTPUTS, (settings.yaw_rate_std, settings.speed_std), strict=True):
         together = max(1.0, dt_secs / found[name].usual_secs)
         stds.append(None if std is None else std / sqrt(together))
     return replace(settings, yaw_rate_std=stds[0], speed_std=stds[1])

@@ -1,8 +1,8 @@
 """From a log to what it says: the order of the steps.
 
-A log may be longer than memory: it is gone through in slabs, twice to plan the replay (`plan`) and
+A log may be longer than memory: it is gone through in chunks, twice to plan the replay (`plan`) and
 at last to replay it; where its states are to be smoothed, once between, to learn what the end says
-of the beginning. Every stage takes slabs, gives slabs and carries its state; where the slabs are
+of the beginning. Every stage takes chunks, gives chunks and carries its state; where the chunks are
 cut changes nothing.
 """
 
@@ -11,21 +11,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.disturbance.observer import Course, Disturbance, ForceObserver
+from analysis.disturbance.observer import Disturbance, DisturbanceSummary, ForceObserver
 from analysis.filters.base import OUTPUT_STATES, Estimates, Filter
 from analysis.filters.factory import make_filter
 from analysis.filters.smoother import Adjoint, SmoothingPass, smoothed
-from analysis.regression.changes import Change, ShipWatch
-from analysis.regression.coefficients import Identification
+from analysis.regression.changes import Change, ShipChangeTest
+from analysis.regression.coefficients import CoefficientFit
 from analysis.regression.sliding import History
-from analysis.signals.concat import stacked
+from analysis.signals.concat import concatenate
 from analysis.signals.hold import InputHold, held_throughout
 from shiplog import LogError, Signals, Vessel
 from shiplog.errors import UsageError
-from shiplog.ships.paper import OUTPUTS
+from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Log
 
-from .plan import FITTED, Plan, Planner, Tell, signals_of, weak_form_of
+from .plan import FITTED, Plan, Planner, ProgressCallback, signals_of, weak_form_of
 from .residuals import OutputResiduals, ResidualTest
 from .track import Track, Tracker
 
@@ -33,7 +33,7 @@ STEPS = ("check", "one clock", "model", "look ahead", "replay")  # the fourth wh
 
 
 @dataclass(frozen=True, eq=False)
-class Slab:
+class ReplayChunk:
     """What a replay says of a stretch of the trial; each part as far as it is known by then."""
 
     signals: Signals  # as measured, NaN where not
@@ -50,20 +50,20 @@ class Findings(Plan):
 
     metadata: dict[str, str]  # of the log
     residuals: tuple[OutputResiduals, ...]  # of yaw rate and speed
-    courses: dict[str, Course]  # of the disturbances
-    yaw: Identification
-    surge: Identification
+    courses: dict[str, DisturbanceSummary]  # of the disturbances
+    yaw: CoefficientFit
+    surge: CoefficientFit
     changes: tuple[Change, ...]  # of coefficients, within the trial
     track_origin: str  # how the track is known, in words
 
 
 @dataclass(frozen=True, eq=False)
-class Analysis(Findings, Slab):
-    """All that a replay found: what it comes to, and the whole trial in one slab."""
+class Analysis(Findings, ReplayChunk):
+    """All that a replay found: what it comes to, and the whole trial in one chunk."""
 
 
 def _silent(_step: str, _share: float) -> None:
-    """Tell nobody."""
+    """ProgressCallback nobody."""
 
 
 def analyse(
@@ -71,28 +71,28 @@ def analyse(
     vessel: Vessel | None = None,
     *,
     settings: Mapping[str, object] | None = None,
-    on_step: Tell = _silent,
+    on_progress: ProgressCallback = _silent,
 ) -> Analysis:
     """Replay a log: check it, filter it, observe what disturbed it, identify the ship.
 
     The model is `vessel`'s, or the one the log carries, or else a first one fitted to the log.
     `settings`, such as {"filter.kind": "extended"}, stand above those of its `[filter]` and
-    `[disturbance]`. `on_step` is told each of `STEPS`, and the share of it that is done. For a log
-    longer than memory use `Replay`.
+    `[disturbance]`. `on_progress` is told each of `STEPS`, and the share of it that is done. For a
+    log longer than memory use `Replay`.
 
     Raises `LogError` where the log lacks a needed channel or cannot be used as it is, `UsageError`
     for settings that do not do.
     """
-    replay = Replay(log, vessel, settings=settings, on_step=on_step)
-    whole = stacked(list(replay.slabs()))
+    replay = Replay(log, vessel, settings=settings, on_progress=on_progress)
+    whole = concatenate(list(replay.chunks()))
     return Analysis(**vars(whole), **vars(replay.findings))
 
 
 class Replay:
-    """A replay in slabs: go through `slabs`, then ask for the `findings`.
+    """A replay in chunks: go through `chunks`, then ask for the `findings`.
 
-    As `analyse`, except that no more than a slab is held. Its `plan` is made at once, from two
-    passes over the log; the slabs are the last.
+    As `analyse`, except that no more than a chunk is held. Its `plan` is made at once, from two
+    passes over the log; the chunks are the last.
     """
 
     def __init__(
@@ -101,29 +101,29 @@ class Replay:
         vessel: Vessel | None = None,
         *,
         settings: Mapping[str, object] | None = None,
-        on_step: Tell = _silent,
+        on_progress: ProgressCallback = _silent,
     ) -> None:
-        self._log, self._tell = log, on_step
-        planned = Planner(log, vessel, settings or {}, on_step)
+        self._log, self._tell = log, on_progress
+        planned = Planner(log, vessel, settings or {}, on_progress)
         self.plan, self._yaw, self._surge = planned.plan, planned.yaw, planned.surge
         self._begun = False
         self._findings: Findings | None = None
 
-    def slabs(self) -> Iterator[Slab]:
+    def chunks(self) -> Iterator[ReplayChunk]:
         """Replay the trial, once.
 
         Raises `LogError` where the model does not fit it at all.
         """
         if self._begun:
-            raise ValueError("the slabs of a replay come once; make another")
+            raise ValueError("the chunks of a replay come once; make another")
         self._begun = True
-        plan, clock, fastest = self.plan, self.plan.clock, self.plan.usual.fastest
+        plan, clock, fastest = self.plan, self.plan.clock, self.plan.stats.fastest
         ends = self._looked_ahead() if plan.vessel.filter.smooth else None
         holding, (filtering, observing) = InputHold(clock), self._designed()
-        tests = [self._residual_test(output) for output in range(len(OUTPUTS))]
-        weak_form = weak_form_of(plan.vessel.paper, clock, plan.usual.intervals)
-        watching = ShipWatch(weak_form, guessed=plan.model_origin == FITTED)
-        tracking = Tracker(clock, plan.survey.get("position"))
+        tests = [self._residual_test(output) for output in range(len(PAPER_OUTPUTS))]
+        weak_form = weak_form_of(plan.vessel.paper, clock, plan.stats.intervals)
+        watching = ShipChangeTest(weak_form, guessed=plan.model_origin == FITTED)
+        tracking = Tracker(clock, plan.log_stats.get("position"))
         watches = holding.add_raw, tracking.add_raw
         on_clock = signals_of(self._log, clock, self._tell, "replay", *watches)
         for signals, held, following in held_throughout(on_clock, holding):
@@ -138,7 +138,7 @@ class Replay:
             watching.add(yaw_rows, surge_rows)
             yaw, surge = self._yaw.step(yaw_rows), self._surge.step(surge_rows)
             track = tracking.step(signals, *(estimates.states[:, i] for i in OUTPUT_STATES))
-            yield Slab(signals, estimates, disturbance, yaw, surge, track)
+            yield ReplayChunk(signals, estimates, disturbance, yaw, surge, track)
         residuals = tuple(test.result() for test in tests)
         changes = watching.result()
         said = [residual.caution for residual in residuals if residual.caution]
@@ -156,13 +156,13 @@ class Replay:
 
     @property
     def findings(self) -> Findings:
-        """What the replay came to. Raises `ValueError` before its slabs were gone through."""
+        """What the replay came to. Raises `ValueError` before its chunks were gone through."""
         if self._findings is None:
-            raise ValueError("go through the slabs first")
+            raise ValueError("go through the chunks first")
         return self._findings
 
     def _looked_ahead(self) -> Iterator[Adjoint]:
-        """Of each slab, in their order, what the measurements after it say: one more pass."""
+        """Of each chunk, in their order, what the measurements after it say: one more pass."""
         holding, (filtering, _) = InputHold(self.plan.clock), self._designed()
         ahead = SmoothingPass(filtering.outputs)
         on_clock = signals_of(self._log, self.plan.clock, self._tell, "look ahead", holding.add_raw)
@@ -172,20 +172,20 @@ class Replay:
 
     def _designed(self) -> tuple[Filter, ForceObserver]:
         """The filter and the observer; of a model that runs away neither may be had."""
-        model, noise, usual = self.plan.vessel.paper, self.plan.noise, self.plan.usual
+        model, noise, stats = self.plan.vessel.paper, self.plan.noise, self.plan.stats
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                filtering = make_filter(model, noise, usual, self.plan.vessel.filter)
+                filtering = make_filter(model, noise, stats, self.plan.vessel.filter)
                 observed = self.plan.observed
-                observing = ForceObserver(model, noise, usual, observed, observed.wave_frequency)
+                observing = ForceObserver(model, noise, stats, observed, observed.wave_frequency)
                 return filtering, observing
         except (UsageError, np.linalg.LinAlgError) as error:
             raise self._runs_away(f" ({error})") from error
 
     def _residual_test(self, output: int) -> ResidualTest:
-        name, plan = OUTPUTS[output], self.plan
-        interval = float(plan.usual.intervals[output])
-        unit, noise_measured = plan.survey[name].unit, plan.noise.measured[output]
+        name, plan = PAPER_OUTPUTS[output], self.plan
+        interval = float(plan.stats.intervals[output])
+        unit, noise_measured = plan.log_stats[name].unit, plan.noise.measured[output]
         return ResidualTest(name, unit, interval, noise_measured=noise_measured)
 
     def _runs_away(self, why: str = "") -> LogError:
@@ -200,7 +200,8 @@ def _without_gated(held: Signals, estimates: Estimates) -> Signals:
     if not estimates.gated.any():
         return held
     believed = {
-        name: np.where(estimates.gated[:, i], np.nan, held[name]) for i, name in enumerate(OUTPUTS)
+        name: np.where(estimates.gated[:, i], np.nan, held[name])
+        for i, name in enumerate(PAPER_OUTPUTS)
     }
     return replace(held, values=dict(held.values) | believed)
 
@@ -211,7 +212,7 @@ def _estimated(
     following: Mapping[str, float],
     ends: Iterator[Adjoint] | None,
 ) -> Estimates:
-    """The next slab's estimates, smoothed where it is known what comes after."""
+    """The next chunk's estimates, smoothed where it is known what comes after."""
     if ends is None:
         return filtering.step(held, following)
     estimates, trace = filtering.trace(held, following)

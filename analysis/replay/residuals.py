@@ -65,7 +65,7 @@ class ResidualTest:
 
     `usual_step` is the median number of instants from one measurement to the next.
     `noise_measured` says that the noise expected was taken from the same log, by its third
-    differences (`gauge.NoiseLevel`), so that it is itself uncertain.
+    differences (`signal_stats.NoiseLevel`), so that it is itself uncertain.
     """
 
     def __init__(self, name: str, unit: str, usual_step: float, *, noise_measured: bool) -> None:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.signals.concat import stacked
+from analysis.signals.concat import concatenate
 from shiplog import Channel
-from shiplog.checks.channel_stats import ChannelSurvey
+from shiplog.checks.channel_stats import ChannelStats
 from shiplog.mcap.schema import GEOGRAPHIC
 from shiplog.resampling import Clock
 from shiplog.types import FloatArray, Signals
@@ -28,13 +28,13 @@ NOWHERE = Track(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
 class Tracker:
-    """Follows the ship in slabs: the positions recorded, or else dead reckoning.
+    """Follows the ship in chunks: the positions recorded, or else dead reckoning.
 
     The latter is from heading and speed ahead; where there is no heading the yaw rate is
     integrated, which also bridges where the compass was silent.
     """
 
-    def __init__(self, clock: Clock, position: ChannelSurvey | None) -> None:
+    def __init__(self, clock: Clock, position: ChannelStats | None) -> None:
         self._recorded = position if position is not None and position.known > 1 else None
         self._start_ns, self._reckoning = clock.start_ns, _DeadReckoner(clock)
         self._fixes: list[Track] = []  # since the last step
@@ -48,9 +48,9 @@ class Tracker:
         heading = "heading" if self._reckoning.by_compass else "yaw rate"
         return f"dead reckoning from {heading} and speed ahead"
 
-    def add_raw(self, slab: tuple[Channel, ...]) -> None:
+    def add_raw(self, chunk: tuple[Channel, ...]) -> None:
         """Look at the samples themselves for the positions recorded."""
-        channel = self._recorded.of(slab) if self._recorded else None
+        channel = self._recorded.of(chunk) if self._recorded else None
         if channel is None:
             return
         known = np.isfinite(channel.values).all(axis=1)
@@ -59,12 +59,12 @@ class Tracker:
             north, east = self._in_metres(channel, channel.values[known, :2]).T
             self._fixes.append(Track(at, north, east))
 
-    def step(self, slab: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
-        """The track as far as it is known by now; the filter's rates on the slab, (n,)."""
+    def step(self, chunk: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
+        """The track as far as it is known by now; the filter's rates on the chunk, (n,)."""
         if not self._recorded:
-            return self._reckoning.step(slab, yaw_rate, speed)
+            return self._reckoning.step(chunk, yaw_rate, speed)
         fixes, self._fixes = self._fixes, []
-        return stacked([NOWHERE, *fixes])
+        return concatenate([NOWHERE, *fixes])
 
     def _in_metres(self, channel: Channel, positions: FloatArray) -> FloatArray:
         """North and east of the first position, (n, 2)."""
@@ -77,7 +77,7 @@ class Tracker:
 
 
 class _DeadReckoner:
-    """Dead reckoning in slabs; what follows the last heading known waits for the next.
+    """Dead reckoning in chunks; what follows the last heading known waits for the next.
 
     It does not wait for ever: after a silence of `BRIDGED` the compass is taken for lost, and the
     gyro goes on alone until there is a heading again.
@@ -96,14 +96,14 @@ class _DeadReckoner:
         """Whether there was a heading."""
         return len(self._off) > 0
 
-    def step(self, slab: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
+    def step(self, chunk: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
         """The track as far as the heading is known by now."""
-        dt, end = slab.dt_secs, slab.first + len(slab)
+        dt, end = chunk.dt_secs, chunk.first + len(chunk)
         sums = np.cumsum(np.concatenate(([self._turned], yaw_rate)))[1:]
         self._turned, turned = float(sums[-1]), sums * dt
         self._waiting = np.concatenate((self._waiting, np.column_stack((turned, speed))))
         if self._compass:
-            self._look_at_compass(slab, turned)
+            self._look_at_compass(chunk, turned)
         last = int(self._off[-1, 0]) if len(self._off) else -1
         waits = self._compass and end < self._clock.count and end - 1 - last <= BRIDGED
         until = last + 1 if waits else end
@@ -122,14 +122,14 @@ class _DeadReckoner:
         north, east = (positions - self._start).T
         return Track(at * dt, north, east)
 
-    def _look_at_compass(self, slab: Signals, turned: FloatArray) -> None:
+    def _look_at_compass(self, chunk: Signals, turned: FloatArray) -> None:
         """Add how far off each heading is from what was turned.
 
         Where two are further apart than is bridged, the first is said again just before the
         second, so that what lies between them is not led from one to the other.
         """
-        known = np.flatnonzero(np.isfinite(slab["heading"]))
-        off = np.column_stack((known + slab.first, slab["heading"][known] - turned[known]))
+        known = np.flatnonzero(np.isfinite(chunk["heading"]))
+        off = np.column_stack((known + chunk.first, chunk["heading"][known] - turned[known]))
         before = self._off if len(self._off) else np.array([[-1.0, 0.0]])
         rows = np.concatenate((before, off))
         lost = np.flatnonzero(np.diff(rows[:, 0]) > BRIDGED)

@@ -12,7 +12,7 @@ from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
 from analysis.identification.validation import Validation
 from analysis.manoeuvres.indices import Figure
 from shiplog import __version__
-from shiplog.ships.motion import OUTPUTS
+from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.units import CATALOGUE, factor
 
 from .replay_tables import Section
@@ -20,7 +20,7 @@ from .replay_tables import Section
 FITTED = "output error"
 PEOPLES = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}
 ALIKE, MOST_PAIRS = 0.97, 3  # of correlations that are told
-UNIT = {name: CATALOGUE[name].unit for name in OUTPUTS} | {"track": "m"}
+UNIT = {name: CATALOGUE[name].unit for name in MODEL_OUTPUTS} | {"track": "m"}
 
 
 def sections(found: IdentifiedShip) -> tuple[Section, ...]:
@@ -46,7 +46,7 @@ def _comparison(found: IdentifiedShip) -> Section:
                 *(f"{100 * value:.3g}" if told and isfinite(value) else "" for value in off),
             )
         )
-    columns = ("model", "sought", "score [%]", *(f"{OUTPUTS[i]} [%]" for i in JUDGED_COLUMNS))
+    columns = ("model", "sought", "score [%]", *(f"{MODEL_OUTPUTS[i]} [%]" for i in JUDGED_COLUMNS))
     remark = (
         "Each run in turn is predicted by a fit to the others, which know nothing of it but where "
         "it began, its rudder's zero and its gyro's bias: the rms of what is off over the standard "
@@ -67,7 +67,7 @@ def _coefficients(found: IdentifiedShip) -> Section:
         value, half, bound = told.values[i], 1.96 * told.std[i], 1.96 * told.bound[i]
         share = _percent(told.prior_share[i])
         unit = found.model.parameter(name).unit
-        if name in told.vague:
+        if name in told.unidentifiable:
             rows.append((name, "not identifiable", "", "", share, unit))
         else:
             rows.append((name, f"{value:.5g}", f"± {half:.2g}", f"± {bound:.2g}", share, unit))
@@ -83,7 +83,7 @@ def _remarks(found: IdentifiedShip) -> Iterator[str]:
         yield f"{', '.join(names)}: not identifiable from these logs; what would tell: {text}."
     yield (
         "95 %: half the interval; bound: Cramér and Rao's, if each sample were off by itself. "
-        "Echo: how much of the value was believed before any data. "
+        "PriorSensitivity: how much of the value was believed before any data. "
         f"Condition {found.uncertainty.condition:.0f}."
     )
     alike = _alike(found)
@@ -133,7 +133,9 @@ def _echoes(found: IdentifiedShip) -> Section:
         f"priors to either side, {100 * OFF:.0f} % off or more, over the latter half of the runs. "
         "100 % is a copy of the prior; beyond it errors grow."
     )
-    return Section("Echo of what was believed before", ("coefficient", *by_method), rows, (remark,))
+    return Section(
+        "PriorSensitivity of what was believed before", ("coefficient", *by_method), rows, (remark,)
+    )
 
 
 def _echoes_by_method(found: IdentifiedShip) -> dict[str, dict[str, float]]:
@@ -169,14 +171,14 @@ def _runs(found: IdentifiedShip) -> Section:
 
 
 def _held_out(found: IdentifiedShip) -> Section:
-    names = [n for n in (*OUTPUTS, "track") if any(n in v.rms for v in found.validations)]
+    names = [n for n in (*MODEL_OUTPUTS, "track") if any(n in v.rms for v in found.validations)]
     rows = []
     for each in found.validations:
         cells = [_shown(each.rms[n], UNIT[n]) if n in each.rms else "" for n in names]
-        seconds = f"{(len(each.trial) - 1) * each.trial.dt_secs:.0f}"
+        seconds = f"{(len(each.segment) - 1) * each.segment.dt_secs:.0f}"
         end = np.hypot(*(each.track[-1] - each.measured_track[-1]))
         last = f"{end:.3g}" if isfinite(end) else ""
-        rows.append((each.trial.name, seconds, *cells, last))
+        rows.append((each.segment.name, seconds, *cells, last))
     columns = ("held out", "length\n[s]", *map(_headed, names), "at the end\n[m]")
     remark = (
         "Simulated open loop from how each run began, under its rudder and revolutions: the rms of "
@@ -189,7 +191,7 @@ def _figures(validation: Validation) -> Section:
     rows = tuple(_figure(figure) for figure in validation.figures)
     columns = ("figure", "measured", "simulated", "off", "off [%]")
     remark = "Counted from where the rudder leaves its rest by 0.5°."
-    return Section(f"Figures of {validation.trial.name}", columns, rows, (remark,))
+    return Section(f"Figures of {validation.segment.name}", columns, rows, (remark,))
 
 
 def _figure(figure: Figure) -> tuple[str, ...]:
@@ -264,7 +266,7 @@ def as_json(found: IdentifiedShip) -> dict[str, Any]:
             {
                 "name": c.model.name, "score": c.score if c.fit is not None else None,
                 "misfits": dict(zip(
-                    (OUTPUTS[i] for i in JUDGED_COLUMNS), _mean_misfits(c), strict=True
+                    (MODEL_OUTPUTS[i] for i in JUDGED_COLUMNS), _mean_misfits(c), strict=True
                 )),
             }
             for c in found.candidates
@@ -278,12 +280,12 @@ def _coefficient(found: IdentifiedShip, i: int) -> dict[str, Any]:
     """A value that the logs do not tell stands as None: what is printed is believed."""
     told = found.uncertainty
     name = told.names[i]
-    vague = name in told.vague
+    unidentifiable = name in told.unidentifiable
     return {
-        "value": None if vague else told.values[i],
+        "value": None if unidentifiable else told.values[i],
         "unit": found.model.parameter(name).unit,
-        "identifiable": not vague,
-        "interval": None if vague else told.interval[i].tolist(),
+        "identifiable": not unidentifiable,
+        "interval": None if unidentifiable else told.interval[i].tolist(),
         "std": told.std[i],
         "cramer_rao_std": told.bound[i],
         "prior_share": told.prior_share[i],
@@ -293,7 +295,7 @@ def _coefficient(found: IdentifiedShip, i: int) -> dict[str, Any]:
 
 def _validation(each: Validation) -> dict[str, Any]:
     return {
-        "log": each.trial.name,
+        "log": each.segment.name,
         "ran_away": each.ran_away,
         "rms": each.rms,
         "figures": [

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from analysis.disturbance.observer import Course
+from analysis.disturbance.observer import DisturbanceSummary
 from analysis.filters.wave_fit import Wave
 from analysis.regression.changes import Change
-from analysis.regression.coefficients import Identification
+from analysis.regression.coefficients import CoefficientFit
 from analysis.replay.replay import Findings
 from shiplog import __version__
-from shiplog.checks.channel_stats import ChannelSurvey
+from shiplog.checks.channel_stats import ChannelStats
 from shiplog.ships.paper import COEFFICIENT_UNITS
 from shiplog.vessel.settings import as_table
 
@@ -22,18 +22,18 @@ Summary = dict[str, Any]
 
 def summarise(findings: Findings) -> Summary:
     """The summary as plain numbers in SI, ready for JSON; what is not a number is None."""
-    survey, clock = findings.survey, findings.clock
-    start_ns, _ = survey.span_ns
+    log_stats, clock = findings.log_stats, findings.clock
+    start_ns, _ = log_stats.span_ns
     summary = {
         "shiplog": __version__,
         "log": {
             "name": findings.name,
             "start": datetime.fromtimestamp(start_ns * 1e-9, UTC).isoformat(),
-            "duration_secs": survey.duration_secs,
+            "duration_secs": log_stats.duration_secs,
             "dt_secs": clock.dt_secs,
             "samples": clock.count,
             "provenance": findings.metadata,
-            "channels": {channel.topic: _channel(channel) for channel in survey},
+            "channels": {channel.topic: _channel(channel) for channel in log_stats},
         },
         "model": {
             "name": findings.vessel.name,
@@ -59,7 +59,7 @@ def summarise(findings: Findings) -> Summary:
     return _without_nan(summary)  # type: ignore[no-any-return]
 
 
-def _channel(channel: ChannelSurvey) -> Summary:
+def _channel(channel: ChannelStats) -> Summary:
     return {
         "unit": channel.unit,
         "samples": channel.samples,
@@ -117,7 +117,7 @@ def _disturbance(findings: Findings) -> Summary:
     return {keys.get(name, name): _course(course) for name, course in findings.courses.items()}
 
 
-def _course(course: Course) -> Summary:
+def _course(course: DisturbanceSummary) -> Summary:
     return {
         "mean": course.mean,
         "rms": course.rms,
@@ -130,7 +130,7 @@ def _course(course: Course) -> Summary:
     }
 
 
-def _coefficients(found: Identification) -> Summary:
+def _coefficients(found: CoefficientFit) -> Summary:
     return {
         name: {
             "value": coefficient.value,
@@ -147,7 +147,7 @@ def _change(change: Change) -> Summary:
     return asdict(change) | {"instead": list(change.instead)}
 
 
-def _windows(found: Identification) -> Summary:
+def _windows(found: CoefficientFit) -> Summary:
     """How well the sliding windows could tell: their condition numbers, and how many are blank."""
     conditions = found.window_conditions
     known = conditions[np.isfinite(conditions)]

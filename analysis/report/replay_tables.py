@@ -69,16 +69,16 @@ def _markdown_table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> st
 
 
 def _log_section(findings: Findings) -> Section:
-    survey, rows = findings.survey, []
-    for channel in survey:
+    log_stats, rows = findings.log_stats, []
+    for channel in log_stats:
         rate = f"{1 / channel.usual_secs:.3g} Hz" if channel.usual_secs else ""
         gaps = "none"
         if channel.gaps:
             longest = max(length for _, length in channel.gaps)
             gaps = f"{len(channel.gaps)}, the longest {longest:.1f} s"
         rows.append((channel.topic, f"{channel.samples}", rate, gaps))
-    start = np.datetime64(survey.span_ns[0], "ns").astype("M8[s]")
-    title = f"Log, {survey.duration_secs:.0f} s from {start} UTC"
+    start = np.datetime64(log_stats.span_ns[0], "ns").astype("M8[s]")
+    title = f"Log, {log_stats.duration_secs:.0f} s from {start} UTC"
     return Section(title, ("channel", "samples", "rate", "gaps"), tuple(rows))
 
 

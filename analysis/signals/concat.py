@@ -1,4 +1,4 @@
-"""Slabs of a result put together: whatever its arrays, one after the other."""
+"""Chunks of a result put together: whatever its arrays, one after the other."""
 
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
@@ -11,20 +11,20 @@ from shiplog.types import Signals, joined
 T = TypeVar("T")
 
 
-def stacked(slabs: Sequence[T]) -> T:
-    """Consecutive slabs of one kind of dataclass, one at least, as one.
+def concatenate(chunks: Sequence[T]) -> T:
+    """Consecutive chunks of one kind of dataclass, one at least, as one.
 
     Arrays are put together along their first axis, dataclasses within likewise; all else is as in
-    the first slab.
+    the first chunk.
     """
-    first = slabs[0]
+    first = chunks[0]
     if isinstance(first, Signals):
-        return joined(slabs)  # type: ignore[arg-type,return-value]
+        return joined(chunks)  # type: ignore[arg-type,return-value]
     parts: dict[str, Any] = {}
     for field in fields(first):  # type: ignore[arg-type]
-        values = [getattr(slab, field.name) for slab in slabs]
+        values = [getattr(chunk, field.name) for chunk in chunks]
         if isinstance(values[0], np.ndarray):
             parts[field.name] = np.concatenate(values)
         elif is_dataclass(values[0]):
-            parts[field.name] = stacked(values)
+            parts[field.name] = concatenate(values)
     return replace(first, **parts)  # type: ignore[type-var]

@@ -7,7 +7,7 @@ import numpy as np
 
 from shiplog import Channel, Signals
 from shiplog.resampling import Clock
-from shiplog.ships.paper import INPUTS
+from shiplog.ships.paper import PAPER_INPUTS
 
 
 class InputHold:
@@ -18,14 +18,14 @@ class InputHold:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._last = dict.fromkeys(INPUTS, np.nan)
-        self._last_ns = dict.fromkeys(INPUTS, np.iinfo(np.int64).min)
-        self.missing = dict.fromkeys(INPUTS, 0)  # instants
+        self._last = dict.fromkeys(PAPER_INPUTS, np.nan)
+        self._last_ns = dict.fromkeys(PAPER_INPUTS, np.iinfo(np.int64).min)
+        self.missing = dict.fromkeys(PAPER_INPUTS, 0)  # instants
 
-    def add_raw(self, slab: tuple[Channel, ...]) -> None:
+    def add_raw(self, chunk: tuple[Channel, ...]) -> None:
         """Look at the samples themselves for what was known before the clock begins."""
-        for name in INPUTS:
-            channel = self._clock.channels[name].of(slab)
+        for name in PAPER_INPUTS:
+            channel = self._clock.channels[name].of(chunk)
             if channel is None:
                 continue
             earlier = np.isfinite(channel.values) & (channel.measured_ns <= self._clock.start_ns)
@@ -37,7 +37,7 @@ class InputHold:
     def step(self, signals: Signals) -> Signals:
         """The next signals, their inputs known throughout."""
         values = dict(signals.values)
-        for name in INPUTS:
+        for name in PAPER_INPUTS:
             missing = np.isnan(values[name])
             if missing.any():
                 self.missing[name] += int(missing.sum())
@@ -58,17 +58,17 @@ class InputHold:
 
 
 def held_throughout(
-    slabs: Iterable[Signals], holding: InputHold
+    chunks: Iterable[Signals], holding: InputHold
 ) -> Iterator[tuple[Signals, Signals, Mapping[str, float]]]:
-    """Each slab as measured, with its inputs held, and the inputs of the instant after it.
+    """Each chunk as measured, with its inputs held, and the inputs of the instant after it.
 
-    Of the last slab these are its own last.
+    Of the last chunk these are its own last.
     """
     previous: tuple[Signals, Signals] | None = None
-    for signals in slabs:
+    for signals in chunks:
         held = holding.step(signals)
         if previous is not None:
-            yield *previous, {name: float(held[name][0]) for name in INPUTS}
+            yield *previous, {name: float(held[name][0]) for name in PAPER_INPUTS}
         previous = signals, held
     if previous is not None:
         yield *previous, last_inputs(previous[1])
@@ -76,4 +76,4 @@ def held_throughout(
 
 def last_inputs(signals: Signals) -> Mapping[str, float]:
     """The inputs of signals at their end."""
-    return {name: float(signals[name][-1]) for name in INPUTS}
+    return {name: float(signals[name][-1]) for name in PAPER_INPUTS}

@@ -6,8 +6,8 @@ import numpy as np
 
 from shiplog import Signals
 from shiplog.checks.channel_stats import longest_step_secs
-from shiplog.checks.quantiles import Thinned
-from shiplog.ships.paper import OUTPUTS, Coefficients, rudder_effects
+from shiplog.checks.quantiles import Quantiles
+from shiplog.ships.paper import PAPER_OUTPUTS, Coefficients, rudder_effects
 from shiplog.types import FloatArray, joined
 
 from .moments import Moments
@@ -16,7 +16,7 @@ HEAD = 50_000  # samples of a long log are enough to tell how well a model fits
 
 
 @dataclass(frozen=True, eq=False)
-class Gauge:
+class SignalStats:
     """The signals' usual values; those of the outputs are (2,), yaw rate rad/s and speed m/s."""
 
     count: int  # of the clock's instants
@@ -44,40 +44,40 @@ class Gauge:
         return np.array([longest_step_secs(s) / self.dt_secs for s in self.interval_secs])
 
 
-class Gauger:
-    """Looks at signals, their inputs held, as they come in slabs.
+class SignalStatsCollector:
+    """Looks at signals, their inputs held, as they come in chunks.
 
     Of `model` only the alphas are used. Source of the noise: `noise_level`.
     """
 
     def __init__(self, model: Coefficients) -> None:
         self._model = model
-        self._outputs = {name: _OutputGauger() for name in OUTPUTS}
-        self._speed, self._rpm = Thinned(), Thinned()
+        self._outputs = {name: _OutputStatsCollector() for name in PAPER_OUTPUTS}
+        self._speed, self._rpm = Quantiles(), Quantiles()
         self.fastest = self._steering = 0.0  # m/s so far, and of the rudder's effect
         self._heads: list[Signals] = []
         self._count, self._dt = 0, 1.0
 
-    def add(self, slab: Signals) -> None:
+    def add(self, chunk: Signals) -> None:
         """Take the next signals."""
         for name, output in self._outputs.items():
-            output.add(slab[name])
-        speed = slab["speed"]
+            output.add(chunk[name])
+        speed = chunk["speed"]
         known = np.isfinite(speed)
         self._speed.add(speed[known])
-        self._rpm.add(slab["rpm"])
+        self._rpm.add(chunk["rpm"])
         self.fastest = max(self.fastest, float(np.max(np.abs(speed[known]), initial=0.0)))
-        effects = rudder_effects(self._model, speed[known], slab["rpm"][known])
+        effects = rudder_effects(self._model, speed[known], chunk["rpm"][known])
         self._steering = max(self._steering, float(np.max(np.abs(effects), initial=0.0)))
         if self._count < HEAD:
-            self._heads.append(slab.part(0, HEAD - self._count))
-        self._count, self._dt = self._count + len(slab), slab.dt_secs
+            self._heads.append(chunk.part(0, HEAD - self._count))
+        self._count, self._dt = self._count + len(chunk), chunk.dt_secs
 
-    def result(self) -> Gauge:
+    def result(self) -> SignalStats:
         """What all that was added comes to."""
         outputs = list(self._outputs.values())
         yaw_rate = outputs[0].moments
-        return Gauge(
+        return SignalStats(
             count=self._count,
             dt_secs=self._dt,
             measured=(outputs[0].moments.count, outputs[1].moments.count),
@@ -94,19 +94,19 @@ class Gauger:
         )
 
 
-def gauge(signals: Signals, model: Coefficients) -> Gauge:
+def signal_stats(signals: Signals, model: Coefficients) -> SignalStats:
     """What signals usually do, their inputs held; of `model` only the alphas are used."""
-    gauging = Gauger(model)
+    gauging = SignalStatsCollector(model)
     gauging.add(signals)
     return gauging.result()
 
 
-class _OutputGauger:
+class _OutputStatsCollector:
     """Looks at one output."""
 
     def __init__(self) -> None:
         self.moments, self.noise, self.first = Moments(), NoiseLevel(), np.nan
-        self._intervals, self._last, self._count = Thinned(), -1, 0
+        self._intervals, self._last, self._count = Quantiles(), -1, 0
 
     def add(self, values: FloatArray) -> None:
         """Take the next values, NaN where not measured."""
@@ -141,12 +141,12 @@ def noise_level(values: FloatArray) -> float:
 
 
 class NoiseLevel:
-    """As `noise_level`, of measured values that come in slabs."""
+    """As `noise_level`, of measured values that come in chunks."""
 
     def __init__(self) -> None:
         self._last: FloatArray = np.zeros(0)
         self._moments = Moments()
-        self._thirds, self._least_step = Thinned(), np.inf
+        self._thirds, self._least_step = Quantiles(), np.inf
 
     def add(self, seen: FloatArray) -> None:
         """Take the next measured values."""

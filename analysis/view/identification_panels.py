@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.identification.comparison import paper_scheme, parameter_ekf, windows
-from analysis.identification.comparison.history import Courses, run_secs
+from analysis.identification.comparison.history import ParameterHistory, run_secs
 from analysis.identification.identify import IdentifiedShip
-from analysis.identification.segment import Trial
+from analysis.identification.segment import Segment
 from analysis.identification.validation import Validation
-from shiplog.ships.motion import OUTPUTS
-from shiplog.ships.paper import INPUTS
+from shiplog.ships.motion import MODEL_OUTPUTS
+from shiplog.ships.paper import PAPER_INPUTS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, factor
 
@@ -32,7 +32,7 @@ from .series import (
 )
 from .track_chart import Chart, chart
 
-COLOURS = dict(zip(OUTPUTS, (BLUE, ORANGE, CYAN, GREEN), strict=True))
+COLOURS = dict(zip(MODEL_OUTPUTS, (BLUE, ORANGE, CYAN, GREEN), strict=True))
 METHODS = {  # by what name, on top of those before it in the alphabet, and in which colour
     paper_scheme.METHOD: ("a_paper", RED),
     parameter_ekf.METHOD: ("kalman", BLUE),
@@ -61,17 +61,17 @@ class RunSheet:
 def run_sheets(found: IdentifiedShip) -> Iterator[RunSheet]:
     """The runs that were fitted, then those held out."""
     fit, problem = found.fit, found.fit.problem
-    for i, trial in enumerate(problem.trials):
-        simulated = np.full((len(trial), len(OUTPUTS)), np.nan)
+    for i, segment in enumerate(problem.segments):
+        simulated = np.full((len(segment), len(MODEL_OUTPUTS)), np.nan)
         simulated[:, problem.columns] = problem.predicted(fit.minimum.unknowns, i)
-        yield _sheet(f"run_{i + 1}", f"fitted: {trial.name}", trial, simulated, found, None)
+        yield _sheet(f"run_{i + 1}", f"fitted: {segment.name}", segment, simulated, found, None)
     for k, validation in enumerate(found.validations):
-        trial = validation.trial
+        segment = validation.segment
         drawn = _track(validation, found.vessel.length if found.vessel else None)
         yield _sheet(
             f"held_out_{k + 1}",
-            f"held out: {trial.name}",
-            trial,
+            f"held out: {segment.name}",
+            segment,
             validation.simulated,
             found,
             drawn,
@@ -79,43 +79,43 @@ def run_sheets(found: IdentifiedShip) -> Iterator[RunSheet]:
 
 
 def _sheet(
-    origin: str, title: str, trial: Trial, simulated: FloatArray, found: IdentifiedShip,
+    origin: str, title: str, segment: Segment, simulated: FloatArray, found: IdentifiedShip,
     track: Chart | None,
 ) -> RunSheet:  # fmt: skip
     shown = [
         name
-        for i, name in enumerate(OUTPUTS)
-        if trial.has(name) and np.isfinite(simulated[:, i]).any()
+        for i, name in enumerate(MODEL_OUTPUTS)
+        if segment.has(name) and np.isfinite(simulated[:, i]).any()
     ]
     judged = [name for name in found.fit.problem.outputs if name in shown]
-    normalised = {name: _normalised(trial, simulated, found, name) for name in judged}
-    duration = (len(trial) - 1) * trial.dt_secs
+    normalised = {name: _normalised(segment, simulated, found, name) for name in judged}
+    duration = (len(segment) - 1) * segment.dt_secs
     lag_secs = min(LAG_SECS, LAGS_SHARE * duration)
     return RunSheet(
-        title, trial.signals.start_ns, duration,
-        tuple(_output(origin, trial, simulated, name) for name in shown),
-        tuple(_residual(origin, trial, name, values) for name, values in normalised.items()),
-        tuple(_input(origin, trial, name) for name in INPUTS),
-        _correlation(origin, trial, normalised, lag_secs), lag_secs, track,
+        title, segment.signals.start_ns, duration,
+        tuple(_output(origin, segment, simulated, name) for name in shown),
+        tuple(_residual(origin, segment, name, values) for name, values in normalised.items()),
+        tuple(_input(origin, segment, name) for name in PAPER_INPUTS),
+        _correlation(origin, segment, normalised, lag_secs), lag_secs, track,
     )  # fmt: skip
 
 
-def _output(origin: str, trial: Trial, simulated: FloatArray, name: str) -> Panel:
-    column, unit, scale = OUTPUTS.index(name), *_peoples(name)
-    at, values = _samples(trial, trial.measured[:, column] * scale)
+def _output(origin: str, segment: Segment, simulated: FloatArray, name: str) -> Panel:
+    column, unit, scale = MODEL_OUTPUTS.index(name), *_peoples(name)
+    at, values = _samples(segment, segment.measured[:, column] * scale)
     measured = Series("measured", at, (Line("measured", values, GREY, 2.5),), spiky=True)
     line = Line("simulated", simulated[:, column] * scale, COLOURS[name], 1.5)
-    drawn = Series("simulated", trial.signals.time_secs, (line,))
+    drawn = Series("simulated", segment.signals.time_secs, (line,))
     return Panel(
         f"{origin}/{name}", f"{name.replace('_', ' ')} [{unit}]",
         (thinned(measured), thinned(drawn)), limits(values, line.values),
     )  # fmt: skip
 
 
-def _samples(trial: Trial, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _samples(segment: Segment, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The times and the values of what was measured; a piece of a log begins within it."""
-    at, known = measured_line(values, trial.dt_secs)
-    return at + trial.signals.time_secs[0], known
+    at, known = measured_line(values, segment.dt_secs)
+    return at + segment.signals.time_secs[0], known
 
 
 def _peoples(name: str) -> tuple[str, float]:
@@ -123,28 +123,30 @@ def _peoples(name: str) -> tuple[str, float]:
     return entry.display_unit, factor(entry.unit, entry.display_unit)
 
 
-def _input(origin: str, trial: Trial, name: str) -> Panel:
+def _input(origin: str, segment: Segment, name: str) -> Panel:
     unit, scale = _peoples(name)
-    values = trial.signals[name] * scale
-    drawn = Series("given", trial.signals.time_secs, (Line(name, values, GREEN, 1.5),), spiky=True)
+    values = segment.signals[name] * scale
+    drawn = Series(
+        "given", segment.signals.time_secs, (Line(name, values, GREEN, 1.5),), spiky=True
+    )
     title = name if name == unit else f"{name} [{unit}]"
     return Panel(f"{origin}/{name}", title, (thinned(drawn),), limits(values))
 
 
 def _normalised(
-    trial: Trial, simulated: FloatArray, found: IdentifiedShip, name: str
+    segment: Segment, simulated: FloatArray, found: IdentifiedShip, name: str
 ) -> FloatArray:
     """Measured less simulated over what the fit leaves of it as a rule, (n,)."""
-    column = OUTPUTS.index(name)
+    column = MODEL_OUTPUTS.index(name)
     noise = found.fit.noises[found.fit.problem.outputs.index(name)]
-    _, usual = noise.spread(simulated[:, column], trial.dt_secs)
-    return np.asarray((trial.measured[:, column] - simulated[:, column]) / usual)
+    _, usual = noise.spread(simulated[:, column], segment.dt_secs)
+    return np.asarray((segment.measured[:, column] - simulated[:, column]) / usual)
 
 
-def _residual(origin: str, trial: Trial, name: str, normalised: FloatArray) -> Panel:
-    at, values = _samples(trial, normalised)
+def _residual(origin: str, segment: Segment, name: str, normalised: FloatArray) -> Panel:
+    at, values = _samples(segment, normalised)
     drawn = Series("normalised", at, (Line("residual", values, COLOURS[name]),), spiky=True)
-    ends = trial.signals.time_secs[[0, -1]]
+    ends = segment.signals.time_secs[[0, -1]]
     return Panel(
         f"{origin}/residual_{name}", f"{name.replace('_', ' ')} residual [usual std]",
         (thinned(drawn), _guides(ends, GUIDE)),
@@ -158,16 +160,16 @@ def _guides(ends: FloatArray, bound: float) -> Series:
 
 
 def _correlation(
-    origin: str, trial: Trial, normalised: dict[str, FloatArray], lag_secs: float
+    origin: str, segment: Segment, normalised: dict[str, FloatArray], lag_secs: float
 ) -> Panel:
     """Autocorrelations over the lag; between the guides a white residual's would mostly be."""
-    lags = np.arange(1, max(2, round(lag_secs / trial.dt_secs)))
+    lags = np.arange(1, max(2, round(lag_secs / segment.dt_secs)))
     series: list[Series] = []
     counts: list[int] = []
     for name, values in normalised.items():
         found, count = autocorrelation(values, int(lags[-1]))
         line = Line(name.replace("_", " "), found[1:], COLOURS[name], 1.5)
-        series.append(thinned(Series(name, lags * trial.dt_secs, (line,))))
+        series.append(thinned(Series(name, lags * segment.dt_secs, (line,))))
         counts.append(count)
     bound = GUIDE / np.sqrt(max(min(counts, default=1), 1))
     series.append(_guides(np.array([0.0, lag_secs]), bound))
@@ -196,20 +198,22 @@ def autocorrelation(values: FloatArray, most: int) -> tuple[FloatArray, int]:
 
 
 def _track(validation: Validation, length: float | None) -> Chart | None:
-    trial = validation.trial
-    heading = trial.measured[:, OUTPUTS.index("heading")] if trial.has("heading") else None
+    segment = validation.segment
+    heading = (
+        segment.measured[:, MODEL_OUTPUTS.index("heading")] if segment.has("heading") else None
+    )
     if heading is not None:
         at = np.flatnonzero(np.isfinite(heading))
         heading = np.interp(np.arange(len(heading)), at, heading[at])
     return chart(
         "track, north up: grey as sailed, blue as simulated", validation.measured_track,
-        trial.signals.time_secs, heading, length, validation.track,
+        segment.signals.time_secs, heading, length, validation.track,
     )  # fmt: skip
 
 
 def coefficient_panels(found: IdentifiedShip) -> list[Panel]:
     """Each coefficient that was sought: its value and interval, and the courses of all methods."""
-    end = run_secs(found.fit.problem.trials)
+    end = run_secs(found.fit.problem.segments)
     return [_coefficient(found, i, end) for i in range(len(found.uncertainty.names))]
 
 
@@ -221,24 +225,26 @@ def _coefficient(found: IdentifiedShip, i: int, end: float) -> Panel:
     reach = max([float(np.ptp(each)) / 2 for each in priors], default=abs(value) / 3)
     unit = found.model.parameter(name).unit
     prefix, scale = ("", 1.0) if unit == "1" else thousands(abs(value))
-    series = [_final(value * scale, half * scale, end, vague=name in told.vague)]
+    series = [_final(value * scale, half * scale, end, unidentifiable=name in told.unidentifiable)]
     for each in courses:
         series += _course(each, name, scale, limit=(value, 3 * reach))
-    said = "not identifiable" if name in told.vague else rounded(value * scale, half * scale)
+    said = (
+        "not identifiable" if name in told.unidentifiable else rounded(value * scale, half * scale)
+    )
     axis = np.array([value - 1.4 * reach, value + 1.4 * reach]) * scale
     title = f"{name} {said}" + ("" if unit == "1" else f" [{prefix}{unit}]")
     return Panel(f"coefficient_{name}", title, tuple(series), limits(axis))
 
 
-def _final(value: float, half: float, end: float, *, vague: bool) -> Series:
+def _final(value: float, half: float, end: float, *, unidentifiable: bool) -> Series:
     """What output error says, with its interval; nothing where nothing is told."""
-    shown = np.full(2, np.nan if vague else value)
+    shown = np.full(2, np.nan if unidentifiable else value)
     lines = banded("output error", shown, np.full(2, half), GREY)
     return Series("interval", np.array([0.0, end]), lines)
 
 
 def _course(
-    courses: Courses, name: str, scale: float, limit: tuple[float, float]
+    courses: ParameterHistory, name: str, scale: float, limit: tuple[float, float]
 ) -> Sequence[Series]:
     """One method's courses from its priors, faint where they echo; nothing beyond the limit."""
     i, (slug, colour) = courses.names.index(name), METHODS[courses.method]

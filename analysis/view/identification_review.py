@@ -58,7 +58,7 @@ def write_review(found: IdentifiedShip, path: str | os.PathLike[str]) -> None:
 
 def _recording(found: IdentifiedShip) -> rr.RecordingStream:
     """A stream whose names depend on the model and the logs alone; see the replay's."""
-    logs = [trial.name for trial in found.fit.problem.trials]
+    logs = [segment.name for segment in found.fit.problem.segments]
     digest = sha256(repr((found.model.name, logs, found.fit.parameters.tolist())).encode())
     name = re.sub(r"[^A-Za-z0-9_-]+", "-", f"shiplog identify {found.model.name} {logs[0]}")
     recording = rr.RecordingStream(
@@ -85,7 +85,7 @@ def _track_origin(i: int) -> str:
 def _blueprint(
     found: IdentifiedShip, sheets: list[RunSheet], coefficients: list[Panel]
 ) -> rrb.Blueprint:
-    axis = until(run_secs(found.fit.problem.trials))
+    axis = until(run_secs(found.fit.problem.segments))
     columns = 3 if len(coefficients) <= MOST_LARGE else 4
     overview = rrb.Horizontal(
         rrb.Grid(*(plot(panel, axis) for panel in coefficients), grid_columns=columns),

@@ -10,7 +10,7 @@ from analysis.disturbance.observer import DISTURBANCE_UNITS
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import Coefficient
 from analysis.replay.replay import Findings
-from shiplog.ships.paper import INPUTS, OUTPUTS
+from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
 
@@ -48,7 +48,9 @@ def equation_panels(findings: Findings, drawn: Drawn) -> tuple[list[Panel], list
             _disturbance(findings, drawn, disturbed),
             _residual(findings, drawn, output),
         ]
-        for output, given, disturbed in zip(OUTPUTS, INPUTS, ("yaw", "surge"), strict=True)
+        for output, given, disturbed in zip(
+            PAPER_OUTPUTS, PAPER_INPUTS, ("yaw", "surge"), strict=True
+        )
     )
     return yaw, surge
 

@@ -11,7 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from analysis.replay.plan import Plan
-from analysis.replay.replay import Analysis, Findings, Slab
+from analysis.replay.replay import Analysis, Findings, ReplayChunk
 
 from .panels import Panel, coefficient_panels, equation_panels
 from .rerun_io import (
@@ -39,16 +39,16 @@ A gap: not measured, or a window that cannot tell.*
 
 
 class Review:
-    """A review that is drawn as the slabs of a replay come; made by `reviewing`."""
+    """A review that is drawn as the chunks of a replay come; made by `reviewing`."""
 
     def __init__(self, plan: Plan, recording: rr.RecordingStream, *, full: bool) -> None:
         self._recording, self._full = recording, full
         self._start_ns = plan.clock.start_ns
-        self._sketch = Sketch(plan.clock, plan.usual)
+        self._sketch = Sketch(plan.clock, plan.stats)
 
-    def add(self, slab: Slab) -> None:
-        """Draw the next slab."""
-        dense = self._sketch.add(slab)
+    def add(self, chunk: ReplayChunk) -> None:
+        """Draw the next chunk."""
+        dense = self._sketch.add(chunk)
         if self._full:
             for entity, series in dense.items():
                 send_points(self._recording, entity, series, self._start_ns)
@@ -101,7 +101,7 @@ def _recording(plan: Plan) -> rr.RecordingStream:
     Each log is an application of its own to Rerun, which shares one layout among the recordings
     of an application; the axes of another ship would be wrong for this one.
     """
-    name, usual, noise = plan.name, plan.usual, plan.noise
+    name, usual, noise = plan.name, plan.stats, plan.noise
     known = (name, plan.clock.start_ns, plan.clock.count, plan.vessel, usual.measured)
     digest = sha256(repr(known).encode())
     for array in (usual.spread, noise.measurement_std, noise.process_ratio):
@@ -119,7 +119,7 @@ def _send_properties(recording: rr.RecordingStream, findings: Findings) -> None:
     trial = rr.AnyValues(
         vessel=findings.vessel.name,
         model=findings.model_origin,
-        duration_secs=findings.survey.duration_secs,
+        duration_secs=findings.log_stats.duration_secs,
         dt_secs=findings.clock.dt_secs,
         samples=findings.clock.count,
         warnings=list(findings.warnings) or ["none"],

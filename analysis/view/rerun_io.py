@@ -52,7 +52,7 @@ def send_style(recording: rr.RecordingStream, entity: str, series: Series) -> No
 
 
 def send_points(recording: rr.RecordingStream, entity: str, series: Series, start_ns: int) -> None:
-    """Send a series in slabs of a size that Rerun likes."""
+    """Send a series in chunks of a size that Rerun likes."""
     values = np.column_stack([line.values for line in series.lines])
     for start in range(0, len(values), ROWS_SENT):
         part = slice(start, start + ROWS_SENT)

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from analysis.disturbance.observer import DISTURBANCE_UNITS
 from analysis.filters.base import OUTPUT_STATES
-from analysis.replay.replay import Slab
-from analysis.signals.signal_stats import Gauge
+from analysis.replay.replay import ReplayChunk
+from analysis.signals.signal_stats import SignalStats
 from shiplog.checks.channel_stats import longest_step_secs
 from shiplog.compiled import compiled
 from shiplog.resampling import Clock
-from shiplog.ships.paper import INPUTS, OUTPUTS
+from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, factor
 
@@ -52,24 +52,24 @@ class Series:
 
 
 class Sketch:
-    """Draws a replay as its slabs come, and keeps of each series what a screen can show."""
+    """Draws a replay as its chunks come, and keeps of each series what a screen can show."""
 
-    def __init__(self, clock: Clock, usual: Gauge) -> None:
+    def __init__(self, clock: Clock, stats: SignalStats) -> None:
         self._clock, self._spiky = clock, clock.count > POINTS
         self._thinned: dict[str, Thinning] = {}
         self._samples = {
             name: _Samples(longest)
-            for name, longest in zip(OUTPUTS, usual.longest_steps, strict=True)
+            for name, longest in zip(PAPER_OUTPUTS, stats.longest_steps, strict=True)
         }
 
-    def add(self, slab: Slab) -> dict[str, Series]:
-        """Draw the next slab; its series over time, by entity, whole."""
+    def add(self, chunk: ReplayChunk) -> dict[str, Series]:
+        """Draw the next chunk; its series over time, by entity, whole."""
         dense = {
             entity: series
-            for part in (self._outputs(slab), self._inputs(slab), self._disturbances(slab))
+            for part in (self._outputs(chunk), self._inputs(chunk), self._disturbances(chunk))
             for entity, series in part.items()
         }
-        for entity, series in (dense | _sparse(slab)).items():
+        for entity, series in (dense | _sparse(chunk)).items():
             if entity not in self._thinned:
                 stretch = _stretch(self._clock.count, len(series.lines))
                 self._thinned[entity] = Thinning(stretch * self._clock.dt_secs)
@@ -77,21 +77,21 @@ class Sketch:
         return dense
 
     def result(self) -> dict[str, Series]:
-        """All series, by entity, each thinned to about `POINTS`, once all slabs were added."""
+        """All series, by entity, each thinned to about `POINTS`, once all chunks were added."""
         return {entity: thinned.result() for entity, thinned in self._thinned.items()}
 
-    def _outputs(self, slab: Slab) -> dict[str, Series]:
+    def _outputs(self, chunk: ReplayChunk) -> dict[str, Series]:
         drawn = {}
-        estimates, at = slab.estimates, slab.signals.time_secs
+        estimates, at = chunk.estimates, chunk.signals.time_secs
         for i, (name, state, colour) in enumerate(
-            zip(OUTPUTS, OUTPUT_STATES, (BLUE, ORANGE), strict=True)
+            zip(PAPER_OUTPUTS, OUTPUT_STATES, (BLUE, ORANGE), strict=True)
         ):
             scale = factor(CATALOGUE[name].unit, CATALOGUE[name].display_unit)
             residual = estimates.innovations[:, i] / estimates.innovation_stds[:, i]
             rows, columns = self._samples[name].step(
-                slab.signals.first, np.column_stack((slab.signals[name] * scale, residual))
+                chunk.signals.first, np.column_stack((chunk.signals[name] * scale, residual))
             )
-            times, (measured, normalised) = rows * slab.signals.dt_secs, columns.T
+            times, (measured, normalised) = rows * chunk.signals.dt_secs, columns.T
             line = Line("measured", measured, GREY, 2.5)
             drawn[f"{name}/measured"] = Series("measured", times, (line,), spiky=True)
             value = estimates.states[:, state] * scale
@@ -104,18 +104,18 @@ class Sketch:
             drawn[f"residual_{name}/normalised"] = Series("normalised", times, (line,), spiky=True)
         return drawn
 
-    def _inputs(self, slab: Slab) -> dict[str, Series]:
+    def _inputs(self, chunk: ReplayChunk) -> dict[str, Series]:
         drawn = {}
-        for name in INPUTS:
+        for name in PAPER_INPUTS:
             scale = factor(CATALOGUE[name].unit, CATALOGUE[name].display_unit)
-            line = Line(name, slab.signals[name] * scale, GREEN, 1.5)
-            series = Series("measured", slab.signals.time_secs, (line,), spiky=True)
+            line = Line(name, chunk.signals[name] * scale, GREEN, 1.5)
+            series = Series("measured", chunk.signals.time_secs, (line,), spiky=True)
             drawn[f"{name}/measured"] = series
         return drawn
 
-    def _disturbances(self, slab: Slab) -> dict[str, Series]:
-        drawn, found = {}, slab.disturbance
-        at, waves = slab.signals.time_secs, {"yaw": found.yaw_wave, "surge": found.surge_wave}
+    def _disturbances(self, chunk: ReplayChunk) -> dict[str, Series]:
+        drawn, found = {}, chunk.disturbance
+        at, waves = chunk.signals.time_secs, {"yaw": found.yaw_wave, "surge": found.surge_wave}
         for name, values in (("yaw", found.yaw), ("surge", found.surge)):
             scale, wave = DISTURBANCE_UNITS[name][2], waves[name]
             line = Line("disturbance", values * scale, RED, 1.5)
@@ -126,20 +126,20 @@ class Sketch:
         return drawn
 
 
-def _sparse(slab: Slab) -> dict[str, Series]:
+def _sparse(chunk: ReplayChunk) -> dict[str, Series]:
     """Coefficients with their standard deviations in SI, the track in m, the heading in rad."""
     drawn = {}
-    for history in (slab.yaw_history, slab.surge_history):
+    for history in (chunk.yaw_history, chunk.surge_history):
         for i, name in enumerate(history.names):
             value, std = history.values[:, i], history.stds[:, i]
             lines = Line("value", value, GREY), Line("std", std, GREY)
             drawn[f"coefficient_{name}/window"] = Series("window", history.time_secs, lines)
-    lines = Line("north", slab.track.north, GREY), Line("east", slab.track.east, GREY)
-    drawn["track"] = Series("track", slab.track.time_secs, lines)
-    if "heading" in slab.signals:
-        known = np.isfinite(slab.signals["heading"])
-        line = Line("heading", slab.signals["heading"][known], GREY)
-        drawn["heading"] = Series("heading", slab.signals.time_secs[known], (line,))
+    lines = Line("north", chunk.track.north, GREY), Line("east", chunk.track.east, GREY)
+    drawn["track"] = Series("track", chunk.track.time_secs, lines)
+    if "heading" in chunk.signals:
+        known = np.isfinite(chunk.signals["heading"])
+        line = Line("heading", chunk.signals["heading"][known], GREY)
+        drawn["heading"] = Series("heading", chunk.signals.time_secs[known], (line,))
     return drawn
 
 
@@ -180,7 +180,7 @@ class _Samples:
         self._longest, self._last = longest, -1
 
     def step(self, first: int, columns: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
-        """The instants (k,) and the rows (k, c) of the next slab (n, c), which begins at `first`.
+        """The instants (k,) and the rows (k, c) of the next chunk (n, c), which begins at `first`.
 
         Where the first column is measured the others are.
         """
@@ -201,7 +201,7 @@ def _stretch(count: int, lines: int) -> int:
 
 
 class Thinning:
-    """Keeps of a series that comes in slabs each line's extremes in each of equal stretches.
+    """Keeps of a series that comes in chunks each line's extremes in each of equal stretches.
 
     What is kept stands at its own time. The first point of every gap is kept, and both ends. A
     stretch of 0 s keeps all.

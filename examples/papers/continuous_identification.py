@@ -26,7 +26,7 @@ from analysis.identification.comparison.paper_scheme import (
     STRIDE_SECS,
     Q,
     R,
-    papers_states,
+    paper_states,
     regression,
     solved,
     windowed,
@@ -140,7 +140,7 @@ PRINTED_ROWS = (
 
 def estimates(signals: Signals, prior: Coefficients, *, jumps: bool = True) -> FloatArray:
     """The states by the paper's filter, (m, 5), the model in it being `prior`."""
-    return papers_states(signals, prior, as_printed=not jumps)
+    return paper_states(signals, prior, as_printed=not jumps)
 
 
 def identified(signals: Signals, c: Coefficients, x: FloatArray) -> FloatArray:

@@ -13,12 +13,12 @@ from shiplog.units import CATALOGUE
 
 from .manoeuvres import manoeuvre
 from .sensors import Suite, corrupt, delays, sample_times, suite
-from .trajectory import Gust, Trajectory, Unrest, WaveMoment, sail
+from .trajectory import Gust, RandomForcing, Trajectory, WaveMoment, sail
 
-SLAB_SECS = 60.0  # of reception: what one damaged chunk can cost
+CHUNK_SECS = 60.0  # of reception: what one damaged chunk can cost
 MOST_SAMPLES = 50_000_000  # of one sensor
 START_NS = 1_767_225_600 * 10**9  # 2026-01-01 00:00 UTC: a fixed instant, so that runs repeat
-UNREST_CHILD = 1_000_000  # of the seed: far behind the sensors' own, of which more may come
+RANDOM_FORCING_CHILD = 1_000_000  # of the seed: far behind the sensors' own, of which more may come
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +31,9 @@ class SimulatedTrial:
     vessel_toml: str | None = None
     metadata: Mapping[str, str] = field(default_factory=dict)
 
-    def slabs(self) -> Iterator[tuple[Channel, ...]]:
-        """The samples in slabs of `SLAB_SECS` of reception."""
-        ends = START_NS + (np.arange(SLAB_SECS, self.duration_secs, SLAB_SECS) * 1e9).astype(int)
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
+        """The samples in chunks of `CHUNK_SECS` of reception."""
+        ends = START_NS + (np.arange(CHUNK_SECS, self.duration_secs, CHUNK_SECS) * 1e9).astype(int)
         cuts = [
             [0, *np.searchsorted(channel.received_ns, ends).tolist(), len(channel)]
             for channel in self.channels
@@ -67,29 +67,29 @@ def simulate(
     sensors: Suite | None = None,
     gusts: tuple[Gust, ...] = (),
     wave: WaveMoment | None = None,
-    unrest: Unrest | None = None,
+    random_forcing: RandomForcing | None = None,
     vessel_toml: str | None = None,
 ) -> SimulatedTrial:
     """Sail a manoeuvre and measure it; the same seed gives the same samples to the last bit.
 
     Raises `UsageError` for an unknown manoeuvre, a duration that is not positive, a gust outside
-    the trial, or an unrest that is negative or not finite.
+    the trial, or an random_forcing that is negative or not finite.
     """
     sensors = suite("paper") if sensors is None else sensors
-    _require_sensible(duration_secs, seed, sensors, gusts, unrest)
+    _require_sensible(duration_secs, seed, sensors, gusts, random_forcing)
     orders_seed, *sensor_seeds = np.random.SeedSequence(seed).spawn(1 + len(CATALOGUE))
     ordered = manoeuvre(
         manoeuvre_name, duration_secs, vessel.approach_rpm, np.random.default_rng(orders_seed)
     )
-    unrest_seed = np.random.SeedSequence(seed, spawn_key=(UNREST_CHILD,))
+    random_forcing_seed = np.random.SeedSequence(seed, spawn_key=(RANDOM_FORCING_CHILD,))
     trajectory = sail(
         vessel,
         ordered,
         duration_secs,
         gusts=gusts,
         wave=wave,
-        unrest=unrest,
-        rng=np.random.default_rng(unrest_seed),
+        random_forcing=random_forcing,
+        rng=np.random.default_rng(random_forcing_seed),
     )
     channels = []
     for name, sensor_seed in zip(CATALOGUE, sensor_seeds, strict=True):
@@ -108,7 +108,7 @@ def _require_sensible(
     seed: int,
     sensors: Suite,
     gusts: tuple[Gust, ...],
-    unrest: Unrest | None,
+    random_forcing: RandomForcing | None,
 ) -> None:
     if not (isfinite(duration_secs) and duration_secs > 0):
         raise UsageError(f"the duration must be positive, got {duration_secs:g} s")
@@ -126,10 +126,12 @@ def _require_sensible(
                 f"a gust must begin within the trial and last: it begins at {gust.start_secs:g} s "
                 f"of {duration_secs:g} s, for {gust.duration_secs:g} s"
             )
-    if unrest and not all(isfinite(std) and std >= 0 for std in (unrest.rudder, unrest.force)):
+    if random_forcing and not all(
+        isfinite(std) and std >= 0 for std in (random_forcing.rudder, random_forcing.force)
+    ):
         raise UsageError(
-            "an unrest's standard deviations must be finite and not negative, got "
-            f"{unrest.rudder:g} rad of rudder and {unrest.force:g} m/s²"
+            "an random_forcing's standard deviations must be finite and not negative, got "
+            f"{random_forcing.rudder:g} rad of rudder and {random_forcing.force:g} m/s²"
         )
 
 

@@ -43,7 +43,7 @@ class WaveMoment:
 
 
 @dataclass(frozen=True)
-class Unrest:
+class RandomForcing:
     """White noise that pushes the ship: gusts, and the sea below the waves' band.
 
     Each is the standard deviation of a mean over one second: that of a yaw moment as large as so
@@ -61,15 +61,17 @@ class Trajectory:
     ship: Ship
     hull: Hull
     rows: FloatArray
-    has_unrest: bool = False
+    has_random_forcing: bool = False
 
     def at(self, times_secs: FloatArray) -> dict[str, FloatArray]:
         """The truth at any times, (n,) each: integrated from the row before, not interpolated.
 
-        With an unrest there is a `surge_disturbance`, too, in m/s^2.
+        With an random_forcing there is a `surge_disturbance`, too, in m/s^2.
         """
         found = acting = self._rows_before(times_secs)
-        if self.has_unrest:  # the grid's 3 * 0.1 lies behind 0.3, where the next push is to be seen
+        if (
+            self.has_random_forcing
+        ):  # the grid's 3 * 0.1 lies behind 0.3, where the next push is to be seen
             acting = self._rows_before(times_secs + INSTANT_SECS)
         states = _told_at(
             self.ship.coefficients, self.hull, self.rows, found, acting, times_secs, self.ship.yaw
@@ -88,7 +90,7 @@ class Trajectory:
             "rpm": rpm,
             "yaw_disturbance": per_rudder * (moment + wave * np.sin(frequency * times_secs)),
         }
-        return truth | {"surge_disturbance": force} if self.has_unrest else truth
+        return truth | {"surge_disturbance": force} if self.has_random_forcing else truth
 
     def _rows_before(self, times_secs: FloatArray) -> TimeArray:
         return np.searchsorted(self.rows[:, _TIME], times_secs, side="right") - 1
@@ -101,13 +103,13 @@ def sail(
     *,
     gusts: tuple[Gust, ...] = (),
     wave: WaveMoment | None = None,
-    unrest: Unrest | None = None,
+    random_forcing: RandomForcing | None = None,
     rng: np.random.Generator | None = None,
 ) -> Trajectory:
     """The ship's way through a manoeuvre, free of any sensor's noise.
 
-    `rng` draws the unrest. Raises `UsageError` for a ship that runs away, or has no steady speed
-    to begin with.
+    `rng` draws the random_forcing. Raises `UsageError` for a ship that runs away, or has no steady
+    speed to begin with.
     """
     ship, rpm = ship_of(vessel), ordered.orders[0].rpm
     speed = ordered.initial_speed
@@ -125,7 +127,7 @@ def sail(
         _schedule(ordered, gusts),
         (zigzag.start_secs, zigzag.rudder, zigzag.heading) if zigzag else (inf, 0.0, 0.0),
         (wave.rudder, 2 * pi / wave.period_secs) if wave else (0.0, 0.0),
-        _unrest(unrest, duration_secs, rng or np.random.default_rng(0)),
+        _random_forcing(random_forcing, duration_secs, rng or np.random.default_rng(0)),
         vessel.rudder_max,
         vessel.rudder_rate,
         duration_secs,
@@ -136,14 +138,16 @@ def sail(
             f"{vessel.name} runs away in {ordered.name}: its model is unstable there; "
             "correct its coefficients or choose a gentler manoeuvre"
         )
-    return Trajectory(ship, hull, sailed, unrest is not None)
+    return Trajectory(ship, hull, sailed, random_forcing is not None)
 
 
-def _unrest(unrest: Unrest | None, duration_secs: float, rng: np.random.Generator) -> FloatArray:
+def _random_forcing(
+    random_forcing: RandomForcing | None, duration_secs: float, rng: np.random.Generator
+) -> FloatArray:
     """The moment and the force of each step of the grid, the last for all that follow, (k, 2)."""
-    if unrest is None:
+    if random_forcing is None:
         return np.full((1, 2), -0.0)  # added to any number, it leaves even the sign of a zero
-    stds = np.array([unrest.rudder, unrest.force]) / sqrt(GRID_SECS)
+    stds = np.array([random_forcing.rudder, random_forcing.force]) / sqrt(GRID_SECS)
     drawn: FloatArray = stds * rng.standard_normal((round(duration_secs / GRID_SECS) + 1, 2))
     return drawn
 
@@ -172,7 +176,7 @@ def _sail(
     schedule: FloatArray,
     zigzag: tuple[float, float, float],
     waves: tuple[float, float],
-    unrest: FloatArray,
+    random_forcing: FloatArray,
     rudder_max: float,
     rudder_rate: float,
     duration: float,
@@ -194,7 +198,7 @@ def _sail(
             grid_index += 1
         # what acts until the next knot
         delta, delta_dot, arrival = _steer(delta, order, t, rudder_max, rudder_rate)
-        push, force = unrest[min(grid_index, len(unrest)) - 1]
+        push, force = random_forcing[min(grid_index, len(random_forcing)) - 1]
         moment = schedule[at, 3] + push
         acting = Acting(delta, delta_dot, schedule[at, 2], moment, waves[0], waves[1], force)
         if count == len(rows):

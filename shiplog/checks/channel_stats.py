@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shiplog.mcap.schema import GEOGRAPHIC
-from shiplog.types import ByName, Channel, FloatArray, Log, TimeArray
+from shiplog.types import Channel, ChannelsByName, FloatArray, Log, TimeArray
 from shiplog.units import CATALOGUE
 
-from .quantiles import Thinned
-from .stuck import Stuck, StuckWatch
+from .quantiles import Quantiles
+from .stuck import Stuck, StuckCheck
 
 Mask = NDArray[np.bool_]
 
@@ -32,7 +32,7 @@ class Cases:
 
 
 @dataclass(frozen=True, eq=False)
-class ChannelSurvey:
+class ChannelStats:
     """What a channel holds. Known are values that are finite, and possible too if `strict`."""
 
     name: str
@@ -71,20 +71,20 @@ class ChannelSurvey:
         """The silence beyond which the channel was not measured, not between two samples."""
         return longest_step_secs(self.usual_secs)
 
-    def of(self, slab: tuple[Channel, ...]) -> Channel | None:
-        """The part of a slab that is this channel's, what is not known as NaN."""
-        for channel in slab:
+    def of(self, chunk: tuple[Channel, ...]) -> Channel | None:
+        """The part of a chunk that is this channel's, what is not known as NaN."""
+        for channel in chunk:
             if channel.topic == self.topic and channel.fields == self.fields:
                 return possible(channel) if self.strict else channel
         return None
 
 
 @dataclass(frozen=True, eq=False)
-class Survey(ByName[ChannelSurvey]):
+class LogStats(ChannelsByName[ChannelStats]):
     """What a log holds."""
 
     name: str
-    channels: tuple[ChannelSurvey, ...]
+    channels: tuple[ChannelStats, ...]
 
     @property
     def span_ns(self) -> tuple[int, int]:
@@ -101,18 +101,18 @@ class Survey(ByName[ChannelSurvey]):
         return (end - start) * 1e-9
 
 
-def survey_log(log: Log, *, strict: bool = False) -> Survey:
+def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
     """Go through a log once and say what each of its channels holds.
 
     `strict` takes what no ship does as not measured.
     """
-    surveyors: dict[tuple[str, tuple[str, ...]], _Surveyor] = {}
-    for slab in log.slabs():
-        for channel in slab:
-            if channel.key not in surveyors:
-                surveyors[channel.key] = _Surveyor(channel, strict=strict)
-            surveyors[channel.key].add(channel)
-    return Survey(log.name, tuple(surveyor.result() for surveyor in surveyors.values()))
+    collectors: dict[tuple[str, tuple[str, ...]], _ChannelStatsCollector] = {}
+    for chunk in log.chunks():
+        for channel in chunk:
+            if channel.key not in collectors:
+                collectors[channel.key] = _ChannelStatsCollector(channel, strict=strict)
+            collectors[channel.key].add(channel)
+    return LogStats(log.name, tuple(collector.result() for collector in collectors.values()))
 
 
 def longest_step_secs(usual_secs: float) -> float:
@@ -132,13 +132,13 @@ def possible(channel: Channel) -> Channel:
     )
 
 
-class _Surveyor:
+class _ChannelStatsCollector:
     """Counts one channel's samples as they come."""
 
     def __init__(self, channel: Channel, *, strict: bool) -> None:
         self._channel, self._strict = channel, strict  # the former for what it is called
         kind = CATALOGUE.get(channel.name)
-        self._stuck = None if kind is not None and kind.commanded else StuckWatch()
+        self._stuck = None if kind is not None and kind.commanded else StuckCheck()
         self._samples = self._repeated = self._missing = self._known = self._negative = 0
         self._start = self._last = self._last_known = 0
         self._span, self._known_span = (_NEVER, -_NEVER), (_NEVER, -_NEVER)
@@ -147,7 +147,7 @@ class _Surveyor:
         self._delay = 0
         self._worst_beyond = 0.0  # by which a value is impossible
         self._long = [np.zeros((0, 2), np.int64)]  # rows of the start and length of a long step
-        self._intervals, self._values = Thinned(), Thinned()
+        self._intervals, self._values = Quantiles(), Quantiles()
         self._known_intervals = self._intervals  # until a sample is not known
 
     def add(self, channel: Channel) -> None:
@@ -233,7 +233,7 @@ class _Surveyor:
             return replace(cases, count=cases.count + count)
         return Cases(count, float(at_ns - self._start) * 1e-9, extent)
 
-    def result(self) -> ChannelSurvey:
+    def result(self) -> ChannelStats:
         """What all that was added comes to."""
         channel, usual = self._channel, _median_secs(self._intervals)
         known = self._known_intervals
@@ -241,7 +241,7 @@ class _Surveyor:
         long = long[long[:, 1] * 1e-9 > longest_step_secs(usual)]
         gaps = zip((long[:, 0] - self._span[0]) * 1e-9, long[:, 1] * 1e-9, strict=True)
         off_beat, interval_range = _beat(self._intervals.values * 1e-9, usual)
-        return ChannelSurvey(
+        return ChannelStats(
             name=channel.name,
             source=channel.source,
             unit=channel.unit,
@@ -297,7 +297,7 @@ def _spanned(span: tuple[int, int], times: TimeArray) -> tuple[int, int]:
     return min(span[0], int(times.min())), max(span[1], int(times.max()))
 
 
-def _median_secs(intervals: Thinned) -> float:
+def _median_secs(intervals: Quantiles) -> float:
     return intervals.median() * 1e-9 if len(intervals.values) else 0.0
 
 

@@ -7,7 +7,7 @@ from shiplog.mcap.schema import GEOGRAPHIC
 from shiplog.types import TrialLog
 from shiplog.units import CATALOGUE, factor
 
-from .channel_stats import ChannelSurvey, Survey, survey_log
+from .channel_stats import ChannelStats, LogStats, compute_log_stats
 
 IRREGULAR_SHARE = 0.1  # of the intervals, which may be more than half off the usual one
 
@@ -20,10 +20,10 @@ def examine(log: TrialLog, names: tuple[str, ...]) -> list[str]:
     Raises `LogError` where a channel is missing, holds an infinite value, or has measured times
     that run backwards: with these nothing can be computed.
     """
-    return faults(survey_log(log), names)
+    return faults(compute_log_stats(log), names)
 
 
-def faults(found: Survey, names: tuple[str, ...]) -> list[str]:
+def faults(found: LogStats, names: tuple[str, ...]) -> list[str]:
     """As `examine`, of a log that was surveyed."""
     said = []
     for name in names:
@@ -36,7 +36,7 @@ def faults(found: Survey, names: tuple[str, ...]) -> list[str]:
     return said
 
 
-def _require_usable(found: Survey, channel: ChannelSurvey) -> None:
+def _require_usable(found: LogStats, channel: ChannelStats) -> None:
     infinite, back = channel.infinite, channel.backwards
     if infinite.count:
         raise LogError(
@@ -52,7 +52,7 @@ def _require_usable(found: Survey, channel: ChannelSurvey) -> None:
         )
 
 
-def _faults(channel: ChannelSurvey) -> Iterator[str]:
+def _faults(channel: ChannelStats) -> Iterator[str]:
     if channel.gaps:
         start, longest = max(channel.gaps, key=lambda gap: gap[1])
         count = _count(len(channel.gaps), "gap")
@@ -77,7 +77,7 @@ def _faults(channel: ChannelSurvey) -> Iterator[str]:
         )
 
 
-def _stuck(channel: ChannelSurvey) -> Iterator[str]:
+def _stuck(channel: ChannelStats) -> Iterator[str]:
     stuck = channel.stuck
     if stuck:
         held = ", ".join(_shown(channel, float(value)) for value in stuck.value)
@@ -87,7 +87,7 @@ def _stuck(channel: ChannelSurvey) -> Iterator[str]:
         )
 
 
-def _impossible(channel: ChannelSurvey) -> Iterator[str]:
+def _impossible(channel: ChannelStats) -> Iterator[str]:
     """Values that no ship has."""
     count = channel.impossible.count
     if not count:
@@ -103,7 +103,7 @@ def _impossible(channel: ChannelSurvey) -> Iterator[str]:
         )
 
 
-def _shown(channel: ChannelSurvey, value: float) -> str:
+def _shown(channel: ChannelStats, value: float) -> str:
     """A value as a person reads it."""
     kind = CATALOGUE.get(channel.name)
     if kind is None or channel.fields == GEOGRAPHIC:

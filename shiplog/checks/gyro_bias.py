@@ -7,8 +7,8 @@ import numpy as np
 from shiplog.types import Channel, FloatArray, Log
 from shiplog.units import factor
 
-from .channel_stats import ChannelSurvey, Survey, survey_log
-from .interpolate import Probe, known_samples
+from .channel_stats import ChannelStats, LogStats, compute_log_stats
+from .interpolate import Interpolator, known_samples
 
 BLOCKS = 8  # of a record, each telling the bias for itself
 SIGNIFICANT = 4.0  # standard errors
@@ -22,19 +22,19 @@ def gyro_bias_warning(log: Log) -> str | None:
     their scatter; blocks with a gap in either channel are left out. None where a channel is
     missing, or too little of it is whole.
     """
-    watch = GyroWatch(survey_log(log))
-    for slab in log.slabs():
-        watch.add(slab)
+    watch = GyroBiasCheck(compute_log_stats(log))
+    for chunk in log.chunks():
+        watch.add(chunk)
     return watch.result()
 
 
-class GyroWatch:
+class GyroBiasCheck:
     """Looks at yaw rate and heading as they come, and gives `gyro_bias_warning`'s answer.
 
-    `found` is the survey of the log that comes.
+    `found` is the log_stats of the log that comes.
     """
 
-    def __init__(self, found: Survey) -> None:
+    def __init__(self, found: LogStats) -> None:
         self._duration_secs = found.duration_secs
         self._turned: _Turning | None = None
         gyro, compass = found.get("yaw_rate"), found.get("heading")
@@ -46,11 +46,11 @@ class GyroWatch:
         self._turned = _Turning(gyro, self._edges, start, _integrated)
         self._headed = _Turning(compass, self._edges, start, _unwrapped)
 
-    def add(self, slab: tuple[Channel, ...]) -> None:
+    def add(self, chunk: tuple[Channel, ...]) -> None:
         """Take the next samples."""
         if self._turned:
-            self._turned.add(slab)
-            self._headed.add(slab)
+            self._turned.add(chunk)
+            self._headed.add(chunk)
 
     def result(self) -> str | None:
         """What there is to say, once all samples were added."""
@@ -82,7 +82,7 @@ class _Turning:
 
     def __init__(
         self,
-        channel: ChannelSurvey,
+        channel: ChannelStats,
         edges: FloatArray,
         origin_ns: int,
         turns: Callable[[FloatArray, FloatArray], FloatArray],
@@ -90,12 +90,12 @@ class _Turning:
         self.channel = channel
         self.whole = np.ones(len(edges) - 1, bool)
         self._edges, self._origin, self._turns = edges, origin_ns, turns
-        self._probe, self._turned = Probe(edges), 0.0
+        self._probe, self._turned = Interpolator(edges), 0.0
         self._last: tuple[FloatArray, FloatArray] = (np.zeros(0), np.zeros(0))
 
-    def add(self, slab: tuple[Channel, ...]) -> None:
+    def add(self, chunk: tuple[Channel, ...]) -> None:
         """Take the next samples."""
-        channel = self.channel.of(slab)
+        channel = self.channel.of(chunk)
         if channel is None or not len(channel):
             return
         new = known_samples(channel, self._origin)

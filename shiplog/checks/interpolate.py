@@ -1,11 +1,11 @@
-"""A channel's values at chosen instants, from slabs."""
+"""A channel's values at chosen instants, from chunks."""
 
 import numpy as np
 
 from shiplog.types import Channel, FloatArray
 
 
-class Probe:
+class Interpolator:
     """Linear between a channel's known samples; NaN in a gap; the first and the last beyond them.
 
     `at` (n,) are seconds, in order. The samples come in the order of their times.

@@ -9,11 +9,11 @@ HELD = 1 << 20  # values: more than a day at 10 Hz has
 _RUN = 256  # neighbours are kept or left out together, so that choosing costs next to nothing
 
 
-class Thinned:
+class Quantiles:
     """The values of a stream, all of them, or of a longer one a part from all over it.
 
     Which values are kept depends on their numbers in the stream alone, by a hash, never on the
-    slabs in which they came or on what they are: between about half of `HELD` and all of it.
+    chunks in which they came or on what they are: between about half of `HELD` and all of it.
     """
 
     def __init__(self) -> None:

@@ -4,8 +4,8 @@ import numpy as np
 
 from shiplog.types import Channel, FloatArray, Log
 
-from .channel_stats import ChannelSurvey, Survey, survey_log
-from .interpolate import Probe, known_samples
+from .channel_stats import ChannelStats, LogStats, compute_log_stats
+from .interpolate import Interpolator, known_samples
 
 WINDOW_SECS = 10.0  # over which the rudder's effect on the yaw rate is looked at
 WINDOWS = 12  # at least so many of them must fit into a record
@@ -24,22 +24,22 @@ def rudder_sign_warning(log: Log) -> str | None:
     into account (Newey and West, 1987). None where a channel is missing, or the rudder moved too
     little to tell.
     """
-    watch = RudderWatch(survey_log(log))
-    for slab in log.slabs():
-        watch.add(slab)
+    watch = RudderSignCheck(compute_log_stats(log))
+    for chunk in log.chunks():
+        watch.add(chunk)
     return watch.result()
 
 
-class RudderWatch:
+class RudderSignCheck:
     """Looks at rudder, yaw rate and speed as they come, and gives `rudder_sign_warning`'s answer.
 
-    `found` is the survey of the log that comes.
+    `found` is the log_stats of the log that comes.
     """
 
-    def __init__(self, found: Survey) -> None:
+    def __init__(self, found: LogStats) -> None:
         self._rudder, yaw_rate = found.get("rudder"), found.get("yaw_rate")
         self._dt, self._start = 0.0, 0
-        self._probes: dict[ChannelSurvey, Probe] = {}
+        self._probes: dict[ChannelStats, Interpolator] = {}
         if self._rudder is None or yaw_rate is None:
             return
         if min(yaw_rate.known, self._rudder.known) < 2 * WINDOWS:
@@ -51,16 +51,17 @@ class RudderWatch:
             return
         self._dt, self._start, at = dt, start, np.arange(int(span / dt) + 1) * dt
         self._probes = {
-            channel: Probe(at, channel.gap_threshold_secs) for channel in (yaw_rate, self._rudder)
+            channel: Interpolator(at, channel.gap_threshold_secs)
+            for channel in (yaw_rate, self._rudder)
         }
         speed = found.get("speed")
         if speed is not None and speed.known:
-            self._probes[speed] = Probe(at)
+            self._probes[speed] = Interpolator(at)
 
-    def add(self, slab: tuple[Channel, ...]) -> None:
+    def add(self, chunk: tuple[Channel, ...]) -> None:
         """Take the next samples."""
         for surveyed, probe in self._probes.items():
-            channel = surveyed.of(slab)
+            channel = surveyed.of(chunk)
             if channel is not None:
                 probe.add(*known_samples(channel, self._start))
 

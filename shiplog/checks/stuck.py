@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from shiplog.types import FloatArray
 
-from .quantiles import Thinned
+from .quantiles import Quantiles
 
 STUCK_PERIODS = 30  # a value that stands still for more usual periods than this,
 STUCK_SECS = 5.0  # and for longer than this,
@@ -24,12 +24,12 @@ class Stuck:
     lasted_secs: float
 
 
-class StuckWatch:
-    """Looks for runs of equal values in a channel that comes in slabs."""
+class StuckCheck:
+    """Looks for runs of equal values in a channel that comes in chunks."""
 
     def __init__(self) -> None:
         self._runs = 0
-        self._lasted, self._jumps = Thinned(), Thinned()
+        self._lasted, self._jumps = Quantiles(), Quantiles()
         self._long: list[FloatArray] = []  # rows of start, lasted, jump before, after, value
         self._start, self._count, self._jump = 0.0, 0, 0.0  # of the run that goes on
         self._last: tuple[float, FloatArray] | None = None

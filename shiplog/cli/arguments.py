@@ -80,7 +80,7 @@ sensors, each setting in SI:
         "--wave", metavar="DEG@PERIOD", help="a sinusoidal yaw moment worth DEG of rudder"
     )
     simulate.add_argument(
-        "--unrest",
+        "--random-forcing",
         metavar="DEG[,MM]",
         help="a white yaw moment and surge force: the standard deviations of their means over a "
         "second, in degrees of rudder at the approach speed and in mm/s²",
@@ -94,7 +94,7 @@ sensors, each setting in SI:
 
 def _add_info(verbs: Any) -> None:  # noqa: ANN401
     said = "what is in a log, without reading it all"
-    info = verbs.add_parser("info", help=said, description=f"Tell {said}.")
+    info = verbs.add_parser("info", help=said, description=f"ProgressCallback {said}.")
     info.add_argument("log", metavar="LOG")
     info.add_argument("--json", metavar="FILE", help="as JSON, - for stdout")
     info.set_defaults(verb="info")
@@ -296,9 +296,9 @@ def wave(text: str) -> tuple[float, float]:
     return radians(float(match[1])), float(match[2])
 
 
-def unrest(text: str) -> tuple[float, float]:
+def random_forcing(text: str) -> tuple[float, float]:
     """`0.2,5` as the rudder in rad and the force in m/s²; without one the force is 0."""
     match = re.fullmatch(rf"{_NUMBER}(?:,{_NUMBER})?", text)
     if not match:
-        raise UsageError(f"--unrest wants DEG[,MM], such as 0.2,5, got {text!r}")
+        raise UsageError(f"--random-forcing wants DEG[,MM], such as 0.2,5, got {text!r}")
     return radians(float(match[1])), float(match[2] or 0) / 1000

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.files import is_device, replacing
 
-from .arguments import gust, known, parser, replay_settings, settings, sources, unrest, wave
+from .arguments import gust, known, parser, random_forcing, replay_settings, settings, sources, wave
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -60,7 +60,7 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
     from recorders.record import record
     from recorders.simulated.sensors import suite
     from recorders.simulated.simulate import simulate
-    from recorders.simulated.trajectory import Gust, Unrest, WaveMoment
+    from recorders.simulated.trajectory import Gust, RandomForcing, WaveMoment
     from shiplog.mcap.writer import write
     from shiplog.vessel.vessel import load_vessel
 
@@ -79,11 +79,13 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
             ),
             gusts=tuple(Gust(*gust(said)) for said in arguments.gust),
             wave=WaveMoment(*wave(arguments.wave)) if arguments.wave else None,
-            unrest=None if arguments.unrest is None else Unrest(*unrest(arguments.unrest)),
+            random_forcing=None
+            if arguments.random_forcing is None
+            else RandomForcing(*random_forcing(arguments.random_forcing)),
             vessel_toml=text,
         )
         tell("write")
-        recorded = record(trial, arguments.output, on_slab=lambda n: tell(f"write: {n} samples"))
+        recorded = record(trial, arguments.output, on_chunk=lambda n: tell(f"write: {n} samples"))
         if arguments.truth and not recorded.interrupted:
             write(trial.truth(), arguments.truth)
     said = f"{arguments.output}: {recorded.samples} samples of {len(trial.channels)} channels"
@@ -134,15 +136,15 @@ def _run_replay(arguments: argparse.Namespace) -> int:
         tell("read")
         log = open_log(arguments.log).preferring(preferred)
         try:
-            replay = Replay(log, vessel, settings=chosen, on_step=tell)
+            replay = Replay(log, vessel, settings=chosen, on_progress=tell)
         except ShiplogError:
             _warn(log.warnings)  # they may explain it
             raise
         from analysis.view.replay_review import reviewing
 
         with reviewing(replay.plan, output, full=arguments.full) as review:
-            for slab in replay.slabs():
-                review.add(slab)
+            for chunk in replay.chunks():
+                review.add(chunk)
             findings = replay.findings
             tell("review")
             review.finish(findings, markdown(findings))
@@ -193,7 +195,7 @@ def _run_identify(arguments: argparse.Namespace) -> int:
             validation_logs=validation_logs,
             known=known(arguments.known),
             vessel=vessel,
-            on_step=tell,
+            on_progress=tell,
         )
         text = vessel_toml(found, tell) if arguments.output else ""
     if arguments.output:
@@ -210,9 +212,11 @@ def _run_identify(arguments: argparse.Namespace) -> int:
     if review:
         _show_review(review, view=arguments.view)
     if arguments.output:
-        vague = ", ".join(found.uncertainty.vague)
+        unidentifiable = ", ".join(found.uncertainty.unidentifiable)
         said = (
-            f"; not identifiable, and no more than what fits these logs: {vague}" if vague else ""
+            f"; not identifiable, and no more than what fits these logs: {unidentifiable}"
+            if unidentifiable
+            else ""
         )
         print(f"vessel file: {arguments.output}{said}", file=sys.stderr)
     return DATA_LOST if found.data_lost else FINE

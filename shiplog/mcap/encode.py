@@ -29,11 +29,11 @@ class Part:
 
     channel_id: int
     first_sequence: int
-    slab: Channel
+    chunk: Channel
 
 
 @dataclass(frozen=True, eq=False)
-class Chunk:
+class McapChunk:
     """The messages of a chunk, and where each channel's stand in it."""
 
     body: Bytes
@@ -42,38 +42,38 @@ class Chunk:
     index: dict[int, NDArray[np.void]]  # of INDEX_ENTRY
 
 
-def chunks(parts: Sequence[Part], largest: int) -> Iterator[Chunk]:
+def mcap_chunks(parts: Sequence[Part], largest: int) -> Iterator[McapChunk]:
     """Lay parts out in even chunks of at most about `largest` bytes, in the order of reception.
 
     A channel has one part. Parts as they were received are laid out little by little; where one
     is in another order, all at once.
     """
     for few in _portions(parts):
-        yield from _laid_out([part for part in few if len(part.slab)], largest)
+        yield from _laid_out([part for part in few if len(part.chunk)], largest)
 
 
 def _portions(parts: Sequence[Part]) -> Iterator[list[Part]]:
     """The parts cut at the same times of reception, so that each portion is moderately large."""
-    total = sum(len(part.slab) for part in parts)
-    leader = max(parts, key=lambda part: len(part.slab)).slab.received_ns
+    total = sum(len(part.chunk) for part in parts)
+    leader = max(parts, key=lambda part: len(part.chunk)).chunk.received_ns
     step = max(1, LAID_OUT_AT_ONCE * len(leader) // max(total, 1))
     times = leader[step::step]
-    if not all(ascending(part.slab.received_ns) for part in parts):
+    if not all(ascending(part.chunk.received_ns) for part in parts):
         times = times[:0]
-    cuts = [[0, *np.searchsorted(p.slab.received_ns, times).tolist(), len(p.slab)] for p in parts]
+    cuts = [[0, *np.searchsorted(p.chunk.received_ns, times).tolist(), len(p.chunk)] for p in parts]
     for number in range(len(times) + 1):
         yield [
             Part(part.channel_id, part.first_sequence + at[number],
-                 part.slab.part(at[number], at[number + 1]))
+                 part.chunk.part(at[number], at[number + 1]))
             for part, at in zip(parts, cuts, strict=True)
         ]  # fmt: skip
 
 
-def _laid_out(parts: Sequence[Part], largest: int) -> Iterator[Chunk]:
+def _laid_out(parts: Sequence[Part], largest: int) -> Iterator[McapChunk]:
     if not parts:
         return
     messages = [_messages(part) for part in parts]
-    received = np.concatenate([part.slab.received_ns for part in parts])
+    received = np.concatenate([part.chunk.received_ns for part in parts])
     order = np.argsort(received, kind="stable")
     ends = np.cumsum(np.concatenate([m.sizes for m in messages])[order])
     starts = np.concatenate(([0], ends[:-1]))
@@ -82,7 +82,7 @@ def _laid_out(parts: Sequence[Part], largest: int) -> Iterator[Chunk]:
     body = np.empty(int(ends[-1]), np.uint8)
     index = {}
     for part, its_messages in zip(parts, messages, strict=True):
-        its_places, places = np.split(places, [len(part.slab)])
+        its_places, places = np.split(places, [len(part.chunk)])
         _place(body, its_places, its_messages)
         index[part.channel_id] = _index(part, its_places)
     even = ceil(ends[-1] / ceil(ends[-1] / largest))
@@ -92,13 +92,13 @@ def _laid_out(parts: Sequence[Part], largest: int) -> Iterator[Chunk]:
         first_ns, last_ns = received[order[[first, stop - 1]]].tolist()
         within = {channel_id: _between(index[channel_id], start, end) for channel_id in index}
         present = {channel_id: entries for channel_id, entries in within.items() if len(entries)}
-        yield Chunk(body[start:end], first_ns, last_ns, present)
+        yield McapChunk(body[start:end], first_ns, last_ns, present)
 
 
 def _index(part: Part, places: TimeArray) -> NDArray[np.void]:
     """Where the messages of a part stand, in the order in which they do."""
     entries = np.empty(len(places), INDEX_ENTRY)
-    entries["received"], entries["offset"] = part.slab.received_ns, places
+    entries["received"], entries["offset"] = part.chunk.received_ns, places
     return entries if np.all(places[1:] > places[:-1]) else np.sort(entries, order="offset")
 
 
@@ -119,16 +119,16 @@ class _Messages:
 
 
 def _messages(part: Part) -> _Messages:
-    slab, n = part.slab, len(part.slab)
-    fixed = schema_for(slab.fields).dtype
+    chunk, n = part.chunk, len(part.chunk)
+    fixed = schema_for(chunk.fields).dtype
     rows = np.empty(n, MESSAGE_HEAD if fixed is None else MESSAGE_HEAD.descr + fixed.descr)
     rows["opcode"], rows["channel"] = Opcode.MESSAGE, part.channel_id
     rows["sequence"] = np.arange(part.first_sequence, part.first_sequence + n)
-    rows["received"], rows["measured"] = slab.received_ns, slab.measured_ns
+    rows["received"], rows["measured"] = chunk.received_ns, chunk.measured_ns
     if fixed is None:
-        return _ragged(rows, encode(slab))
+        return _ragged(rows, encode(chunk))
     rows["length"] = rows.dtype.itemsize - RECORD_HEAD.size
-    fill_rows(rows, slab)
+    fill_rows(rows, chunk)
     return _Messages(rows.view(np.uint8), np.full(n, rows.dtype.itemsize))
 
 

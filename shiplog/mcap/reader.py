@@ -243,7 +243,7 @@ def _not_wanted(summary: Summary, ids: frozenset[int], span: Span) -> frozenset[
     """Where the chunks stand that hold nothing of these channels and this span."""
     return frozenset(
         chunk.offset
-        for chunk in summary.chunks() or ()
+        for chunk in summary.chunk_places() or ()
         if ids.isdisjoint(chunk.channel_ids) or span.is_beside(chunk.first_ns, chunk.last_ns)
     )
 

@@ -1,4 +1,4 @@
-"""A log too long to be held whole, which is gone through slab by slab."""
+"""A log too long to be held whole, which is gone through chunk by chunk."""
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,12 +16,12 @@ from .scan import scan
 from .summary import ChunkPlace, read_summary
 
 HELD_SAMPLES = 16_000_000  # a log of more is not held: they would take 400 MB, their filter more
-SLAB_SAMPLES = 1 << 20
+CHUNK_SAMPLES = 1 << 20
 
 
 @dataclass(eq=False, repr=False)
 class LogFile:
-    """A log in its file. Each call of `slabs` is one pass over it, in bounded memory.
+    """A log in its file. Each call of `chunks` is one pass over it, in bounded memory.
 
     What it says of itself is complete, and what `read` would say, after the first pass.
     """
@@ -33,7 +33,7 @@ class LogFile:
 
     def __repr__(self) -> str:
         """What it is, not all that it holds."""
-        return f"LogFile({self.path}), to be gone through by its slabs"
+        return f"LogFile({self.path}), to be gone through by its chunks"
 
     @property
     def name(self) -> str:
@@ -67,31 +67,31 @@ class LogFile:
         """
         return replace(self, known=self.known.preferring(sources))
 
-    def slabs(self) -> Iterator[tuple[Channel, ...]]:
-        """The samples in the order of the file, about `SLAB_SAMPLES` at a time.
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
+        """The samples in the order of the file, about `CHUNK_SAMPLES` at a time.
 
-        Each slab has every channel, though some may have no samples in it; those of a channel,
-        one slab after the other, are what `read` gives.
+        Each chunk has every channel, though some may have no samples in it; those of a channel,
+        one chunk after the other, are what `read` gives.
 
         Raises `LogError` as `read` does.
         """
         contents = Contents(dict(self.schemas), dict(self.channel_records), keeps_orphans=False)
         with open_mcap(self.path) as stream:
             for _ in scan(stream, contents):
-                if contents.held >= SLAB_SAMPLES:
+                if contents.held >= CHUNK_SAMPLES:
                     yield self._chosen(trial_log(self.path, contents))
         rest = trial_log(self.path, contents)
         yield self._chosen(rest)
         self.known = replace(rest, channels=self.known.channels)
 
-    def _chosen(self, slab: TrialLog) -> tuple[Channel, ...]:
-        """A slab's channels, in the order of those asked for."""
-        found = {channel.key: channel for channel in slab}
+    def _chosen(self, chunk: TrialLog) -> tuple[Channel, ...]:
+        """A chunk's channels, in the order of those asked for."""
+        found = {channel.key: channel for channel in chunk}
         return tuple(found.get(channel.key, channel) for channel in self.known)
 
 
 def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:
-    """A log, whole if memory holds it easily, else in its file, to be gone through in slabs.
+    """A log, whole if memory holds it easily, else in its file, to be gone through in chunks.
 
     A file that has no trustworthy summary is gone through once to learn what is in it. One whose
     messages are not in the order of reception from chunk to chunk is read whole.
@@ -105,7 +105,7 @@ def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:
             return _learned(path, stream)
         if summary.statistics.message_count <= HELD_SAMPLES:
             return read(path)
-        chunks = summary.chunks()
+        chunks = summary.chunk_places()
         if chunks is None:
             return _learned(path, stream)
     if not _are_in_order(chunks):

@@ -40,7 +40,7 @@ class Summary:
     vessel_toml: str | None
     chunk_indexes: tuple[bytes, ...]  # unread: there are thousands in a long file
 
-    def chunks(self) -> tuple[ChunkPlace, ...] | None:
+    def chunk_places(self) -> tuple[ChunkPlace, ...] | None:
         """The chunks in the order of the file; None if some messages are in none of them.
 
         Only where every message is accounted for can one know where a channel's messages are not.

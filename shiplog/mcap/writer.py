@@ -20,7 +20,7 @@ from shiplog.types import Channel, TrialLog, one_channel
 from shiplog.units import CATALOGUE, factor
 from shiplog.version import __version__
 
-from .encode import Chunk, Part, chunks
+from .encode import McapChunk, Part, mcap_chunks
 from .records import CHUNK_HEAD, MAGIC, RECORD_HEAD
 from .schema import (
     ENCODING,
@@ -89,16 +89,16 @@ class LogWriter:
         """How many were added so far."""
         return sum(self._counts.values())
 
-    def write(self, *slabs: Channel) -> None:
-        """Add the slabs' samples, interleaved in the order in which they were received.
+    def write(self, *chunks: Channel) -> None:
+        """Add the chunks' samples, interleaved in the order in which they were received.
 
-        Raises `UsageError` where a slab's unit does not measure what its name says.
+        Raises `UsageError` where a chunk's unit does not measure what its name says.
         """
-        for slab in slabs:
-            channel_id = self._register(slab)
-            self._pending.append(Part(channel_id, self._counts[channel_id], slab))
-            self._counts[channel_id] += len(slab)
-        if sum(len(part.slab) for part in self._pending) >= _PENDING_SAMPLES:
+        for chunk in chunks:
+            channel_id = self._register(chunk)
+            self._pending.append(Part(channel_id, self._counts[channel_id], chunk))
+            self._counts[channel_id] += len(chunk)
+        if sum(len(part.chunk) for part in self._pending) >= _PENDING_SAMPLES:
             self._put_pending()
 
     def flush(self) -> None:
@@ -115,27 +115,27 @@ class LogWriter:
                 self._put(_bytes(records.DataEnd(data_section_crc=self._crc)))
                 self._put_summary()
 
-    def _register(self, slab: Channel) -> int:
-        if slab.topic not in self._channels:
-            if slab.name in CATALOGUE and slab.fields != GEOGRAPHIC:
-                factor(slab.unit, CATALOGUE[slab.name].unit)  # refused now, not when it is read
-            schema = schema_for(slab.fields)
+    def _register(self, chunk: Channel) -> int:
+        if chunk.topic not in self._channels:
+            if chunk.name in CATALOGUE and chunk.fields != GEOGRAPHIC:
+                factor(chunk.unit, CATALOGUE[chunk.name].unit)  # refused now, not when it is read
+            schema = schema_for(chunk.fields)
             if schema.name not in self._schemas:
                 number = len(self._schemas) + 1
                 self._schemas[schema.name] = records.Schema(
                     id=number, name=schema.name, encoding=ENCODING, data=schema.descriptor_set
                 )
                 self._undescribed.append(self._schemas[schema.name])
-            self._channels[slab.topic] = records.Channel(
+            self._channels[chunk.topic] = records.Channel(
                 id=len(self._channels) + 1,
-                topic=slab.topic,
+                topic=chunk.topic,
                 message_encoding=ENCODING,
-                metadata=channel_metadata(slab),
+                metadata=channel_metadata(chunk),
                 schema_id=self._schemas[schema.name].id,
             )
-            self._undescribed.append(self._channels[slab.topic])
-            self._counts[self._channels[slab.topic].id] = 0
-        return self._channels[slab.topic].id
+            self._undescribed.append(self._channels[chunk.topic])
+            self._counts[self._channels[chunk.topic].id] = 0
+        return self._channels[chunk.topic].id
 
     def _add_metadata(self, said: Mapping[str, str]) -> None:
         data = _bytes(records.Metadata(name=METADATA_NAME, metadata=dict(said)))
@@ -169,10 +169,10 @@ class LogWriter:
 
     def _put_pending(self) -> None:
         parts, self._pending = _one_a_channel(self._pending), []
-        for chunk in chunks(parts, CHUNK_BYTES) if parts else ():
+        for chunk in mcap_chunks(parts, CHUNK_BYTES) if parts else ():
             self._put_chunk(chunk)
 
-    def _put_chunk(self, chunk: Chunk) -> None:
+    def _put_chunk(self, chunk: McapChunk) -> None:
         described = b"".join(map(_bytes, self._undescribed))
         self._undescribed = []
         raw = described + chunk.body.tobytes() if described else chunk.body.data
@@ -252,16 +252,16 @@ class LogWriter:
 
 
 def _one_a_channel(parts: Sequence[Part]) -> list[Part]:
-    """Slabs of one channel that follow one another, as one."""
+    """Chunks of one channel that follow one another, as one."""
     by_channel: dict[int, list[Part]] = {}
     for part in parts:
-        if len(part.slab):
+        if len(part.chunk):
             by_channel.setdefault(part.channel_id, []).append(part)
     return [few[0] if len(few) == 1 else _joined(few) for few in by_channel.values()]
 
 
 def _joined(parts: Sequence[Part]) -> Part:
-    return replace(parts[0], slab=one_channel([part.slab for part in parts]))
+    return replace(parts[0], chunk=one_channel([part.chunk for part in parts]))
 
 
 def _bytes(record: records.McapRecord) -> bytes:

@@ -12,7 +12,7 @@ from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 from shiplog.units import did_you_mean
 
-from .motion import OUTPUTS, ComplexArray, Path
+from .motion import MODEL_OUTPUTS, ComplexArray, Path
 
 STEP = 1e-30  # along the imaginary axis: nothing is lost to rounding, however small
 
@@ -55,12 +55,14 @@ class Scale:
 
     @property
     def outputs(self) -> FloatArray:
-        """(4,) what one of each of `OUTPUTS` is in SI."""
+        """(4,) what one of each of `MODEL_OUTPUTS` is in SI."""
         return np.array([1 / self.secs, self.speed, self.speed, 1.0])
 
     def of_channel(self, channel: str | None) -> float:
         """What one of a channel's is in SI; 1 for what no channel measures."""
-        return float(self.outputs[OUTPUTS.index(channel)]) if channel in OUTPUTS else 1.0
+        return (
+            float(self.outputs[MODEL_OUTPUTS.index(channel)]) if channel in MODEL_OUTPUTS else 1.0
+        )
 
     def scaled(self, path: Path) -> Path:
         """A path in these units."""
@@ -82,7 +84,7 @@ def _as_they_are(values: ComplexArray) -> Sequence[complex]:
 class Advance:
     """A run of `count` samples, and how it changes along k directions."""
 
-    outputs: FloatArray  # (count, 4) SI, in the order of OUTPUTS
+    outputs: FloatArray  # (count, 4) SI, in the order of MODEL_OUTPUTS
     end: FloatArray  # (s,) the state at the last sample, in the units of the equations
     outputs_by: FloatArray  # (k, count, 4)
     end_by: FloatArray  # (k, s)
@@ -102,7 +104,11 @@ class Model:
     parameters: tuple[Parameter, ...]
     state: tuple[StateValue, ...]
     compiled: Callable[..., ComplexArray]  # `sail` for this kind, kept in the model's own file
-    outputs: tuple[str, ...] = ("yaw_rate", "speed", "heading")  # of OUTPUTS: what it predicts
+    outputs: tuple[str, ...] = (
+        "yaw_rate",
+        "speed",
+        "heading",
+    )  # of MODEL_OUTPUTS: what it predicts
     dimensionless: bool = True  # else its equations are in SI
     expand: Callable[[ComplexArray], Sequence[complex]] = field(default=_as_they_are)
 
@@ -138,7 +144,7 @@ class Model:
         self, parameters: FloatArray, initial: FloatArray, path: Path, count: int,
         *, offset: float = 0.0, scale: Scale = SI,
     ) -> FloatArray:  # fmt: skip
-        """What would be measured, (count, 4), SI, in the order of `OUTPUTS`.
+        """What would be measured, (count, 4), SI, in the order of `MODEL_OUTPUTS`.
 
         `parameters` are (p,), `initial` is the state at the first sample in the units of the
         equations, `offset` a rudder added to that of the path, in rad. NaN from where the
@@ -175,9 +181,9 @@ class Model:
         All as `sensitivities`.
         """
         scaled, p = scale.scaled(path), len(parameters)
-        outputs_by = np.empty((len(directions), count, len(OUTPUTS)))
+        outputs_by = np.empty((len(directions), count, len(MODEL_OUTPUTS)))
         ends = np.empty((len(directions), len(initial)), np.complex128)
-        out = np.empty((count, len(OUTPUTS)), np.complex128)
+        out = np.empty((count, len(MODEL_OUTPUTS)), np.complex128)
         for i, along in enumerate(directions * (1j * STEP)):
             ends[i] = initial + along[p:-1]
             out = self._sail(parameters + along[:p], ends[i], offset + along[-1], scaled, count)
@@ -197,4 +203,4 @@ class Model:
             return self.compiled(coefficients, initial, complex(offset), path, count)
         except ZeroDivisionError:  # numba's, of complex numbers
             initial[:] = np.nan
-            return np.full((count, len(OUTPUTS)), np.nan + 0j)
+            return np.full((count, len(MODEL_OUTPUTS)), np.nan + 0j)

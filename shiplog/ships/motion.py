@@ -22,7 +22,7 @@ from shiplog.types import FloatArray
 ComplexArray = NDArray[np.complex128]
 F = TypeVar("F", bound=Callable[..., object])
 
-OUTPUTS = ("yaw_rate", "speed", "sway", "heading")  # what `observed` gives, in this order
+MODEL_OUTPUTS = ("yaw_rate", "speed", "sway", "heading")  # what `observed` gives, in this order
 
 
 class Forcing(NamedTuple):
@@ -50,7 +50,7 @@ def motion(c: Any, x: Any, u: Forcing) -> tuple[complex, ...]:  # noqa: ANN401
 
 
 def observed(c: Any, x: Any) -> tuple[complex, complex, complex, complex]:  # noqa: ANN401
-    """What would be measured in a state, in the order of `OUTPUTS`."""
+    """What would be measured in a state, in the order of `MODEL_OUTPUTS`."""
     raise NotImplementedError(f"no observations for {type(c).__name__}")
 
 

@@ -55,8 +55,8 @@ COEFFICIENT_UNITS = {
     "alpha2": "1/rpm",
     "alpha3": "s/m",
 }
-OUTPUTS = ("yaw_rate", "speed")  # what is measured of the ship,
-INPUTS = ("rudder", "rpm")  # and what she is given
+PAPER_OUTPUTS = ("yaw_rate", "speed")  # what is measured of the ship,
+PAPER_INPUTS = ("rudder", "rpm")  # and what she is given
 YAW_COEFFICIENTS = ("a", "b1", "b2", "b3", "d", "e")
 SURGE_COEFFICIENTS = ("f", "g", "h")
 

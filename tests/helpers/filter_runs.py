@@ -10,12 +10,12 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag
 
 from analysis.filters.base import Estimates, Filter, Trace
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.filters.smoother import SmoothingPass, smooth
 from analysis.signals.hold import last_inputs
-from analysis.signals.signal_stats import Gauge
+from analysis.signals.signal_stats import SignalStats
 from shiplog import Signals
-from shiplog.ships.paper import INPUTS, Coefficients
+from shiplog.ships.paper import PAPER_INPUTS, Coefficients
 
 Following = Mapping[str, float]
 
@@ -90,44 +90,44 @@ def steered(count: int, dt: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def five_states(
-    c: Coefficients, noise: Noise, usual: Gauge, delta: np.ndarray, n: np.ndarray
+    c: Coefficients, noise: NoiseModel, stats: SignalStats, delta: np.ndarray, n: np.ndarray
 ) -> LinearRun:
     """The pseudo-input filter's model of a straight ship at constant revolutions."""
-    dt, r = usual.dt_secs, noise.measurement_std**2
+    dt, r = stats.dt_secs, noise.measurement_std**2
     yaw = [[0, 1, 0], [c.b1, c.a, 0], [0, c.b1, c.a]]
     A = block_diag(yaw, np.zeros((2, 2)))
-    F, Q = held(A, np.diag(np.repeat(noise.process_ratio * r * usual.interval_secs, (3, 2))), dt)
-    dw, dv = usual.spread + 1e-9
+    F, Q = held(A, np.diag(np.repeat(noise.process_ratio * r * stats.interval_secs, (3, 2))), dt)
+    dw, dv = stats.spread + 1e-9
     rate = abs(c.a) + 1e-3
     P = np.diag([dw, rate * dw, rate**2 * dw, dv, 1e-2 * dv]) ** 2
-    path = sailed(c, np.array([usual.first[0], 0.0, usual.first[1]]), delta, n, dt)
+    path = sailed(c, np.array([stats.first[0], 0.0, stats.first[1]]), delta, n, dt)
     return LinearRun(told_of(c, path, delta, n, dt), F, Q, P, np.eye(5)[[0, 3]], r)
 
 
-def pushes(c: Coefficients, noise: Noise, usual: Gauge) -> np.ndarray:
+def pushes(c: Coefficients, noise: NoiseModel, stats: SignalStats) -> np.ndarray:
     """What yaw moment and surge force add to the covariance of w, w' and v in a step, (3, 3)."""
-    stiffness = c.b1 + 2 * c.b2 * abs(usual.turning) + 3 * c.b3 * usual.turning**2
-    A = np.array([[0, 1, 0], [stiffness, c.a, 0], [0, 0, 2 * c.g * usual.ahead]])
-    q = noise.process_ratio * noise.measurement_std**2 * usual.interval_secs
-    return held(A, np.diag([0.0, *q]), usual.dt_secs)[1]
+    stiffness = c.b1 + 2 * c.b2 * abs(stats.turning) + 3 * c.b3 * stats.turning**2
+    A = np.array([[0, 1, 0], [stiffness, c.a, 0], [0, 0, 2 * c.g * stats.ahead]])
+    q = noise.process_ratio * noise.measurement_std**2 * stats.interval_secs
+    return held(A, np.diag([0.0, *q]), stats.dt_secs)[1]
 
 
 def three_states(
     c: Coefficients,
-    noise: Noise,
-    usual: Gauge,
+    noise: NoiseModel,
+    stats: SignalStats,
     delta: np.ndarray,
     n: np.ndarray,
     spread: np.ndarray | None = None,
 ) -> LinearRun:
     """The other filters' of a straight ship; the wave's states are two of another basis."""
-    dt, r = usual.dt_secs, noise.measurement_std**2
-    q = noise.process_ratio * r * usual.interval_secs
+    dt, r = stats.dt_secs, noise.measurement_std**2
+    q = noise.process_ratio * r * stats.interval_secs
     A, C = np.array([[0, 1, 0], [c.b1, c.a, 0], [0, 0, 0]]), np.eye(3)[[0, 2]]
-    dw, dv = usual.spread + 1e-9 if spread is None else spread
-    P = np.diag([dw, (abs(c.a) + 1e-3) * (usual.spread[0] + 1e-9), dv]) ** 2
+    dw, dv = stats.spread + 1e-9 if spread is None else spread
+    P = np.diag([dw, (abs(c.a) + 1e-3) * (stats.spread[0] + 1e-9), dv]) ** 2
     intensity = np.diag([0.0, *q])
-    path = sailed(c, np.array([usual.first[0], 0.0, usual.first[1]]), delta, n, dt)
+    path = sailed(c, np.array([stats.first[0], 0.0, stats.first[1]]), delta, n, dt)
     wave = noise.wave
     if wave is not None:
         w0, zeta = wave.frequency, wave.damping
@@ -159,12 +159,12 @@ def measured_as(pattern: str, measured: np.ndarray) -> np.ndarray:
     return seen
 
 
-def in_slabs(signals: Signals, cuts: list[int]) -> Iterator[tuple[Signals, Following]]:
+def in_chunks(signals: Signals, cuts: list[int]) -> Iterator[tuple[Signals, Following]]:
     """The signals cut at instants, each part with the inputs of the instant after it."""
     edges = [0, *cuts, len(signals)]
     for start, stop in pairwise(edges):
         known = stop < len(signals)
-        following = {name: float(signals[name][stop]) for name in INPUTS} if known else None
+        following = {name: float(signals[name][stop]) for name in PAPER_INPUTS} if known else None
         yield signals.part(start, stop), following or last_inputs(signals)
 
 
@@ -180,7 +180,7 @@ def smoothed_run(
 
 
 def together(parts: list[Estimates] | list[Trace]) -> Estimates | Trace:
-    """Estimates or traces of slabs as one."""
+    """Estimates or traces of chunks as one."""
     values = {field.name: [getattr(p, field.name) for p in parts] for field in fields(parts[0])}
     joined = {k: None if v[0] is None else np.concatenate(v) for k, v in values.items()}
     return type(parts[0])(**joined)

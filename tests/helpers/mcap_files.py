@@ -126,15 +126,15 @@ def top_level(data: bytes) -> list[tuple[int, int, int]]:
     return found
 
 
-def chunks(data: bytes) -> list[tuple[int, int]]:
+def mcap_chunks(data: bytes) -> list[tuple[int, int]]:
     return [(start, end) for opcode, start, end in top_level(data) if opcode == Opcode.CHUNK]
 
 
-def flushed(path: Path, slabs: int = 5, count: int = 100) -> tuple[TrialLog, bytes]:
-    """A log written in flushed slabs, so in many chunks, and the bytes of its finished file."""
-    whole = [channel("yaw_rate", slabs * count, 1), channel("speed", slabs * count, 2)]
+def flushed(path: Path, chunks: int = 5, count: int = 100) -> tuple[TrialLog, bytes]:
+    """A log written in flushed chunks, so in many chunks, and the bytes of its finished file."""
+    whole = [channel("yaw_rate", chunks * count, 1), channel("speed", chunks * count, 2)]
     with LogWriter(path, metadata={"place": "Neva"}) as writer:
-        for at in range(0, slabs * count, count):
+        for at in range(0, chunks * count, count):
             part = slice(at, at + count)
             for c in whole:
                 writer.write(

@@ -13,7 +13,7 @@ def as_log(trial: SimulatedTrial, name: str = "trial.mcap") -> TrialLog:
     return TrialLog(name, trial.channels, trial.metadata, trial.vessel_toml)
 
 
-class InSlabs:
+class InChunks:
     """A log cut at given times of reception, seconds after its start."""
 
     def __init__(self, log: TrialLog, cuts: list[float]) -> None:
@@ -22,7 +22,7 @@ class InSlabs:
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401
         return getattr(self.log, name)
 
-    def slabs(self) -> Iterator[tuple[Channel, ...]]:
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
         start, _ = self.log.span_ns
         edges = [int(start + at * 1e9) for at in self.cuts]
         ends = {

@@ -9,7 +9,7 @@ from shiplog import Channel, ShiplogError, read
 
 
 class Sensor:
-    """A source of three slabs that may be interrupted."""
+    """A source of three chunks that may be interrupted."""
 
     metadata = {"source": "test"}  # noqa: RUF012
     vessel_toml = None
@@ -17,7 +17,7 @@ class Sensor:
     def __init__(self, interruption: BaseException | None = None) -> None:
         self.interruption = interruption
 
-    def slabs(self) -> Iterator[tuple[Channel, ...]]:
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
         for k in range(3):
             if k == 2 and self.interruption:
                 raise self.interruption
@@ -27,7 +27,7 @@ class Sensor:
 
 def test_all_that_a_source_yields_is_written_and_told(tmp_path: Path) -> None:
     told: list[int] = []
-    assert record(Sensor(), tmp_path / "a.mcap", on_slab=told.append) == (30, False)
+    assert record(Sensor(), tmp_path / "a.mcap", on_chunk=told.append) == (30, False)
     assert told == [10, 20, 30]
     log = read(tmp_path / "a.mcap")
     assert len(log["yaw_rate"]) == 30

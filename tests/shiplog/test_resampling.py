@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shiplog import Channel, LogError, TrialLog, UsageError, resample
-from shiplog.checks.channel_stats import survey_log
+from shiplog.checks.channel_stats import compute_log_stats
 from shiplog.resampling import on_clock, set_clock
 from shiplog.types import joined
 
@@ -89,7 +89,7 @@ def test_what_is_measured_is_the_mean_of_the_nearest_samples(seed: int, dt_ns: i
 def test_what_is_commanded_is_interpolated_but_not_across_a_gap(seed: int, dt_ns: int) -> None:
     commanded = scattered("rudder", np.random.default_rng(seed), 40, 60.0)
     signals = resample(log_of(commanded), dt_ns * 1e-9)
-    gap_ns = survey_log(log_of(commanded))[commanded.name].gap_threshold_secs * 1e9
+    gap_ns = compute_log_stats(log_of(commanded))[commanded.name].gap_threshold_secs * 1e9
     expected = interpolated_by_force(commanded, signals.start_ns, dt_ns, len(signals), gap_ns)
     np.testing.assert_allclose(signals["rudder"], expected, rtol=1e-9, atol=1e-12)
 
@@ -163,7 +163,9 @@ def test_jittered_times_keep_the_usual_period_and_lose_no_sample() -> None:
     rng = np.random.default_rng(3)
     seconds = np.arange(500) * 0.1 + rng.uniform(-0.02, 0.02, 500)
     jittered = channel("yaw_rate", seconds, np.arange(500.0))
-    assert survey_log(log_of(jittered))[jittered.name].usual_secs == pytest.approx(0.1, abs=0.005)
+    assert compute_log_stats(log_of(jittered))[jittered.name].usual_secs == pytest.approx(
+        0.1, abs=0.005
+    )
     signals = resample(log_of(jittered), 0.1)
     assert np.nanmax(np.abs(np.diff(signals["yaw_rate"]))) <= 2
     assert np.isfinite(signals["yaw_rate"]).mean() > 0.9
@@ -261,7 +263,7 @@ def test_a_step_that_is_none_is_refused(dt_secs: float) -> None:
 
 
 @pytest.mark.parametrize("silent", ["yaw_rate", "rudder", "heading", "all"])
-def test_a_long_silence_comes_in_slabs_as_it_goes_by(
+def test_a_long_silence_comes_in_chunks_as_it_goes_by(
     silent: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("shiplog.resampling.MOST_INSTANTS", 50)
@@ -276,21 +278,21 @@ def test_a_long_silence_comes_in_slabs_as_it_goes_by(
     ]
     log = log_of(*channels)
     whole = resample(log, channels=names)
-    clock = set_clock(log, survey_log(log), channels=names)
+    clock = set_clock(log, compute_log_stats(log), channels=names)
     given, most, done = 0, 0, 0
     parts = []
     for at in range(0, 3000, 100):
-        slab = tuple(
+        chunk = tuple(
             c.part(*np.searchsorted(c.received_ns, [START + at * SEC, START + (at + 100) * SEC]))
             for c in log
         )
-        parts.append(slab)
+        parts.append(chunk)
 
     def watched() -> Iterator[tuple[Channel, ...]]:
         nonlocal given
-        for slab in parts:
+        for chunk in parts:
             given += 100
-            yield slab
+            yield chunk
 
     for signals in on_clock(watched(), clock):
         most = max(most, len(signals))

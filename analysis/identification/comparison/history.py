@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.identification.segment import Trial
+from analysis.identification.segment import Segment
 from analysis.identification.uncertainty import ECHO, Uncertainty
 from shiplog.types import FloatArray
 
@@ -19,7 +19,7 @@ MOST_OFF = 1.0  # the same where the value is hardly told
 
 
 @dataclass(frozen=True, eq=False)
-class Courses:
+class ParameterHistory:
     """Coefficients by one method from one or two priors, over the runs put end to end.
 
     p coefficients at k instants from each of q priors; NaN where the method cannot tell.
@@ -90,14 +90,14 @@ def with_breaks(parts: Sequence[FloatArray]) -> FloatArray:
     return np.concatenate(rows[:-1])
 
 
-def run_secs(trials: tuple[Trial, ...]) -> float:
+def run_secs(segments: tuple[Segment, ...]) -> float:
     """How long some runs take, put end to end."""
-    return sum(len(trial) * trial.dt_secs for trial in trials)
+    return sum(len(segment) * segment.dt_secs for segment in segments)
 
 
-def begins_secs(trials: tuple[Trial, ...]) -> Iterator[float]:
+def begins_secs(segments: tuple[Segment, ...]) -> Iterator[float]:
     """When each of some runs put end to end begins."""
     start = 0.0
-    for trial in trials:
+    for segment in segments:
         yield start
-        start += len(trial) * trial.dt_secs
+        start += len(segment) * segment.dt_secs

@@ -11,14 +11,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from analysis.filters.factory import filter_states
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.identification.output_error import OutputError
-from analysis.identification.segment import Trial
+from analysis.identification.segment import Segment
 from shiplog.ships.paper import Coefficients, rudder_effects
 from shiplog.types import FloatArray, Signals
 from shiplog.vessel.settings import FilterSettings
 
-from .history import Courses, begins_secs, with_breaks
+from .history import ParameterHistory, begins_secs, with_breaks
 
 METHOD = "the paper's scheme"
 Q, R = 0.01, 400.0  # of its filter
@@ -26,7 +26,7 @@ WINDOW_SECS, STRIDE_SECS = 200.0, 2.0
 NINE = Coefficients._fields[:9]  # what it identifies; the alphas are known
 
 
-def papers_scheme(fit: OutputError, priors: FloatArray) -> Courses | None:
+def paper_scheme(fit: OutputError, priors: FloatArray) -> ParameterHistory | None:
     """Its courses of the coefficients of the paper's model, from two priors, (2, p); else None.
 
     There are none where a model in the filter runs away, and none of T3: e stands for it.
@@ -34,7 +34,7 @@ def papers_scheme(fit: OutputError, priors: FloatArray) -> Courses | None:
     problem = fit.problem
     if problem.model.kind is not Coefficients:
         return None
-    parts = [list(_courses(problem.trials, _coefficients(fit, prior))) for prior in priors]
+    parts = [list(_courses(problem.segments, _coefficients(fit, prior))) for prior in priors]
     wanted = [NINE.index(name) for name in problem.free_names if name in NINE]
     columns = [i for i, name in enumerate(problem.free_names) if name in NINE]
     times = with_breaks([time for time, _ in parts[0]])
@@ -42,7 +42,9 @@ def papers_scheme(fit: OutputError, priors: FloatArray) -> Courses | None:
     values = values[:, :, wanted]
     values[values == 0] = np.nan  # of a column of zeros: the pseudo-inverse's 0 is nobody's
     names = tuple(problem.free_names[i] for i in columns)
-    return Courses(METHOD, names, times, values, np.full(values.shape, np.nan), priors[:, columns])
+    return ParameterHistory(
+        METHOD, names, times, values, np.full(values.shape, np.nan), priors[:, columns]
+    )
 
 
 def _coefficients(fit: OutputError, prior: FloatArray) -> Coefficients:
@@ -52,19 +54,19 @@ def _coefficients(fit: OutputError, prior: FloatArray) -> Coefficients:
 
 
 def _courses(
-    trials: tuple[Trial, ...], prior: Coefficients
+    segments: tuple[Segment, ...], prior: Coefficients
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
-    for trial, begins in zip(trials, begins_secs(trials), strict=True):
-        ends, found = windowed(trial.signals, prior, papers_states(trial.signals, prior))
+    for segment, begins in zip(segments, begins_secs(segments), strict=True):
+        ends, found = windowed(segment.signals, prior, paper_states(segment.signals, prior))
         yield begins + ends, found
 
 
-def papers_states(signals: Signals, prior: Coefficients, *, as_printed: bool = True) -> FloatArray:
+def paper_states(signals: Signals, prior: Coefficients, *, as_printed: bool = True) -> FloatArray:
     """w, w', w'', v, v' by the paper's filter with `prior` in it, (n, 5).
 
     Not `as_printed`, w'' jumps where the rudder starts or stops, as the equations have it.
     """
-    noise = Noise(np.full(2, np.sqrt(R / signals.dt_secs)), np.full(2, Q / R))
+    noise = NoiseModel(np.full(2, np.sqrt(R / signals.dt_secs)), np.full(2, Q / R))
     settings = FilterSettings(kind="pseudo-input", as_printed=as_printed)
     return filter_states(signals, prior, noise, settings).states
 

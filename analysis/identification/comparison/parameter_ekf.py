@@ -18,12 +18,12 @@ import numpy as np
 from analysis.identification.least_squares import weighed
 from analysis.identification.output_error import OutputError
 from analysis.identification.problem import Problem, residuals
-from analysis.identification.segment import Trial
+from analysis.identification.segment import Segment
 from shiplog.ships.motion import Path
 from shiplog.ships.path import part_of
 from shiplog.types import FloatArray
 
-from .history import Courses, begins_secs, run_secs
+from .history import ParameterHistory, begins_secs, run_secs
 
 METHOD = "extended Kalman filter"
 STRIDE_SECS, MOST_STRIDES = 2.0, 1000  # a ship's fastest motion takes several; of long runs more
@@ -40,13 +40,13 @@ class _Belief:
     covariance: FloatArray
 
 
-def augmented(fit: OutputError, priors: FloatArray) -> Courses:
+def augmented(fit: OutputError, priors: FloatArray) -> ParameterHistory:
     """The courses of a fit's parameters by the extended Kalman filter, from two priors, (2, p)."""
     reach = np.abs(priors[0] - priors[1]) / 2
     parts = [list(_course(fit, prior, reach)) for prior in priors]
     times = np.array([time for time, _, _ in parts[0]])
     values, stds = (np.array([[row[i] for row in part] for part in parts]) for i in (1, 2))
-    return Courses(METHOD, fit.problem.free_names, times, values, stds, priors)
+    return ParameterHistory(METHOD, fit.problem.free_names, times, values, stds, priors)
 
 
 def _course(
@@ -55,27 +55,27 @@ def _course(
     """Instants, parameters and their standard deviations, (p,) each; NaN once the ship ran away."""
     problem, p = fit.problem, len(prior)
     values, covariance = prior, np.diag(reach**2)
-    stride = max(STRIDE_SECS, run_secs(problem.trials) / MOST_STRIDES)
-    for i, begins in enumerate(begins_secs(problem.trials)):
+    stride = max(STRIDE_SECS, run_secs(problem.segments) / MOST_STRIDES)
+    for i, begins in enumerate(begins_secs(problem.segments)):
         yield begins, values.copy(), np.sqrt(np.diag(covariance))
         measured, weight = _calm(fit, i)
         belief = _begun(fit, i, values, covariance)
-        for path, part in _strides(problem.trials[i], stride):
+        for path, part in _strides(problem.segments[i], stride):
             belief = _taken_in(problem, belief, path, measured[part], weight[part])
-            at = begins + (part.stop - 1) * problem.trials[i].dt_secs
+            at = begins + (part.stop - 1) * problem.segments[i].dt_secs
             yield at, belief.mean[:p], np.sqrt(np.diag(belief.covariance)[:p])
         values, covariance = belief.mean[:p], belief.covariance[:p, :p]
 
 
 def _calm(fit: OutputError, i: int) -> tuple[FloatArray, FloatArray]:
-    """What was measured in a trial less the swell the fit found, and its weights: (n, c) each."""
+    """What was measured in a segment less the swell the fit found, and its weights: (n, c) each."""
     problem, z = fit.problem, fit.minimum.unknowns
     left = residuals(problem, z)[i]
-    _, weight = weighed(left, fit.spreads[i])
+    _, weight = weighed(left, fit.residual_stds[i])
     still = replace(problem, waves=())
     own = z[problem.own_slice(i)][: _own_size(problem)]
     parts = [z[: len(problem.free)]]
-    parts += [own if j == i else np.zeros(_own_size(problem)) for j in range(len(problem.trials))]
+    parts += [own if j == i else np.zeros(_own_size(problem)) for j in range(len(problem.segments))]
     return left + still.predicted(np.concatenate(parts), i), weight
 
 
@@ -84,16 +84,16 @@ def _own_size(problem: Problem) -> int:
 
 
 def _begun(fit: OutputError, i: int, values: FloatArray, covariance: FloatArray) -> _Belief:
-    """What is believed as trial i begins."""
-    problem, trial, p = fit.problem, fit.problem.trials[i], len(values)
+    """What is believed as segment i begins."""
+    problem, segment, p = fit.problem, fit.problem.segments[i], len(values)
     still = replace(problem, waves=())
     own, outputs = still.own_slice(i), problem.outputs
     mean = np.concatenate((values, still.start()[own]))
     with np.errstate(divide="ignore"):  # what a sensor tells has no prior
         stds = np.asarray(still.prior[1])[own] ** -0.5
     for k, value in enumerate(problem.model.state):
-        if value.channel in outputs and trial.has(value.channel or ""):
-            usual = fit.spreads[i].usual[0, outputs.index(value.channel or "")]
+        if value.channel in outputs and segment.has(value.channel or ""):
+            usual = fit.residual_stds[i].usual[0, outputs.index(value.channel or "")]
             stds[k] = FIRST_STDS * usual / problem.scale.of_channel(value.channel)
         elif value.channel == "heading":
             stds[k] = STILL
@@ -102,11 +102,11 @@ def _begun(fit: OutputError, i: int, values: FloatArray, covariance: FloatArray)
     return _Belief(mean, whole)
 
 
-def _strides(trial: Trial, stride: float) -> Iterator[tuple[Path, slice]]:
-    """A trial's path in pieces of about `stride` s, and the samples of each with both its ends."""
-    path = trial.path
+def _strides(segment: Segment, stride: float) -> Iterator[tuple[Path, slice]]:
+    """A segment's path in pieces of about `stride` s, and the samples of each, ends included."""
+    path = segment.path
     ends = np.flatnonzero(path.sample >= 0)
-    numbers = np.asarray((path.sample[ends] * trial.dt_secs) // stride)
+    numbers = np.asarray((path.sample[ends] * segment.dt_secs) // stride)
     last = np.append(np.flatnonzero(np.diff(numbers) > 0), len(ends) - 1)
     edges = [-1, *ends[last].tolist()]
     for before, end in pairwise(edges):

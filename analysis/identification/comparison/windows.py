@@ -3,44 +3,46 @@
 import numpy as np
 
 from analysis.identification.output_error import OutputError
-from analysis.identification.segment import Trial
+from analysis.identification.segment import Segment
 from analysis.regression.coefficients import identify
 from analysis.regression.sliding import History
 from analysis.regression.weak_form import CHANNELS, weak_form
-from shiplog.ships.motion import OUTPUTS
+from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
 
-from .history import Courses, begins_secs, with_breaks
+from .history import ParameterHistory, begins_secs, with_breaks
 
 METHOD = "windows in weak form"
 
 
-def windows(fit: OutputError) -> Courses | None:
+def windows(fit: OutputError) -> ParameterHistory | None:
     """The window by window histories of the paper's coefficients; else None.
 
     What a window cannot tell is NaN.
     """
     problem = fit.problem
     names = tuple(name for name in problem.free_names if name in Coefficients._fields)
-    usable = [t for t in problem.trials if all(t.has(c) for c in CHANNELS if c in OUTPUTS)]
+    usable = [t for t in problem.segments if all(t.has(c) for c in CHANNELS if c in MODEL_OUTPUTS)]
     if problem.model.kind is not Coefficients or not usable:
         return None
     model = problem.model.coefficients(fit.parameters)
     parts = [
-        _history(trial, model, begins, names)
-        for trial, begins in zip(problem.trials, begins_secs(problem.trials), strict=True)
-        if trial in usable
+        _history(segment, model, begins, names)
+        for segment, begins in zip(problem.segments, begins_secs(problem.segments), strict=True)
+        if segment in usable
     ]
     times, found, stds = (with_breaks(each) for each in zip(*parts, strict=True))
-    return Courses(METHOD, names, times, found[None], stds[None], np.full((1, len(names)), np.nan))
+    return ParameterHistory(
+        METHOD, names, times, found[None], stds[None], np.full((1, len(names)), np.nan)
+    )
 
 
 def _history(
-    trial: Trial, model: Coefficients, begins: float, names: tuple[str, ...]
+    segment: Segment, model: Coefficients, begins: float, names: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Instants, values and standard deviations, (k,), (k, p) and (k, p), of one run."""
-    yaw, surge = (identify(rows)[1] for rows in weak_form(trial.signals, model))
+    yaw, surge = (identify(rows)[1] for rows in weak_form(segment.signals, model))
     columns = [_column(yaw if name in yaw.names else surge, name) for name in names]
     return (
         begins + yaw.time_secs,

@@ -19,11 +19,11 @@ from analysis.disturbance.observer import (
     ForceObserver,
     observe_disturbance,
 )
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.filters.tuning import noise_of
 from analysis.replay.replay import Replay, analyse
 from analysis.signals.hold import InputHold, held_throughout
-from analysis.signals.signal_stats import Gauge, gauge
+from analysis.signals.signal_stats import SignalStats, signal_stats
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import Gust, WaveMoment
@@ -46,7 +46,9 @@ def observed(vessel: Vessel, manoeuvre: str, noise: str, gusts: tuple[Gust, ...]
     sensors = suite(noise, {k.replace("__", "."): v for k, v in settings.items()})
     trial = simulate(vessel, manoeuvre, duration_secs=600.0, seed=5, sensors=sensors, gusts=gusts)
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
-    noise_found = noise_of(gauge(signals, vessel.coefficients), vessel.coefficients, vessel.filter)
+    noise_found = noise_of(
+        signal_stats(signals, vessel.coefficients), vessel.coefficients, vessel.filter
+    )
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
     found, courses = observe_disturbance(signals, vessel.coefficients, noise_found)
     return signals, found, courses, truth
@@ -89,7 +91,7 @@ def test_where_nothing_is_measured_the_disturbance_is_held(vessel: Vessel) -> No
     values["yaw_rate"] = values["yaw_rate"].copy()
     values["yaw_rate"][4000:4300] = np.nan
     gapped: Signals = replace(signals, values=values)
-    noise = noise_of(gauge(gapped, vessel.coefficients), vessel.coefficients, vessel.filter)
+    noise = noise_of(signal_stats(gapped, vessel.coefficients), vessel.coefficients, vessel.filter)
     found, _ = observe_disturbance(gapped, vessel.coefficients, noise)
     assert np.ptp(found.yaw[4000:4300]) == 0
 
@@ -105,7 +107,7 @@ def test_a_force_is_found_in_surge(vessel: Vessel) -> None:
     c = vessel.coefficients
     trial = simulate(vessel, "zigzag-20-20", duration_secs=900.0, sensors=suite("white"))
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
-    noise = noise_of(gauge(signals, c), c, vessel.filter)
+    noise = noise_of(signal_stats(signals, c), c, vessel.filter)
     # a model that believes in 2 % more thrust sees the ship held back by that much
     found, _ = observe_disturbance(signals, c._replace(h=1.02 * c.h), noise)
     assert np.mean(found.surge[6000:]) == pytest.approx(-0.02 * c.h * 80, rel=0.1)
@@ -163,8 +165,8 @@ def asked(*models: str, **other: object) -> DisturbanceSettings:
     return DisturbanceSettings(models, **other)
 
 
-def quiet(stds: tuple[float, float] = (1e-9, 1e-9)) -> Noise:
-    return Noise(np.array(stds), np.ones(2))
+def quiet(stds: tuple[float, float] = (1e-9, 1e-9)) -> NoiseModel:
+    return NoiseModel(np.array(stds), np.ones(2))
 
 
 def ramp_moment(start: float, slope: float) -> Push:
@@ -202,7 +204,7 @@ def test_a_ramp_of_many_small_gusts_is_found_under_white_noise(vessel: Vessel) -
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
     c = vessel.coefficients
     found, courses = observe_disturbance(
-        signals, c, noise_of(gauge(signals, c), c, vessel.filter), asked("ramp")
+        signals, c, noise_of(signal_stats(signals, c), c, vessel.filter), asked("ramp")
     )
     up = slice(2800, 4000)
     assert np.std(found.yaw[up] - truth[up]) < 2 * courses["yaw"].std + 0.05 * truth[-1]
@@ -293,7 +295,7 @@ def test_a_simulated_log_with_gust_and_wave_tells_both(vessel: Vessel) -> None:
     )
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
-    noise = noise_of(gauge(signals, c), c, vessel.filter)
+    noise = noise_of(signal_stats(signals, c), c, vessel.filter)
     found, _ = observe_disturbance(signals, c, noise, asked("constant", "wave"), OMEGA)
     settled = slice(4000, None)
     _, size = phasor(truth[settled], signals.time_secs[settled])
@@ -395,9 +397,9 @@ def test_in_a_turn_the_poles_stay_where_they_were_placed(
     signals = sailed(c, secs=300.0)
     values = dict(signals.values)
     values["yaw_rate"] = np.where(np.arange(len(signals)) % every, np.nan, values["yaw_rate"])
-    usual = gauge(replace(signals, values=values), c)
-    observing = ForceObserver(c, quiet(), usual, asked(*models), OMEGA)
-    as_designed = np.sort(poles_at(c, observing, usual.turning, every).real)
+    stats = signal_stats(replace(signals, values=values), c)
+    observing = ForceObserver(c, quiet(), stats, asked(*models), OMEGA)
+    as_designed = np.sort(poles_at(c, observing, stats.turning, every).real)
     for turning in (0.0, 0.5, 1.0):
         found = np.sort(poles_at(c, observing, radians(turning), every).real)
         exact = "wave" in models
@@ -444,7 +446,7 @@ def test_without_samples_a_wave_turns_on(vessel: Vessel, models: tuple[str, ...]
     assert seen == pytest.approx(again, abs=1e-9 * WAVE)
 
 
-# ---- slabs
+# ---- chunks
 
 
 @pytest.fixture(scope="module")
@@ -460,7 +462,7 @@ def broken(vessel: Vessel) -> Signals:
     return replace(signals, values=values)
 
 
-def in_slabs(
+def in_chunks(
     signals: Signals, cuts: list[int], make: Callable[[], ForceObserver]
 ) -> tuple[dict[str, np.ndarray], dict]:
     observing, edges, found = make(), [0, *sorted(cuts), len(signals)], []
@@ -470,7 +472,7 @@ def in_slabs(
             following = {name: float(signals[name][after]) for name in ("rudder", "rpm")}
             found.append(observing.step(signals.part(start, stop), following))
     arrays = {
-        part: np.concatenate([getattr(slab, part) for slab in found])
+        part: np.concatenate([getattr(chunk, part) for chunk in found])
         for part in PARTS
         if getattr(found[0], part) is not None
     }
@@ -483,12 +485,12 @@ def in_slabs(
 def test_where_a_log_is_cut_changes_no_bit(
     vessel: Vessel, broken: Signals, models: tuple[str, ...], cuts: list[int]
 ) -> None:
-    usual = gauge(broken, vessel.coefficients)
+    stats = signal_stats(broken, vessel.coefficients)
 
     def make() -> ForceObserver:
-        return ForceObserver(vessel.coefficients, quiet(), usual, asked(*models), OMEGA)
+        return ForceObserver(vessel.coefficients, quiet(), stats, asked(*models), OMEGA)
 
-    (whole, courses), (parts, of_parts) = in_slabs(broken, [], make), in_slabs(broken, cuts, make)
+    (whole, courses), (parts, of_parts) = in_chunks(broken, [], make), in_chunks(broken, cuts, make)
     assert whole.keys() == parts.keys()
     for part, values in whole.items():
         assert values.tobytes() == parts[part].tobytes()
@@ -541,8 +543,8 @@ def test_an_observer_that_lost_the_ship_says_nothing(vessel: Vessel) -> None:
     assert np.isfinite(courses["surge"].rms)
 
 
-def slowly(usual: Gauge, interval: float) -> Gauge:
-    return replace(usual, intervals=np.array([1.0, interval]) / usual.dt_secs)
+def slowly(stats: SignalStats, interval: float) -> SignalStats:
+    return replace(stats, intervals=np.array([1.0, interval]) / stats.dt_secs)
 
 
 @pytest.mark.parametrize(
@@ -583,16 +585,16 @@ def slowly(usual: Gauge, interval: float) -> Gauge:
 def test_what_cannot_be_observed_is_refused_in_one_line(
     vessel: Vessel, change: dict, frequency: float | None, said: str
 ) -> None:
-    usual = slowly(gauge(sailed(vessel.coefficients, secs=60.0), vessel.coefficients), 2.0)
+    stats = slowly(signal_stats(sailed(vessel.coefficients, secs=60.0), vessel.coefficients), 2.0)
     with pytest.raises(UsageError, match=said) as raised:
-        ForceObserver(vessel.coefficients, quiet(), usual, DisturbanceSettings(**change), frequency)
+        ForceObserver(vessel.coefficients, quiet(), stats, DisturbanceSettings(**change), frequency)
     assert "\n" not in str(raised.value)
 
 
 def test_a_model_that_is_not_finite_is_refused(vessel: Vessel) -> None:
-    usual = gauge(sailed(vessel.coefficients, secs=60.0), vessel.coefficients)
+    stats = signal_stats(sailed(vessel.coefficients, secs=60.0), vessel.coefficients)
     with pytest.raises(UsageError, match="NaN or infinities"):
-        ForceObserver(vessel.coefficients._replace(a=np.nan), quiet(), usual)
+        ForceObserver(vessel.coefficients._replace(a=np.nan), quiet(), stats)
 
 
 # ---- real logs
@@ -613,19 +615,19 @@ def test_every_log_is_observed_by_every_model(path: Path) -> None:
         log = read(path)
     plan = Replay(log).plan
     holding = InputHold(plan.clock)
-    for slab in log.slabs():
-        holding.add_raw(slab)
-    slabs = list(held_throughout(on_clock(log.slabs(), plan.clock), holding))
+    for chunk in log.chunks():
+        holding.add_raw(chunk)
+    chunks = list(held_throughout(on_clock(log.chunks(), plan.clock), holding))
     for models in SUBSETS:
         for spectrum in ("butterworth", "binomial"):
             observing = ForceObserver(
                 plan.vessel.coefficients,
                 plan.noise,
-                plan.usual,
+                plan.stats,
                 asked(*models, spectrum=spectrum),
                 OMEGA if "wave" in models else None,
             )
-            for _, held, following in slabs:
+            for _, held, following in chunks:
                 found = observing.step(held, following)
                 for part in ("yaw", "surge", "yaw_wave", "surge_wave"):
                     if getattr(found, part) is not None:

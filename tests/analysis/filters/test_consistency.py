@@ -20,10 +20,10 @@ from filter_runs import (
 from gaussian import band, draws, normalised_squared
 
 from analysis.filters.factory import make_filter
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.filters.wave_fit import Wave
 from analysis.signals.hold import last_inputs
-from analysis.signals.signal_stats import Gauge, gauge
+from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import Vessel
 from shiplog.ships.paper import Coefficients
 from shiplog.vessel.settings import SMOOTHED, FilterSettings
@@ -33,8 +33,8 @@ AT = (0, 20, 65, 120, 199)
 COUNT, DT = 200, 0.5
 SPREAD, FIRST = np.array([1e-3, 0.5]), np.array([2e-3, 8.0])
 STDS = np.array([1e-4, 0.1])
-OF_FIVE = Noise(STDS, np.array([1e-2, 1e-2]))
-OF_THREE = Noise(STDS, np.array([1e-4, 1e-3]))
+OF_FIVE = NoiseModel(STDS, np.array([1e-2, 1e-2]))
+OF_THREE = NoiseModel(STDS, np.array([1e-4, 1e-3]))
 AMONG_WAVES = replace(OF_THREE, wave=Wave(frequency=0.6, damping=0.1, std=4e-4, evidence=1.0))
 
 
@@ -61,57 +61,57 @@ def seen_of(count: int) -> np.ndarray:
     return seen
 
 
-def usual_of(c: Coefficients, inputs: np.ndarray, dt: float, **known: float) -> Gauge:
-    found = gauge(signals_of(seen_of(len(inputs)), *inputs.T, dt), c)
+def usual_of(c: Coefficients, inputs: np.ndarray, dt: float, **known: float) -> SignalStats:
+    found = signal_stats(signals_of(seen_of(len(inputs)), *inputs.T, dt), c)
     return replace(found, first=FIRST, spread=SPREAD, **known)
 
 
-def linear(c: Coefficients, settings: FilterSettings, noise: Noise) -> Pair:
+def linear(c: Coefficients, settings: FilterSettings, noise: NoiseModel) -> Pair:
     """Runs drawn from the filter's own model; the wave's states are left out."""
     inputs = np.column_stack(steered(COUNT, DT))
-    usual = usual_of(c, inputs, DT)
+    stats = usual_of(c, inputs, DT)
     if settings.chosen == "pseudo-input":
-        run = five_states(c, noise, usual, *inputs.T)
+        run = five_states(c, noise, stats, *inputs.T)
     else:
         spread = None if settings.chosen == "extended" else noise.measurement_std
-        run = three_states(c, noise, usual, *inputs.T, spread)
+        run = three_states(c, noise, stats, *inputs.T, spread)
     drawn = [run.drawn(np.random.default_rng(seed)) for seed in range(SEEDS)]
-    return judged(c, settings, noise, usual, inputs, drawn)
+    return judged(c, settings, noise, stats, inputs, drawn)
 
 
-def nonlinear(c: Coefficients, settings: FilterSettings, noise: Noise) -> Pair:
+def nonlinear(c: Coefficients, settings: FilterSettings, noise: NoiseModel) -> Pair:
     """Runs of the ship as she is, a yaw moment and a surge force pushing her about."""
     dt, count, ahead, turning = 0.1, 1000, 7.0, 4e-3
     inputs = np.column_stack(steered(count, dt))
-    usual = usual_of(c, inputs, dt, ahead=ahead, turning=turning)
+    stats = usual_of(c, inputs, dt, ahead=ahead, turning=turning)
     rng = np.random.default_rng(3)
     rate = (abs(c.a) + 1e-3) * (SPREAD[0] + 1e-9)
     first = draws(rng, np.diag([SPREAD[0], rate, SPREAD[1]]) ** 2, SEEDS)
-    moved = draws(rng, pushes(c, noise, usual), SEEDS * (count - 1))
+    moved = draws(rng, pushes(c, noise, stats), SEEDS * (count - 1))
     moved = moved.reshape(SEEDS, count - 1, 3)
     true = disturbed(c, first + np.array([FIRST[0], 0, FIRST[1]]), inputs, dt, moved)
     measured = true[:, :, [0, 2]] + STDS * rng.standard_normal((SEEDS, count, 2))
     drawn = list(zip(true, measured, strict=True))
-    return judged(c, settings, noise, usual, inputs, drawn)
+    return judged(c, settings, noise, stats, inputs, drawn)
 
 
 def judged(
     c: Coefficients,
     settings: FilterSettings,
-    noise: Noise,
-    usual: Gauge,
+    noise: NoiseModel,
+    stats: SignalStats,
     inputs: np.ndarray,
     drawn: list[tuple[np.ndarray, np.ndarray]],
 ) -> Pair:
     """The errors over the runs drawn."""
     own = 5 if settings.chosen == "pseudo-input" else 3
     found: tuple[list, list] = [], []
-    new = make_filter(c, noise, usual, settings)
+    new = make_filter(c, noise, stats, settings)
     for true, measured in drawn:
-        signals = signals_of(measured * seen_of(len(measured)), *inputs.T, usual.dt_secs)
+        signals = signals_of(measured * seen_of(len(measured)), *inputs.T, stats.dt_secs)
         filtering = deepcopy(new)
         _, trace, smoothed = smoothed_run(filtering, signals)
-        expected = true if own == 5 else told_of(c, true[:, :3], *inputs.T, usual.dt_secs)
+        expected = true if own == 5 else told_of(c, true[:, :3], *inputs.T, stats.dt_secs)
         ways = (trace.states, trace.covariances), smoothed
         for kept, (x, P) in zip(found, ways, strict=True):
             told, _, _ = filtering.told(signals, last_inputs(signals), x, P)

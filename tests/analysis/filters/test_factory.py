@@ -5,20 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from filter_runs import in_slabs, signals_of, steered, together
-from trial_logs import InSlabs, as_log
+from filter_runs import in_chunks, signals_of, steered, together
+from trial_logs import InChunks, as_log
 
 from analysis.filters.base import Estimates, Filter
 from analysis.filters.factory import filter_states, make_filter
 from analysis.filters.kernels import PATIENCE
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.filters.wave_fit import Wave
 from analysis.signals.hold import InputHold, held_throughout, last_inputs
-from analysis.signals.signal_stats import Gauge, gauge
+from analysis.signals.signal_stats import SignalStats, signal_stats
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import Channel, Signals, TrialLog, Vessel, resample
-from shiplog.checks.channel_stats import survey_log
+from shiplog.checks.channel_stats import compute_log_stats
 from shiplog.resampling import on_clock, set_clock
 from shiplog.ships.paper import steady_speed
 from shiplog.vessel.settings import FILTERS, FilterSettings
@@ -34,13 +34,13 @@ of_each_output = pytest.mark.parametrize(("output", "name"), [(0, "yaw_rate"), (
 of_each_kind = pytest.mark.parametrize("kind", FILTERS)
 
 
-def noise_for(kind: str, wave: Wave | None = None) -> Noise:
+def noise_for(kind: str, wave: Wave | None = None) -> NoiseModel:
     ratios = [1e-2, 1e-2] if kind == "pseudo-input" else [1e-4, 1e-2]
-    return Noise(STDS, np.array(ratios), wave=wave)
+    return NoiseModel(STDS, np.array(ratios), wave=wave)
 
 
-def made(vessel: Vessel, usual: Gauge, kind: str, wave: Wave | None = None) -> Filter:
-    return make_filter(vessel.coefficients, noise_for(kind, wave), usual, FilterSettings(kind=kind))
+def made(vessel: Vessel, stats: SignalStats, kind: str, wave: Wave | None = None) -> Filter:
+    return make_filter(vessel.coefficients, noise_for(kind, wave), stats, FilterSettings(kind=kind))
 
 
 def straight_run(vessel: Vessel, seed: int, count: int = 1000) -> Signals:
@@ -84,9 +84,9 @@ def test_what_is_gated_is_as_what_was_not_measured(
     spiked = off_by(clean, name, slice(500, 503), 20 * STDS[output])
     missing = off_by(clean, name, slice(500, 503), np.nan)
     assert filtered(vessel, spiked, kind).gated.sum() == 3
-    usual, found = gauge(clean, vessel.coefficients), []
+    stats, found = signal_stats(clean, vessel.coefficients), []
     for signals in (spiked, missing):
-        filtering = made(vessel, usual, kind)
+        filtering = made(vessel, stats, kind)
         found.append(filtering.trace(signals, last_inputs(signals)))
     (estimates, trace), (expected, without) = found
     assert np.array_equal(estimates.states, expected.states)
@@ -155,15 +155,15 @@ def same(found: Estimates, expected: Estimates) -> None:
 
 @of_each
 @pytest.mark.parametrize("cuts", [[1], [700], [3, 4, 5, 400, 401, 1100], "everywhere"])
-def test_in_slabs_a_filter_says_the_same_to_the_last_bit(
+def test_in_chunks_a_filter_says_the_same_to_the_last_bit(
     vessel: Vessel, log: TrialLog, kind: str, wave: Wave | None, cuts: list[int] | str
 ) -> None:
     signals = resample(log, channels=NAMES)
     at = list(range(1, len(signals))) if cuts == "everywhere" else cuts
-    usual = gauge(signals, vessel.coefficients)
-    whole = made(vessel, usual, kind, wave).step(signals, last_inputs(signals))
-    filtering = made(vessel, usual, kind, wave)
-    same(together([filtering.step(*slab) for slab in in_slabs(signals, at)]), whole)
+    stats = signal_stats(signals, vessel.coefficients)
+    whole = made(vessel, stats, kind, wave).step(signals, last_inputs(signals))
+    filtering = made(vessel, stats, kind, wave)
+    same(together([filtering.step(*chunk) for chunk in in_chunks(signals, at)]), whole)
 
 
 @of_each
@@ -171,10 +171,10 @@ def test_a_trace_is_kept_without_changing_what_is_said(
     vessel: Vessel, log: TrialLog, kind: str, wave: Wave | None
 ) -> None:
     signals = resample(log, channels=NAMES)
-    usual = gauge(signals, vessel.coefficients)
-    filtering = made(vessel, usual, kind, wave)
+    stats = signal_stats(signals, vessel.coefficients)
+    filtering = made(vessel, stats, kind, wave)
     found, trace = filtering.trace(signals, last_inputs(signals))
-    same(found, made(vessel, usual, kind, wave).step(signals, last_inputs(signals)))
+    same(found, made(vessel, stats, kind, wave).step(signals, last_inputs(signals)))
     told = filtering.told(signals, last_inputs(signals), trace.states, trace.covariances)
     for name, values in zip(("states", "stds", "wave"), told, strict=True):
         expected = getattr(found, name)
@@ -185,9 +185,9 @@ def shuffled(channel: Channel, rng: np.random.Generator) -> Channel:
     return channel.take(rng.permutation(len(channel)))
 
 
-def placed(log: TrialLog | InSlabs) -> Iterator[Signals]:
-    clock = set_clock(log, survey_log(log), channels=NAMES)
-    return (held for _, held, _ in held_throughout(on_clock(log.slabs(), clock), InputHold(clock)))
+def placed(log: TrialLog | InChunks) -> Iterator[Signals]:
+    clock = set_clock(log, compute_log_stats(log), channels=NAMES)
+    return (held for _, held, _ in held_throughout(on_clock(log.chunks(), clock), InputHold(clock)))
 
 
 @of_each_kind
@@ -212,14 +212,14 @@ def test_where_a_log_is_cut_changes_nothing(
 ) -> None:
     cuts = np.sort(np.random.default_rng(seed).uniform(0, 150, 12)).tolist()
     (signals,) = placed(log)
-    parted = InSlabs(log, cuts)
-    clock = set_clock(parted, survey_log(parted), channels=NAMES)
-    usual = gauge(signals, vessel.coefficients)
-    filtering = made(vessel, usual, kind)
-    slabs = held_throughout(on_clock(parted.slabs(), clock), InputHold(clock))
-    found = [filtering.step(held, following) for _, held, following in slabs]
+    parted = InChunks(log, cuts)
+    clock = set_clock(parted, compute_log_stats(parted), channels=NAMES)
+    stats = signal_stats(signals, vessel.coefficients)
+    filtering = made(vessel, stats, kind)
+    chunks = held_throughout(on_clock(parted.chunks(), clock), InputHold(clock))
+    found = [filtering.step(held, following) for _, held, following in chunks]
     assert len(found) > 5
-    whole = made(vessel, usual, kind).step(signals, last_inputs(signals))
+    whole = made(vessel, stats, kind).step(signals, last_inputs(signals))
     same(together(found), whole)
 
 
@@ -235,8 +235,8 @@ def test_covariances_stay_symmetric_and_positive_over_a_long_run_with_gaps(
         for start in rng.integers(0, count, 8):
             measured[start : start + rng.integers(10, 2000), output] = np.nan
     signals = signals_of(measured, delta, n, 0.1)
-    usual = replace(gauge(signals, vessel.coefficients), first=np.array([0.0, 7.0]))
-    _, trace = made(vessel, usual, kind, wave).trace(signals, last_inputs(signals))
+    stats = replace(signal_stats(signals, vessel.coefficients), first=np.array([0.0, 7.0]))
+    _, trace = made(vessel, stats, kind, wave).trace(signals, last_inputs(signals))
     P = trace.covariances
     assert np.array_equal(P, np.swapaxes(P, 1, 2))
     unit = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
@@ -248,11 +248,11 @@ def test_covariances_stay_symmetric_and_positive_over_a_long_run_with_gaps(
 def test_the_inputs_are_never_asked_for_beyond_the_instant_that_follows(
     vessel: Vessel, kind: str
 ) -> None:
-    """What follows a slab moves the next one, not what is said of this."""
+    """What follows a chunk moves the next one, not what is said of this."""
     signals = straight_run(vessel, 2, 200)
-    usual = gauge(signals, vessel.coefficients)
+    stats = signal_stats(signals, vessel.coefficients)
     found = [
-        made(vessel, usual, kind).step(signals, {"rudder": delta, "rpm": 80.0})
+        made(vessel, stats, kind).step(signals, {"rudder": delta, "rpm": 80.0})
         for delta in (0.0, 0.1)
     ]
     assert np.array_equal(found[0].states[:-1], found[1].states[:-1])

@@ -6,10 +6,10 @@ from filter_runs import signals_of
 from gaussian import held
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 
-from analysis.filters.gains import Channel, channels, discrete_gain, ticked_gain
-from analysis.filters.noise_model import Noise
+from analysis.filters.gains import LinearAxis, channels, discrete_gain, ticked_gain
+from analysis.filters.noise_model import NoiseModel
 from analysis.filters.wave_fit import Wave
-from analysis.signals.signal_stats import Gauge, gauge
+from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import UsageError, Vessel
 from shiplog.compiled import compiled
 from shiplog.ships.paper import Coefficients
@@ -21,40 +21,40 @@ STEADY = FilterSettings(kind="steady-state")
 TURNING, AHEAD = 4e-3, 7.0
 
 
-def usual_at(c: Coefficients, dt: float, intervals: tuple[int, int] = (1, 1)) -> Gauge:
+def usual_at(c: Coefficients, dt: float, intervals: tuple[int, int] = (1, 1)) -> SignalStats:
     """A ship that turns and goes ahead as usual, and how often she is measured."""
     still = signals_of(np.ones((40, 2)), np.zeros(40), np.full(40, 80.0), dt)
-    found = gauge(still, c)
+    found = signal_stats(still, c)
     return replace(found, intervals=np.array(intervals, float), turning=TURNING, ahead=AHEAD)
 
 
 def both(
     c: Coefficients, dt: float, width: float, wave: Wave | None = None
-) -> tuple[Channel, Channel]:
+) -> tuple[LinearAxis, LinearAxis]:
     """The channels for a yaw of that bandwidth, in rad/s; surge is slower."""
     ratios = np.array([width**4, (0.4 * width) ** 2])
-    return channels(c, Noise(np.array([1e-4, 0.1]), ratios, wave=wave), usual_at(c, dt))
+    return channels(c, NoiseModel(np.array([1e-4, 0.1]), ratios, wave=wave), usual_at(c, dt))
 
 
-def from_sample_to_sample(of: Channel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def from_sample_to_sample(of: LinearAxis) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """F, Q and the variance of a sample."""
     F, Q = held(of.A, of.G @ of.Q @ of.G.T, of.interval_secs)
     return F, Q, np.array([[of.R / of.interval_secs]])
 
 
-def closed(of: Channel, gain: np.ndarray) -> np.ndarray:
+def closed(of: LinearAxis, gain: np.ndarray) -> np.ndarray:
     """The poles of (I - K C) F."""
     F, _, _ = from_sample_to_sample(of)
     return np.linalg.eigvals((np.eye(len(F)) - np.outer(gain, of.C[0])) @ F)
 
 
-def best_gain(of: Channel) -> np.ndarray:
+def best_gain(of: LinearAxis) -> np.ndarray:
     F, Q, r = from_sample_to_sample(of)
     P = solve_discrete_are(F.T, of.C.T, Q, r)
     return (P @ of.C.T / (of.C @ P @ of.C.T + r))[:, 0]
 
 
-def stds(of: Channel, gain: np.ndarray) -> np.ndarray:
+def stds(of: LinearAxis, gain: np.ndarray) -> np.ndarray:
     """How far off a filter of that gain is in the end, all in units of the process noise."""
     F, Q, r = from_sample_to_sample(of)
     unit = np.sqrt(np.diag(Q))
@@ -70,7 +70,7 @@ def same_poles(found: np.ndarray, wanted: np.ndarray) -> bool:
 
 def test_a_channel_is_the_ship_about_her_usual_motion(vessel: Vessel) -> None:
     c = vessel.coefficients
-    noise = Noise(np.array([1e-4, 0.2]), np.array([3e-6, 2e-4]))
+    noise = NoiseModel(np.array([1e-4, 0.2]), np.array([3e-6, 2e-4]))
     yaw, surge = channels(c, noise, usual_at(c, 0.5, (2, 6)))
     stiffness = c.b1 + 2 * c.b2 * TURNING + 3 * c.b3 * TURNING**2
     close = np.testing.assert_allclose
@@ -214,7 +214,7 @@ def placed(
     return K
 
 
-def of_all(channel: Channel, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def of_all(channel: LinearAxis, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The measurement and the poles of a yaw channel among all states, and its wave's F."""
     c, among = np.zeros(len(poles) + 1), np.ones(len(poles) + 1, np.complex128)
     at = [0, 1, *range(3, len(c))]

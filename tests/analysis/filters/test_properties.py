@@ -20,9 +20,9 @@ from hypothesis import strategies as st
 
 from analysis.filters.base import Filter
 from analysis.filters.factory import make_filter
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.signals.hold import last_inputs
-from analysis.signals.signal_stats import Gauge, gauge
+from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import Signals, load_vessel
 from shiplog.ships.paper import Coefficients
 from shiplog.vessel.settings import FILTERS, SMOOTHED, FilterSettings
@@ -49,19 +49,19 @@ class Run:
         return signals_of(self.measured, self.delta, self.n, self.dt)
 
     @cached_property
-    def usual(self) -> Gauge:
-        return gauge(self.signals, self.c)
+    def stats(self) -> SignalStats:
+        return signal_stats(self.signals, self.c)
 
-    def noise(self, kind: str) -> Noise:
-        return Noise(self.stds, self.ratios if kind == "pseudo-input" else self.ratios / 10)
+    def noise(self, kind: str) -> NoiseModel:
+        return NoiseModel(self.stds, self.ratios if kind == "pseudo-input" else self.ratios / 10)
 
     def filtering(self, kind: str) -> Filter:
         chosen = FilterSettings(kind=kind, gate=1e9)
-        return make_filter(self.c, self.noise(kind), self.usual, chosen)
+        return make_filter(self.c, self.noise(kind), self.stats, chosen)
 
     def by_force(self, kind: str) -> LinearRun:
         run = five_states if kind == "pseudo-input" else three_states
-        return run(self.c, self.noise(kind), self.usual, self.delta, self.n)
+        return run(self.c, self.noise(kind), self.stats, self.delta, self.n)
 
 
 @st.composite
@@ -113,9 +113,9 @@ def test_a_smoother_is_the_joint_gaussian_given_all_that_was_measured(kind: str,
 @given(run=runs(linear=False))
 def test_with_everything_missing_a_filter_is_the_ships_own_motion(kind: str, run: Run) -> None:
     start = np.array([2e-3, 0.0, 7.0])
-    usual = replace(run.usual, first=start[[0, 2]])
+    stats = replace(run.stats, first=start[[0, 2]])
     nothing = replace(run, measured=np.full((COUNT, 2), np.nan)).signals
-    filtering = make_filter(run.c, run.noise(kind), usual, FilterSettings(kind=kind))
+    filtering = make_filter(run.c, run.noise(kind), stats, FilterSettings(kind=kind))
     estimates = filtering.step(nothing, last_inputs(nothing))
     path = sailed(run.c, start, run.delta, run.n, run.dt)
     expected = told_of(run.c, path, run.delta, run.n, run.dt)

@@ -20,16 +20,16 @@ from analysis.design.pseudo_input_system import (
     pseudo_inputs,
 )
 from analysis.filters.factory import filter_states, make_filter
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.filters.pseudo_input import MotionState, motion
 from analysis.filters.tuning import noise_of
 from analysis.replay.residuals import judge
 from analysis.signals.hold import last_inputs
-from analysis.signals.signal_stats import gauge
+from analysis.signals.signal_stats import signal_stats
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
-from shiplog.ships.paper import INPUTS, OUTPUTS, rudder_effect
+from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, rudder_effect
 from shiplog.vessel.settings import FilterSettings
 
 NAMES = ("yaw_rate", "speed", "rudder", "rpm")
@@ -44,7 +44,7 @@ def on_one_clock(trial: SimulatedTrial) -> Signals:
 
 def filtered(trial: SimulatedTrial, vessel: Vessel):  # noqa: ANN201
     signals, c = on_one_clock(trial), vessel.coefficients
-    noise = noise_of(gauge(signals, c), c, STATED)
+    noise = noise_of(signal_stats(signals, c), c, STATED)
     return signals, filter_states(signals, c, noise, STATED)
 
 
@@ -73,7 +73,7 @@ def test_under_white_noise_the_true_models_innovations_are_white_and_as_large_as
 ) -> None:
     trial = simulate(vessel, "zigzag-20-20", duration_secs=500.0, seed=seed, sensors=suite("white"))
     _, estimates = filtered(trial, vessel)
-    for i, name in enumerate(OUTPUTS):
+    for i, name in enumerate(PAPER_OUTPUTS):
         e, s = estimates.innovations[:, i], estimates.innovation_stds[:, i]
         found = judge(name, "", e, s, noise_measured=True)
         assert found.white, found
@@ -105,7 +105,7 @@ def test_missing_samples_are_predicted_through_and_the_doubt_grows(
     zigzag: SimulatedTrial, vessel: Vessel
 ) -> None:
     signals, c = on_one_clock(zigzag), vessel.coefficients
-    noise = noise_of(gauge(signals, c), c, STATED)
+    noise = noise_of(signal_stats(signals, c), c, STATED)
     holed = {name: values.copy() for name, values in signals.values.items()}
     holed["yaw_rate"][2000:2600] = np.nan
     estimates = filter_states(replace(signals, values=holed), c, noise, STATED)
@@ -120,7 +120,7 @@ def test_with_nothing_measured_the_filter_only_predicts(vessel: Vessel) -> None:
     signals = on_one_clock(trial)
     values = {name: signals[name].copy() for name in NAMES}
     values["yaw_rate"][1:], values["speed"][1:] = np.nan, np.nan
-    noise = Noise(np.array([1e-5, 1e-2]), np.full(2, 1e-4))
+    noise = NoiseModel(np.array([1e-5, 1e-2]), np.full(2, 1e-4))
     estimates = filter_states(replace(signals, values=values), vessel.coefficients, noise)
     truth = trial.trajectory.at(signals.time_secs)
     assert estimates.states[:, 0] == pytest.approx(truth["yaw_rate"], abs=1e-8)
@@ -151,10 +151,13 @@ def test_a_joint_gaussian_by_brute_force_agrees_on_a_short_linear_run(
     measured = rng.standard_normal((14, 2)) * [1e-3, 0.1] + [0.01, 8.0]
     measured = measured_as(pattern, measured)
     signals = signals_of(measured, delta, n, dt)
-    noise, usual = Noise(np.array([1e-3, 0.1]), np.array([0.3, 0.02])), gauge(signals, c)
-    filtering = make_filter(c, noise, usual, STATED)
+    noise, stats = (
+        NoiseModel(np.array([1e-3, 0.1]), np.array([0.3, 0.02])),
+        signal_stats(signals, c),
+    )
+    filtering = make_filter(c, noise, stats, STATED)
     estimates, trace = filtering.trace(signals, last_inputs(signals))
-    by_force = five_states(c, noise, usual, delta, n).filtered(measured)
+    by_force = five_states(c, noise, stats, delta, n).filtered(measured)
     assert max(apart((trace.states, trace.covariances), by_force)) < 1e-9
     assert np.array_equal(estimates.states, trace.states)
     variances = np.diagonal(by_force[1], axis1=1, axis2=2)
@@ -169,16 +172,18 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_is_a_
     n = n + 20 * np.sin(np.arange(600) * dt / 15)
     start = np.array([2e-3, 0.0, 7.0])
     signals = signals_of(np.full((600, 2), np.nan), delta, n, dt)
-    usual = replace(
-        gauge(signals_of(np.ones((600, 2)), delta, n, dt), c), first=start[[0, 2]], spread=SPREAD
+    stats = replace(
+        signal_stats(signals_of(np.ones((600, 2)), delta, n, dt), c),
+        first=start[[0, 2]],
+        spread=SPREAD,
     )
-    noise = Noise(np.array([1e-4, 0.1]), np.array([1e-2, 1e-3]))
-    filtering = make_filter(c, noise, usual, STATED)
+    noise = NoiseModel(np.array([1e-4, 0.1]), np.array([1e-2, 1e-3]))
+    filtering = make_filter(c, noise, stats, STATED)
     estimates, trace = filtering.trace(signals, last_inputs(signals))
     expected = told_of(c, sailed(c, start, delta, n, dt), delta, n, dt)
     for found, true in zip(estimates.states[:-1].T, expected[:-1].T, strict=True):
         assert found == pytest.approx(true, abs=1e-8 * np.abs(true).max())
-    run = five_states(straight(c), noise, usual, delta[:1], n[:1])
+    run = five_states(straight(c), noise, stats, delta[:1], n[:1])
     P = trace.covariances[0]
     np.testing.assert_allclose(P, run.P, rtol=1e-12)
     for found in trace.covariances[1:]:
@@ -188,11 +193,11 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_is_a_
 
 def test_as_printed_the_jump_of_the_rudder_is_missing_from_the_yaw_jerk(vessel: Vessel) -> None:
     trial = simulate(vessel, "zigzag-20-20", duration_secs=60.0, sensors=suite("none"))
-    signals = resample(TrialLog("trial", trial.channels), channels=(*OUTPUTS, *INPUTS))
-    c, usual = vessel.coefficients, gauge(signals, vessel.coefficients)
-    noise = Noise(np.array([1e-5, 1e-2]), np.full(2, 1e-4))
+    signals = resample(TrialLog("trial", trial.channels), channels=(*PAPER_OUTPUTS, *PAPER_INPUTS))
+    c, stats = vessel.coefficients, signal_stats(signals, vessel.coefficients)
+    noise = NoiseModel(np.array([1e-5, 1e-2]), np.full(2, 1e-4))
     ours, printed = (
-        make_filter(c, noise, usual, replace(STATED, as_printed=flag)).step(
+        make_filter(c, noise, stats, replace(STATED, as_printed=flag)).step(
             signals, last_inputs(signals)
         )
         for flag in (False, True)

@@ -5,7 +5,7 @@ import pytest
 from filter_runs import (
     PATTERNS,
     five_states,
-    in_slabs,
+    in_chunks,
     measured_as,
     pushes,
     signals_of,
@@ -19,11 +19,11 @@ from gaussian import apart
 
 from analysis.filters.base import Filter, Trace
 from analysis.filters.factory import filter_states, make_filter
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.filters.smoother import SmoothingPass, smooth, smoothed
 from analysis.filters.wave_fit import Wave
 from analysis.signals.hold import last_inputs
-from analysis.signals.signal_stats import gauge
+from analysis.signals.signal_stats import signal_stats
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import Signals, TrialLog, Vessel, resample
@@ -32,8 +32,8 @@ from shiplog.vessel.settings import SMOOTHED, FilterSettings
 WAVE = Wave(frequency=0.6, damping=0.1, std=4e-4, evidence=1.0)
 STDS = np.array([1e-4, 0.1])
 NOISES = {
-    "pseudo-input": Noise(STDS, np.array([1e-2, 1e-3])),
-    "extended": Noise(STDS, np.array([1e-4, 1e-3])),
+    "pseudo-input": NoiseModel(STDS, np.array([1e-2, 1e-3])),
+    "extended": NoiseModel(STDS, np.array([1e-4, 1e-3])),
 }
 RUNS = [("pseudo-input", None), ("extended", None), ("extended", WAVE)]
 of_each_run = pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def signals(vessel: Vessel) -> Signals:
 def made(vessel: Vessel, signals: Signals, kind: str, wave: Wave | None = None) -> Filter:
     c = vessel.coefficients
     noise = replace(NOISES[kind], wave=wave)
-    return make_filter(c, noise, gauge(signals, c), FilterSettings(kind=kind))
+    return make_filter(c, noise, signal_stats(signals, c), FilterSettings(kind=kind))
 
 
 @of_each_run
@@ -70,11 +70,14 @@ def test_a_joint_gaussian_given_all_data_agrees_on_a_short_linear_run(
     measured = rng.standard_normal((14, 2)) * [1e-3, 0.1] + [0.01, 8.0]
     measured = measured_as(pattern, measured)
     signals = signals_of(measured, delta, n, dt)
-    noise, usual = Noise(np.array([1e-3, 0.1]), np.array([0.3, 0.02]), wave=wave), gauge(signals, c)
-    filtering = make_filter(c, noise, usual, FilterSettings(kind=kind))
+    noise, stats = (
+        NoiseModel(np.array([1e-3, 0.1]), np.array([0.3, 0.02]), wave=wave),
+        signal_stats(signals, c),
+    )
+    filtering = make_filter(c, noise, stats, FilterSettings(kind=kind))
     _, _, (x, P) = smoothed_run(filtering, signals)
     run = five_states if kind == "pseudo-input" else three_states
-    states, covariances = run(c, noise, usual, delta, n).given(measured)
+    states, covariances = run(c, noise, stats, delta, n).given(measured)
     own = 5 if kind == "pseudo-input" else 3
     found = x[:, :own], P[:, :own, :own]
     assert max(apart(found, (states[:, :own], covariances[:, :own, :own]))) < 1e-9
@@ -100,28 +103,28 @@ def test_rauch_tung_and_striebel_agree_on_a_nonlinear_run(
     vessel: Vessel, signals: Signals, kind: str
 ) -> None:
     c, noise = vessel.coefficients, NOISES[kind]
-    usual = gauge(signals, c)
+    stats = signal_stats(signals, c)
     _, trace, found = smoothed_run(made(vessel, signals, kind), signals)
     if kind == "extended":
-        Q = pushes(c, noise, usual)
+        Q = pushes(c, noise, stats)
     else:
-        Q = five_states(c, noise, usual, np.zeros(1), np.zeros(1)).Q
+        Q = five_states(c, noise, stats, np.zeros(1), np.zeros(1)).Q
     assert max(apart(found, by_rauch_tung_striebel(trace, Q))) < 1e-8
 
 
-def smoothed_in_slabs(
+def smoothed_in_chunks(
     filters: tuple[Filter, Filter], signals: Signals, cuts: list[int]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gone through twice, as a trial longer than memory is."""
     first, second = filters
     going = SmoothingPass(first.outputs)
-    for slab, following in in_slabs(signals, cuts):
-        going.add(first.trace(slab, following)[1])
+    for chunk, following in in_chunks(signals, cuts):
+        going.add(first.trace(chunk, following)[1])
     ends = going.result()
     assert len(ends) == len(cuts) + 1
     parts = [
-        smooth(second.trace(slab, following)[1], second.outputs, end)
-        for (slab, following), end in zip(in_slabs(signals, cuts), ends, strict=True)
+        smooth(second.trace(chunk, following)[1], second.outputs, end)
+        for (chunk, following), end in zip(in_chunks(signals, cuts), ends, strict=True)
     ]
     states, covariances = zip(*parts, strict=True)
     return np.concatenate(states), np.concatenate(covariances)
@@ -129,36 +132,36 @@ def smoothed_in_slabs(
 
 @of_each_run
 @pytest.mark.parametrize("seed", range(3))
-def test_a_trial_smoothed_in_slabs_is_as_smoothed_whole(
+def test_a_trial_smoothed_in_chunks_is_as_smoothed_whole(
     vessel: Vessel, signals: Signals, kind: str, wave: Wave | None, seed: int
 ) -> None:
-    """Wherever it is cut, within a hole too, and slabs of one instant."""
+    """Wherever it is cut, within a hole too, and chunks of one instant."""
     rng = np.random.default_rng(seed)
     cuts = sorted({*rng.choice(np.arange(1, len(signals)), 6).tolist(), 350, 700, 701, 702})
     whole = smoothed_run(made(vessel, signals, kind, wave), signals)[2]
     twice = made(vessel, signals, kind, wave), made(vessel, signals, kind, wave)
-    assert max(apart(smoothed_in_slabs(twice, signals, cuts), whole)) < 1e-9
+    assert max(apart(smoothed_in_chunks(twice, signals, cuts), whole)) < 1e-9
 
 
 @pytest.mark.parametrize("kind", SMOOTHED)
-def test_slabs_of_one_instant_each_are_smoothed_as_a_whole(
+def test_chunks_of_one_instant_each_are_smoothed_as_a_whole(
     vessel: Vessel, signals: Signals, kind: str
 ) -> None:
     part = signals.part(200, 520)
     whole = smoothed_run(made(vessel, part, kind), part)[2]
     twice = made(vessel, part, kind), made(vessel, part, kind)
-    assert max(apart(smoothed_in_slabs(twice, part, list(range(1, len(part)))), whole)) < 1e-9
+    assert max(apart(smoothed_in_chunks(twice, part, list(range(1, len(part)))), whole)) < 1e-9
 
 
 @of_each_run
-def test_a_trace_in_slabs_is_that_of_the_whole_to_the_last_bit(
+def test_a_trace_in_chunks_is_that_of_the_whole_to_the_last_bit(
     vessel: Vessel, signals: Signals, kind: str, wave: Wave | None
 ) -> None:
     filtering = made(vessel, signals, kind, wave)
     _, whole = filtering.trace(signals, last_inputs(signals))
     filtering = made(vessel, signals, kind, wave)
-    slabs = in_slabs(signals, [1, 2, 333, 900])
-    parts = together([filtering.trace(*slab)[1] for slab in slabs])
+    chunks = in_chunks(signals, [1, 2, 333, 900])
+    parts = together([filtering.trace(*chunk)[1] for chunk in chunks])
     for name, values in vars(whole).items():
         assert np.array_equal(getattr(parts, name), values), name
 

@@ -19,17 +19,17 @@ from scipy.integrate import solve_ivp
 
 from analysis.filters.factory import filter_states, make_filter
 from analysis.filters.gains import channels, discrete_gain
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.filters.ship_step import predict, tell
 from analysis.filters.tuning import noise_of
 from analysis.filters.wave_fit import Wave
 from analysis.replay.residuals import judge
 from analysis.signals.hold import last_inputs
-from analysis.signals.signal_stats import Gauge, gauge
+from analysis.signals.signal_stats import SignalStats, signal_stats
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
-from shiplog.ships.paper import OUTPUTS, Coefficients
+from shiplog.ships.paper import PAPER_OUTPUTS, Coefficients
 from shiplog.vessel.settings import FilterSettings
 
 NAMES = ("yaw_rate", "speed", "rudder", "rpm")
@@ -40,7 +40,7 @@ WAVE = Wave(frequency=0.6, damping=0.1, std=4e-4, evidence=1.0)
 WAVES = pytest.mark.parametrize("wave", [None, WAVE], ids=["calm", "waves"])
 STDS, SPREAD = np.array([1e-4, 0.1]), np.array([1e-3, 0.5])
 UNITS = np.array([1e-3, 1e-4, 1.0])  # of w, w' and v
-NOISE = Noise(STDS, np.array([1e-4, 1e-3]))
+NOISE = NoiseModel(STDS, np.array([1e-4, 1e-3]))
 
 
 def on_one_clock(trial: SimulatedTrial) -> Signals:
@@ -57,11 +57,11 @@ def helm(count: int, dt: float) -> tuple[np.ndarray, np.ndarray]:
     return delta, n + 20 * np.sin(np.arange(count) * dt / 15)
 
 
-def usual_of(c: Coefficients, signals: Signals, **known: object) -> Gauge:
+def usual_of(c: Coefficients, signals: Signals, **known: object) -> SignalStats:
     """Of signals that need not have been measured."""
     there = dict(signals.values)
     there |= {"yaw_rate": np.full(len(signals), 2e-3), "speed": np.full(len(signals), 7.0)}
-    return replace(gauge(replace(signals, values=there), c), spread=SPREAD, **known)
+    return replace(signal_stats(replace(signals, values=there), c), spread=SPREAD, **known)
 
 
 def drawn(rng: np.random.Generator) -> tuple[np.ndarray, float, float, float, float]:
@@ -116,10 +116,10 @@ def test_a_joint_gaussian_by_brute_force_agrees_on_a_short_linear_run(
     measured = rng.standard_normal((14, 2)) * [1e-3, 0.1] + [0.01, 8.0]
     measured = measured_as(pattern, measured)
     signals = signals_of(measured, delta, n, dt)
-    noise = Noise(np.array([1e-3, 0.1]), np.array([0.1, 0.02]), wave=wave)
-    usual = gauge(signals, c)
-    estimates, trace = make_filter(c, noise, usual, EXTENDED).trace(signals, last_inputs(signals))
-    run = three_states(c, noise, usual, delta, n)
+    noise = NoiseModel(np.array([1e-3, 0.1]), np.array([0.1, 0.02]), wave=wave)
+    stats = signal_stats(signals, c)
+    estimates, trace = make_filter(c, noise, stats, EXTENDED).trace(signals, last_inputs(signals))
+    run = three_states(c, noise, stats, delta, n)
     states, covariances = run.filtered(measured)
     found = trace.states[:, :3], trace.covariances[:, :3, :3]
     assert max(apart(found, (states[:, :3], covariances[:, :3, :3]))) < 1e-9
@@ -162,14 +162,14 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_grows
     delta, n = helm(count, dt)
     signals = signals_of(np.full((count, 2), np.nan), delta, n, dt)
     start = np.array([2e-3, 0.0, 7.0])
-    usual = usual_of(c, signals, first=start[[0, 2]], turning=4e-3, ahead=6.0)
-    filtering = make_filter(c, NOISE, usual, FilterSettings(kind=kind))
+    stats = usual_of(c, signals, first=start[[0, 2]], turning=4e-3, ahead=6.0)
+    filtering = make_filter(c, NOISE, stats, FilterSettings(kind=kind))
     estimates, trace = filtering.trace(signals, last_inputs(signals))
     path = sailed(c, start, delta, n, dt)
     expected = told_of(c, path, delta, n, dt)
     for found, true in zip(estimates.states.T, expected.T, strict=True):
         assert found == pytest.approx(true, abs=1e-9 * np.abs(true).max())
-    P, Q = trace.covariances[0], pushes(c, NOISE, usual)
+    P, Q = trace.covariances[0], pushes(c, NOISE, stats)
     for k in range(count - 1):
         u = delta[k], (delta[k + 1] - delta[k]) / dt, n[k], (n[k + 1] - n[k]) / dt
         F = transition(c, path[k], u, dt)
@@ -181,9 +181,9 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_grows
 def test_every_gain_begins_as_unsure_as_the_signals_vary(vessel: Vessel) -> None:
     c = vessel.coefficients
     signals = signals_of(np.full((4, 2), np.nan), *helm(4, 0.1), 0.1)
-    usual = usual_of(c, signals, first=np.array([2e-3, 8.0]))
+    stats = usual_of(c, signals, first=np.array([2e-3, 8.0]))
     for kind in KINDS:
-        filtering = make_filter(c, NOISE, usual, FilterSettings(kind=kind))
+        filtering = make_filter(c, NOISE, stats, FilterSettings(kind=kind))
         estimates = filtering.step(signals, last_inputs(signals))
         assert estimates.states[0, [0, 1, 3]] == pytest.approx([2e-3, 0.0, 8.0])
         assert estimates.stds[0, [0, 3]] == pytest.approx(SPREAD, rel=1e-5)
@@ -195,8 +195,8 @@ def test_what_is_no_state_is_the_slope_of_what_is_one(vessel: Vessel, kind: str)
     c, dt, count = vessel.coefficients, 0.1, 300
     delta, n = np.linspace(-0.2, 0.3, count), np.linspace(60.0, 90.0, count)
     signals = signals_of(np.full((count, 2), np.nan), delta, n, dt)
-    usual = usual_of(c, signals, first=np.array([2e-3, 7.0]))
-    filtering = make_filter(c, NOISE, usual, FilterSettings(kind=kind))
+    stats = usual_of(c, signals, first=np.array([2e-3, 7.0]))
+    filtering = make_filter(c, NOISE, stats, FilterSettings(kind=kind))
     states = filtering.step(signals, last_inputs(signals)).states
     for told, of in ((2, 1), (4, 3)):
         x = states[:, of]
@@ -243,14 +243,14 @@ def test_any_other_gain_is_kept_in_a_straight_ship_once_the_best_one_has_fallen_
     measured = rng.standard_normal((count, 2)) * STDS + [2e-3, 8.0]
     measured[::3, 1] = np.nan
     signals = signals_of(measured, delta, n, dt)
-    usual = gauge(signals, c)
+    stats = signal_stats(signals, c)
     settings = FilterSettings(kind=kind, gate=1e6)
     K = np.zeros((2, 3))
-    of_yaw, of_surge = channels(c, NOISE, usual)
+    of_yaw, of_surge = channels(c, NOISE, stats)
     K[0, :2], K[1, 2:] = (discrete_gain(settings, one)[0] for one in (of_yaw, of_surge))
-    filtering = make_filter(c, NOISE, usual, settings)
+    filtering = make_filter(c, NOISE, stats, settings)
     estimates, trace = filtering.trace(signals, last_inputs(signals))
-    run = three_states(c, NOISE, usual, delta, n)
+    run = three_states(c, NOISE, stats, delta, n)
     off, P, settled, taken = np.zeros(3), run.P, [False, False], [0, 0]
     poles = [np.abs(discrete_gain(settings, one)[1]).max() for one in (of_yaw, of_surge)]
     for k in range(count):
@@ -281,10 +281,10 @@ def test_the_gains_taken_are_those_designed_for_the_sensors_own_interval(
     measured = np.random.default_rng(2).standard_normal((count, 2)) * STDS + [2e-3, 8.0]
     measured[np.arange(count) % 4 > 0, 0], measured[1::2, 1] = np.nan, np.nan
     signals, noise = signals_of(measured, delta, n, dt), replace(NOISE, wave=wave)
-    usual, settings = gauge(signals, c), FilterSettings(kind=kind, gate=1e6)
-    yaw, surge = channels(c, noise, usual)
+    stats, settings = signal_stats(signals, c), FilterSettings(kind=kind, gate=1e6)
+    yaw, surge = channels(c, noise, stats)
     assert (yaw.interval_secs, surge.interval_secs) == pytest.approx((4 * dt, 2 * dt))
-    filtering = make_filter(c, noise, usual, settings)
+    filtering = make_filter(c, noise, stats, settings)
     _, trace = filtering.trace(signals, last_inputs(signals))
     designed = np.delete(trace.gains[::4, 0], 2, axis=1), trace.gains[::2, 1, 2:3]
     for found, channel in zip(designed, (yaw, surge), strict=True):
@@ -295,7 +295,7 @@ def test_the_gains_taken_are_those_designed_for_the_sensors_own_interval(
 
 def stated(c: Coefficients, signals: Signals, kind: str = "extended"):  # noqa: ANN201
     settings = FilterSettings(kind=kind, process_ratio=2.5e-5)
-    return noise_of(gauge(signals, c), c, settings), settings
+    return noise_of(signal_stats(signals, c), c, settings), settings
 
 
 @pytest.mark.parametrize("preset", ["table1", "table1-rad"])
@@ -321,7 +321,7 @@ def test_under_white_noise_the_true_models_innovations_are_white_and_as_large_as
     trial = simulate(vessel, "zigzag-20-20", duration_secs=500.0, seed=seed, sensors=suite("white"))
     signals = on_one_clock(trial)
     estimates = filter_states(signals, vessel.coefficients, *stated(vessel.coefficients, signals))
-    for i, name in enumerate(OUTPUTS):
+    for i, name in enumerate(PAPER_OUTPUTS):
         e, s = estimates.innovations[:, i], estimates.innovation_stds[:, i]
         found = judge(name, "", e, s, noise_measured=True)
         assert found.white, found
@@ -377,7 +377,7 @@ def test_a_wave_that_is_told_of_is_told_from_the_ships_own_turning(
     signals = replace(
         signals, values=dict(signals.values) | {"yaw_rate": signals["yaw_rate"] + waves}
     )
-    noise = Noise(np.array([9e-5, 0.1]), np.array([1e-4, 1e-3]))
+    noise = NoiseModel(np.array([9e-5, 0.1]), np.array([1e-4, 1e-3]))
     rough = replace(noise, wave=replace(WAVE, std=1e-3))
     off = []
     for told in (noise, rough):

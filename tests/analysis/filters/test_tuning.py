@@ -12,10 +12,10 @@ from filter_runs import (
 )
 
 from analysis.filters.factory import filter_states, make_filter
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from analysis.filters.tuning import PAPER_RATIO, noise_of
 from analysis.signals.hold import last_inputs
-from analysis.signals.signal_stats import Gauge, gauge
+from analysis.signals.signal_stats import SignalStats, signal_stats
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Signals, TrialLog, Vessel, resample
 from shiplog.ships.paper import Coefficients
@@ -32,8 +32,8 @@ def signals(zigzag: SimulatedTrial) -> Signals:
     return resample(TrialLog("trial", zigzag.channels), channels=NAMES)
 
 
-def told(signals: Signals, c: Coefficients, **settings: object) -> Noise:
-    return noise_of(gauge(signals, c), c, FilterSettings(**settings))
+def told(signals: Signals, c: Coefficients, **settings: object) -> NoiseModel:
+    return noise_of(signal_stats(signals, c), c, FilterSettings(**settings))
 
 
 @pytest.mark.parametrize("kind", FILTERS)
@@ -85,18 +85,18 @@ def test_what_one_output_lacks_the_log_tells_and_the_others_is_kept(
     assert noise.tuned == noise.measured == (output == 0, output == 1)
     assert noise.process_ratio[1 - output] == pytest.approx((0.2**4, 0.2**2)[1 - output])
     assert noise.measurement_std[1 - output] == (1e-4, 0.2)[1 - output]
-    assert noise.measurement_std[output] == gauge(signals, c).noise[output]
+    assert noise.measurement_std[output] == signal_stats(signals, c).noise[output]
 
 
 def unlikelihood(
-    usual: Gauge, c: Coefficients, noise: Noise, kind: str, output: int, ratio: float
+    stats: SignalStats, c: Coefficients, noise: NoiseModel, kind: str, output: int, ratio: float
 ) -> float:
     """-2 log of the likelihood of one output's innovations, for a ratio of that output."""
     ratios = noise.process_ratio.copy()
     ratios[output] = ratio
     told = replace(noise, process_ratio=ratios)
-    filtering = make_filter(c, told, usual, FilterSettings(kind=kind))
-    found = filtering.step(usual.head, last_inputs(usual.head))
+    filtering = make_filter(c, told, stats, FilterSettings(kind=kind))
+    found = filtering.step(stats.head, last_inputs(stats.head))
     e, s = found.innovations[:, output], found.innovation_stds[:, output]
     known = np.isfinite(e)
     return float(np.sum((e[known] / s[known]) ** 2 + np.log(2 * np.pi * s[known] ** 2)))
@@ -108,8 +108,8 @@ def test_what_nobody_states_makes_the_innovations_likeliest(
 ) -> None:
     """Against every ratio of a grid of three to the decade, and the ratio's neighbours."""
     c = vessel.coefficients
-    usual = gauge(signals, c)
-    noise = noise_of(usual, c, FilterSettings(kind=kind))
+    stats = signal_stats(signals, c)
+    noise = noise_of(stats, c, FilterSettings(kind=kind))
     assert noise.tuned == noise.measured == (True, True)
     # the yaw's ratio was found while the surge's was still the least
     for output, others in ((0, replace(noise, process_ratio=np.full(2, PAPER_RATIO))), (1, noise)):
@@ -117,8 +117,8 @@ def test_what_nobody_states_makes_the_innovations_likeliest(
         grid = 10.0 ** (power * np.arange(np.log10(PAPER_RATIO), 8.0, 1 / 3))
         near = noise.process_ratio[output] * np.array([0.8, 1.25])
         tried = [*grid, *near[near > grid[0]]]
-        score = [unlikelihood(usual, c, others, kind, output, ratio) for ratio in tried]
-        found = unlikelihood(usual, c, others, kind, output, noise.process_ratio[output])
+        score = [unlikelihood(stats, c, others, kind, output, ratio) for ratio in tried]
+        found = unlikelihood(stats, c, others, kind, output, noise.process_ratio[output])
         assert found < min(score) + 0.5  # the search ends within a twentieth of the ratio
 
 
@@ -130,18 +130,18 @@ def test_a_ratio_that_a_run_was_drawn_with_is_found_again(
     c, dt, count = straight(vessel.coefficients), 0.5, 4000
     first, inputs = np.array([1e-3, 0.0, 8.0]), np.tile([0.0, 80.0], (count, 1))
     still = signals_of(np.tile(first[[0, 2]], (count, 1)), *inputs.T, dt)
-    usual = replace(gauge(still, c), spread=np.array([1e-3, 0.5]))
-    noise = Noise(STDS, np.array([1e-3 if kind == "pseudo-input" else 1e-4, 1e-2]))
+    stats = replace(signal_stats(still, c), spread=np.array([1e-3, 0.5]))
+    noise = NoiseModel(STDS, np.array([1e-3 if kind == "pseudo-input" else 1e-4, 1e-2]))
     path = disturbed(c, first[None], inputs, dt, np.zeros((1, count, 3)))[0]
     if kind == "pseudo-input":
         run = replace(
-            five_states(c, noise, usual, *inputs[:1].T), mean=told_of(c, path, *inputs.T, dt)
+            five_states(c, noise, stats, *inputs[:1].T), mean=told_of(c, path, *inputs.T, dt)
         )
     else:
-        run = replace(three_states(c, noise, usual, *inputs[:1].T), mean=path)
+        run = replace(three_states(c, noise, stats, *inputs[:1].T), mean=path)
     _, measured = run.drawn(np.random.default_rng(seed))
     settings = FilterSettings(kind=kind, yaw_rate_std=STDS[0], speed_std=STDS[1])
-    found = noise_of(gauge(signals_of(measured, *inputs.T, dt), c), c, settings)
+    found = noise_of(signal_stats(signals_of(measured, *inputs.T, dt), c), c, settings)
     off = np.log10(found.process_ratio / noise.process_ratio)
     assert off == pytest.approx([0.0, 0.0], abs=0.15)
 
@@ -176,7 +176,7 @@ def test_a_wrong_model_is_given_more_process_noise_than_the_true_one(
 def test_spikes_make_no_process_noise(signals: Signals, vessel: Vessel, kind: str) -> None:
     rng, c = np.random.default_rng(3), vessel.coefficients
     values = {name: array.copy() for name, array in signals.values.items()}
-    for name, std in zip(("yaw_rate", "speed"), gauge(signals, c).noise, strict=True):
+    for name, std in zip(("yaw_rate", "speed"), signal_stats(signals, c).noise, strict=True):
         values[name][rng.choice(len(signals), 25)] += 40 * std
     clean, spiked = (told(s, c, kind=kind) for s in (signals, replace(signals, values=values)))
     assert np.all(spiked.process_ratio < 3 * clean.process_ratio)

@@ -11,7 +11,7 @@ from analysis.identification.agreement import Agreement, agreement_of
 from analysis.identification.identify import IdentifiedShip, identify
 from analysis.identification.output_error import output_error
 from analysis.identification.runs import run_of
-from analysis.identification.segment import Trial
+from analysis.identification.segment import Segment
 from analysis.identification.uncertainty import uncertainty
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
@@ -30,8 +30,8 @@ def a_log(manoeuvre: str, seed: int, vessel: Vessel = SHIP, noise: str = "paper"
     return as_log(trial, f"{manoeuvre}-{seed}.mcap")
 
 
-def a_trial(*args: object) -> Trial:
-    return run_of(a_log(*args)).trials[0]  # type: ignore[arg-type]
+def a_trial(*args: object) -> Segment:
+    return run_of(a_log(*args)).segments[0]  # type: ignore[arg-type]
 
 
 @cache
@@ -64,14 +64,14 @@ def test_another_ship_among_the_logs_is_named_and_nothing_of_them_is_believed() 
     (said,) = [w for w in found.warnings if "contradict each other" in w]
     assert "zigzag-20-20-port-2.mcap the others" in said
     assert found.uncertainty.agreement.contradiction > 20
-    assert set(found.uncertainty.vague) == set(found.uncertainty.names)
+    assert set(found.uncertainty.unidentifiable) == set(found.uncertainty.names)
 
 
 def test_no_output_is_given_up_to_please_another_ships() -> None:
     """An output whose noise may grow explains everything away, the speed first."""
     fit = mixed().fit
     speed = fit.problem.outputs.index("speed")
-    measured = np.concatenate([t.measured[:, 1] for t in fit.problem.trials])
+    measured = np.concatenate([t.measured[:, 1] for t in fit.problem.segments])
     assert fit.noises[speed].slow < 0.5 * np.nanstd(measured)
     told = mixed().uncertainty
     truth = np.array([C._asdict()[name] for name in told.names])
@@ -95,7 +95,7 @@ def test_a_run_too_short_to_judge_by_itself_is_not_held_against_the_others() -> 
 def test_four_clean_logs_seldom_raise_the_alarm() -> None:
     manoeuvres = ("zigzag-20-20", "zigzag-10-10-port", "zigzag-20-20-port", "zigzag-10-10")
     for first in (100, 200):
-        trials = [a_trial(m, first + i) for i, m in enumerate(manoeuvres)]
-        found = uncertainty(output_error(trials, ship_model("burylin-tied"), known={"T3": 0.5}))
+        segments = [a_trial(m, first + i) for i, m in enumerate(manoeuvres)]
+        found = uncertainty(output_error(segments, ship_model("burylin-tied"), known={"T3": 0.5}))
         assert found.agreement.contradiction == 1.0
         assert np.isfinite(found.between_runs).all()

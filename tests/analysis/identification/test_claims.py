@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 from analysis.filters.factory import filter_states
-from analysis.filters.noise_model import Noise
+from analysis.filters.noise_model import NoiseModel
 from recorders.simulated.manoeuvres import manoeuvre
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import sail
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
 from shiplog.ships.paper import (
-    INPUTS,
-    OUTPUTS,
+    PAPER_INPUTS,
+    PAPER_OUTPUTS,
     Coefficients,
     rudder_effects,
     steady_speed,
@@ -46,12 +46,12 @@ def ship(preset: str) -> Vessel:
 def measured(preset: str, noise: str, run: str, seed: int = 0) -> Signals:
     sensors = suite(noise, angle_unit=ship(preset).angle_unit)
     trial = simulate(ship(preset), run, duration_secs=DURATION, seed=seed, sensors=sensors)
-    return resample(TrialLog("run", trial.channels), channels=(*OUTPUTS, *INPUTS))
+    return resample(TrialLog("run", trial.channels), channels=(*PAPER_OUTPUTS, *PAPER_INPUTS))
 
 
 def estimated(signals: Signals, model: Coefficients, *, printed: bool) -> np.ndarray:
     """w, w', w'', v, v', (n, 5), by the paper's Q and R, which are intensities."""
-    noise = Noise(np.full(2, np.sqrt(R / DT)), np.full(2, Q / R))
+    noise = NoiseModel(np.full(2, np.sqrt(R / DT)), np.full(2, Q / R))
     settings = FilterSettings(kind="pseudo-input", as_printed=printed)
     return filter_states(signals, model, noise, settings).states
 

@@ -1,4 +1,4 @@
-"""Identification from logs to vessel file: what is found, what is refused, what is said."""
+"""CoefficientFit from logs to vessel file: what is found, what is refused, what is said."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -144,7 +144,7 @@ def test_the_vessel_file_is_the_ship_that_was_found() -> None:
     assert "tied: b1 = -d" in text
     # and she sails as the fit says
     trial = simulate(written, "zigzag-20-20", duration_secs=300.0, sensors=suite("none"))
-    (sailed,) = run_of(as_log(trial)).trials
+    (sailed,) = run_of(as_log(trial)).segments
     outputs = predict(found.fit, sailed)
     np.testing.assert_allclose(outputs[:, 0], sailed.measured[:, 0], atol=1e-6)
     np.testing.assert_allclose(outputs[:, 1], sailed.measured[:, 1], atol=1e-5)
@@ -152,7 +152,7 @@ def test_the_vessel_file_is_the_ship_that_was_found() -> None:
 
 def test_what_is_not_identifiable_is_no_number_anywhere() -> None:
     found = identify([a_log("turning-circle-35", 3, seconds=500.0)])
-    assert "b1" in found.uncertainty.vague
+    assert "b1" in found.uncertainty.unidentifiable
     assert as_json(found)["coefficients"]["b1"]["value"] is None
     assert "pull-out" in as_json(found)["coefficients"]["b1"]["what_would_tell"]
     (row,) = [row for row in sections(found)[0].rows if row[0] == "b1"]
@@ -252,7 +252,7 @@ def with_gaps(log: TrialLog, channel: str, *spans: tuple[float, float]) -> Trial
 def test_pieces_of_a_log_are_no_runs_of_their_own() -> None:
     log = a_log(seed=1, noise="white", seconds=900.0)
     found = identify([with_gaps(log, "rudder", (170, 200), (400, 430), (600, 640))], "burylin")
-    assert len(found.fit.problem.trials) == 4
+    assert len(found.fit.problem.segments) == 4
     assert np.isnan(found.uncertainty.between_runs).all()
     assert not any("contradict" in warning for warning in found.warnings)
     np.testing.assert_array_less(found.uncertainty.std, 2 * found.uncertainty.bound)
@@ -331,7 +331,7 @@ def test_a_coefficient_that_is_nearly_none_is_told_to_be_so() -> None:
     ]
     told = identify(logs, "burylin").uncertainty
     i = told.names.index("b1")
-    assert "b1" not in told.vague
+    assert "b1" not in told.unidentifiable
     assert abs(told.values[i]) < 2.5 * told.std[i] < 2e-5
 
 
@@ -348,14 +348,14 @@ def test_what_one_run_lacks_is_told_by_the_others(missing: str) -> None:
 
 def test_drift_lag_without_a_sway_has_courses_and_no_traceback() -> None:
     found = identify([a_log()], "drift-lag")
-    assert "Td" in found.uncertainty.vague
+    assert "Td" in found.uncertainty.unidentifiable
     assert np.isfinite(found.courses[0].values[0, 0]).all()
 
 
 def test_a_piece_without_a_speed_is_fitted_with_the_others() -> None:
     log = with_gaps(a_log(seed=1, noise="white"), "speed", (200, 401))
     found = identify([with_gaps(log, "rudder", (190, 210))], "slipstream")
-    assert len(found.fit.problem.trials) == 2
+    assert len(found.fit.problem.segments) == 2
     assert np.isfinite(found.fit.parameters).all()
 
 

@@ -10,7 +10,7 @@ from trial_logs import as_log
 from analysis.identification.output_error import OutputError, output_error
 from analysis.identification.problem import Nuisance
 from analysis.identification.residual_noise import Left, noise_of
-from analysis.identification.segment import Trial, trials_of
+from analysis.identification.segment import Segment, segments_of
 from analysis.identification.swell import frequency_of
 from analysis.identification.uncertainty import uncertainty
 from recorders.simulated.sensors import suite
@@ -31,9 +31,9 @@ def sailed(
     return resample(as_log(trial), channels=CHANNELS)
 
 
-def a_trial(*args: object, **settings: object) -> Trial:
+def a_trial(*args: object, **settings: object) -> Segment:
     name = f"{args}{settings}.mcap"  # pieces of one name are pieces of one run
-    return trials_of(sailed(*args, **settings), name)[0]  # type: ignore[arg-type]
+    return segments_of(sailed(*args, **settings), name)[0]  # type: ignore[arg-type]
 
 
 def errors(fit: OutputError) -> dict[str, float]:
@@ -82,14 +82,14 @@ def test_free_fits_reach_the_cramer_rao_bound_and_their_intervals_hold_the_truth
 
 def test_each_trial_has_its_own_rudder_zero_and_gyro_bias() -> None:
     offsets, biases = (radians(0.4), radians(-0.3)), (radians(0.003), radians(-0.002))
-    trials = []
+    segments = []
     for seed, (offset, bias) in enumerate(zip(offsets, biases, strict=True)):
         s = sailed(seed=seed)
         values = dict(s.values) | {
             "rudder": s["rudder"] - offset, "yaw_rate": s["yaw_rate"] + bias
         }  # fmt: skip
-        trials += trials_of(Signals(s.start_ns, s.dt_secs, values), f"{seed}.mcap")
-    fit = output_error(trials, ship_model("burylin-tied"), known={"T3": 0.5})
+        segments += segments_of(Signals(s.start_ns, s.dt_secs, values), f"{seed}.mcap")
+    fit = output_error(segments, ship_model("burylin-tied"), known={"T3": 0.5})
     own = [fit.minimum.unknowns[fit.problem.own_slice(i)] for i in (0, 1)]
     assert [u[4] for u in own] == pytest.approx(offsets, abs=radians(0.03))
     assert [u[5] for u in own] == pytest.approx(biases, abs=radians(0.001))
@@ -110,7 +110,7 @@ def test_samples_that_were_not_measured_do_not_count() -> None:
     values = {name: np.array(v) for name, v in s.values.items()}
     values["yaw_rate"][100:900] = np.nan
     values["speed"][::3] = np.nan
-    trial = trials_of(Signals(s.start_ns, s.dt_secs, values), "holes.mcap")[0]
+    trial = segments_of(Signals(s.start_ns, s.dt_secs, values), "holes.mcap")[0]
     assert max(errors(output_error([trial], ship_model("burylin"))).values()) < 1e-2
 
 
@@ -118,7 +118,7 @@ def test_one_spike_in_a_hundred_changes_little() -> None:
     s = sailed(seed=4)
     values = {name: np.array(v) for name, v in s.values.items()}
     values["yaw_rate"][::100] += radians(0.3)
-    spiked = trials_of(Signals(s.start_ns, s.dt_secs, values), "spikes.mcap")[0]
+    spiked = segments_of(Signals(s.start_ns, s.dt_secs, values), "spikes.mcap")[0]
     fit = output_error([spiked], ship_model("burylin-tied"), known={"T3": 0.5})
     assert errors(fit)["d"] < 1
     assert errors(fit)["b2"] < 2
@@ -129,28 +129,28 @@ def test_one_spike_in_a_hundred_changes_little() -> None:
 
 def test_what_one_turning_circle_cannot_tell_is_said_to_be_vague() -> None:
     fit = output_error([a_trial("turning-circle-35")], ship_model("burylin"))
-    vague = uncertainty(fit).vague
-    assert "b1" in vague
-    assert not {"a", "d", "f", "g", "h"} & set(vague)
+    unidentifiable = uncertainty(fit).unidentifiable
+    assert "b1" in unidentifiable
+    assert not {"a", "d", "f", "g", "h"} & set(unidentifiable)
     tied = output_error(
         [a_trial("turning-circle-35")], ship_model("burylin-tied"), known={"T3": 0.5}
     )
-    assert uncertainty(tied).vague == ()
+    assert uncertainty(tied).unidentifiable == ()
 
 
 def test_the_alphas_are_vague_at_constant_revolutions() -> None:
-    trials = [a_trial("turning-circle-35")]
-    fit = output_error(trials, ship_model("burylin"), free=["alpha1", "alpha2", "alpha3"])
-    assert {"alpha1", "alpha2", "alpha3"} <= set(uncertainty(fit).vague)
+    segments = [a_trial("turning-circle-35")]
+    fit = output_error(segments, ship_model("burylin"), free=["alpha1", "alpha2", "alpha3"])
+    assert {"alpha1", "alpha2", "alpha3"} <= set(uncertainty(fit).unidentifiable)
 
 
 def test_what_was_believed_and_not_measured_is_all_prior() -> None:
-    trials = [a_trial("turning-circle-35", noise="white")]
-    fit = output_error(trials, ship_model("three-dof"), length=200.0)
+    segments = [a_trial("turning-circle-35", noise="white")]
+    fit = output_error(segments, ship_model("three-dof"), length=200.0)
     found = uncertainty(fit)
     share = dict(zip(found.names, found.prior_share, strict=True))
     assert share["p"] > 0.5
-    assert "p" in found.vague
+    assert "p" in found.unidentifiable
     assert np.all((found.prior_share > -1e-9) & (found.prior_share < 1 + 1e-9))
 
 
@@ -158,7 +158,7 @@ def test_runs_of_different_ships_widen_the_intervals() -> None:
     s = sailed(seed=1)
     other = Signals(s.start_ns, s.dt_secs, dict(s.values) | {"rudder": 0.8 * s["rudder"]})
     same = [a_trial(seed=0), a_trial(seed=1)]
-    mixed = [a_trial(seed=0), trials_of(other, "other.mcap")[0]]
+    mixed = [a_trial(seed=0), segments_of(other, "other.mcap")[0]]
     model, known = ship_model("burylin-tied"), {"T3": 0.5}
     alike, unlike = (uncertainty(output_error(t, model, known=known)) for t in (same, mixed))
     assert alike.enlarged == 1.0
@@ -221,17 +221,17 @@ def test_no_trials_unknown_names_and_a_rudder_at_rest_are_refused() -> None:
     s = sailed()
     still = Signals(s.start_ns, s.dt_secs, dict(s.values) | {"rudder": np.zeros(len(s))})
     with pytest.raises(LogError, match=r"the rudder moves by 0.0° in all.*still\.mcap"):
-        output_error(trials_of(still, "still.mcap"), ship_model("nomoto"))
+        output_error(segments_of(still, "still.mcap"), ship_model("nomoto"))
 
 
 def test_ten_seconds_are_too_short_and_gaps_part_a_trial() -> None:
     s = sailed()
     with pytest.raises(LogError, match=r"less than 60 s at a time.*short\.mcap"):
-        trials_of(s.part(0, 100), "short.mcap")
+        segments_of(s.part(0, 100), "short.mcap")
     rudder = np.array(s["rudder"])
     rudder[2000:2300] = np.nan
     values = dict(s.values) | {"rudder": rudder}
-    pieces = trials_of(Signals(s.start_ns, s.dt_secs, values), "gap.mcap")
+    pieces = segments_of(Signals(s.start_ns, s.dt_secs, values), "gap.mcap")
     assert [len(piece) for piece in pieces] == [2000, len(s) - 2300]
     assert all(np.isfinite(piece.signals["rudder"]).all() for piece in pieces)
 

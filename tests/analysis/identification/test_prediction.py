@@ -11,7 +11,7 @@ from trial_logs import as_log
 from analysis.identification.model_selection import compare
 from analysis.identification.output_error import OutputError, output_error
 from analysis.identification.prediction import made_good, misfit, predict, turn, zigzag_overshoots
-from analysis.identification.segment import Trial, trials_of
+from analysis.identification.segment import Segment, segments_of
 from analysis.identification.uncertainty import uncertainty
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
@@ -25,19 +25,19 @@ CHANNELS, OPTIONAL = ("yaw_rate", "speed", "rudder", "rpm"), ("sway", "heading")
 
 
 @cache
-def recorded(path: Path) -> tuple[TrialLog, Trial]:
+def recorded(path: Path) -> tuple[TrialLog, Segment]:
     if not path.is_file():
         pytest.skip(f"the real recordings are not here: {path}")
     layout = load_layout(PROJECT / "sample_data" / "layouts" / f"simman_{path.parent.name}.toml")
     log = read_table(path, layout)
-    return log, trials_of(resample(log, 1.0, CHANNELS, OPTIONAL), path.name)[0]
+    return log, segments_of(resample(log, 1.0, CHANNELS, OPTIONAL), path.name)[0]
 
 
-def marin(run: str) -> tuple[TrialLog, Trial]:
+def marin(run: str) -> tuple[TrialLog, Segment]:
     return recorded(KVLCC2 / "marin" / f"MARIN_FREE_KVLCC2_{run}_m.dat")
 
 
-def hsva() -> list[Trial]:
+def hsva() -> list[Segment]:
     runs = ("10_05", "10_10_P", "20_05", "20_10_S", "30_05", "35_05")
     return [recorded(KVLCC2 / "hsva" / f"HSVA_CPMC_KVLCC2_Z_{run}.dat")[1] for run in runs]
 
@@ -62,8 +62,8 @@ def off_the_circle(fit: OutputError) -> dict[str, float]:
 
 
 def test_the_tankers_circle_is_predicted_from_marins_zigzags() -> None:
-    trials = [marin("zz_10")[1], marin("zz_20")[1]]
-    off = off_the_circle(output_error(trials, ship_model("three-dof"), length=LENGTH))
+    segments = [marin("zz_10")[1], marin("zz_20")[1]]
+    off = off_the_circle(output_error(segments, ship_model("three-dof"), length=LENGTH))
     assert abs(off["advance"]) < 3
     assert abs(off["transfer"]) < 10
     assert abs(off["tactical_diameter"]) < 5
@@ -94,9 +94,9 @@ def test_zigzags_alone_choose_the_model_that_predicts_the_circle() -> None:
 
 
 def test_real_residuals_make_white_noise_errors_several_times_too_small() -> None:
-    trials = [marin("zz_10")[1], marin("zz_20")[1]]
-    found = uncertainty(output_error(trials, ship_model("slipstream"), length=LENGTH))
-    told = [i for i, name in enumerate(found.names) if name not in found.vague]
+    segments = [marin("zz_10")[1], marin("zz_20")[1]]
+    found = uncertainty(output_error(segments, ship_model("slipstream"), length=LENGTH))
+    told = [i for i, name in enumerate(found.names) if name not in found.unidentifiable]
     assert len(told) >= 5
     assert np.median(found.std[told] / found.bound[told]) > 3
 
@@ -111,7 +111,7 @@ def test_a_zigzag_of_the_papers_ship_overshoots_as_she_does() -> None:
     vessel, _ = load_vessel("table1")
     trial = simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=suite("none"))
     fit = output_error(
-        trials_of(resample(as_log(trial), channels=CHANNELS), "z.mcap"), ship_model("burylin")
+        segments_of(resample(as_log(trial), channels=CHANNELS), "z.mcap"), ship_model("burylin")
     )
     overshoots = zigzag_overshoots(
         fit, np.radians(20), np.radians(20), rudder_rate=np.radians(2.5),
@@ -122,8 +122,8 @@ def test_a_zigzag_of_the_papers_ship_overshoots_as_she_does() -> None:
 
 
 def test_the_tankers_first_overshoots_are_predicted() -> None:
-    trials = [marin("zz_10")[1], marin("zz_20")[1]]
-    fit = output_error(trials, ship_model("three-dof"), length=LENGTH)
+    segments = [marin("zz_10")[1], marin("zz_20")[1]]
+    fit = output_error(segments, ship_model("three-dof"), length=LENGTH)
     for angle, measured in ((10, 9.39), (20, 15.59)):
         said = zigzag_overshoots(
             fit, np.radians(-angle), np.radians(angle), rudder_rate=np.radians(2.32),

@@ -36,7 +36,7 @@ def a_log(manoeuvre: str, seconds: float, noise_deg: float = 0.0, seed: int = 0)
 @cache
 def the_ship() -> OutputError:
     """The ship that sails, as if an identification had found her to the last digit."""
-    (trial,) = run_of(a_log("zigzag-20-20", 300.0)).trials
+    (trial,) = run_of(a_log("zigzag-20-20", 300.0)).segments
     return output_error([trial], ship_model("burylin"), known=VESSEL.coefficients._asdict())
 
 
@@ -95,7 +95,7 @@ def test_without_heading_fixes_that_tell_no_course_are_left_alone() -> None:
     log = without(fixes(circle(), course_deg=90.0), "heading")
     late = validated(fixes(log, after_secs=30.0))  # the rudder moves at 10 s
     assert late.rms["track"] < 5  # by speed and yaw rate
-    (trial,), (places,) = run_of(log).trials, run_of(log).positions
+    (trial,), (places,) = run_of(log).segments, run_of(log).positions
     assert places is not None
     assert first_course(trial, places) == pytest.approx(radians(90), abs=1e-3)
     rough = places + np.random.default_rng(0).normal(0, 20, places.shape)

@@ -34,12 +34,12 @@ GEAR = "[rudder]\nmax = 0.6\nrate = 0.04\n"
 @cache
 def logs_of(name: str) -> tuple[TrialLog, ...]:
     text = toml_of(name) + GEAR
-    trials = [
+    segments = [
         simulate(parse_vessel(text, name), run, duration_secs=300.0, seed=seed, vessel_toml=text,
                  sensors=suite("white", NOISE))
         for seed, run in enumerate(RUNS)
     ]  # fmt: skip
-    return tuple(as_log(trial, f"{run}.mcap") for trial, run in zip(trials, RUNS, strict=True))
+    return tuple(as_log(trial, f"{run}.mcap") for trial, run in zip(segments, RUNS, strict=True))
 
 
 @cache
@@ -66,7 +66,7 @@ def test_a_simulated_ship_of_any_model_is_found_within_her_intervals(name: str) 
     off = np.abs(told.values - true) / told.std
     assert off.max() < 3.5, told.names[int(off.argmax())]
     assert np.mean(off < 1.96) > 0.8
-    assert set(told.vague) <= {"f2"}
+    assert set(told.unidentifiable) <= {"f2"}
 
 
 @pytest.mark.parametrize("name", SHIPS)
@@ -146,7 +146,7 @@ def test_the_papers_model_that_was_compared_is_not_fitted_again(
 
 
 def runs_away(*_: object, **__: object) -> None:
-    raise LogError("the model burylin runs away on these trials")
+    raise LogError("the model burylin runs away on these segments")
 
 
 def test_where_the_papers_model_runs_away_her_own_stands_alone_and_is_replayed(
@@ -189,11 +189,11 @@ def test_a_log_that_carries_such_a_file_gives_length_gear_and_alphas() -> None:
 @cache
 def without_length() -> IdentifiedShip:
     text = PRESETS["table1"]
-    trials = [
+    segments = [
         simulate(parse_vessel(text, "x"), run, duration_secs=300.0, seed=1, vessel_toml=text)
         for run in RUNS[:2]
     ]
-    return identify([as_log(trial) for trial in trials], "three-dof")
+    return identify([as_log(trial) for trial in segments], "three-dof")
 
 
 def test_a_length_that_was_assumed_is_written_and_said() -> None:
@@ -211,7 +211,7 @@ def test_what_was_not_told_is_marked_and_what_was_believed_before() -> None:
     )
     lines = {line.split(" = ")[0]: line for line in own.split("\n")}
     assert lines["yv"].endswith("NOT IDENTIFIABLE from these logs: believed before, for the most")
-    for name in set(told.vague) - {"yv"}:
+    for name in set(told.unidentifiable) - {"yv"}:
         assert lines[name].endswith("NOT IDENTIFIABLE from these logs: a value that fits them")
 
 
@@ -220,9 +220,9 @@ def test_numbers_that_nobody_knows_are_not_written() -> None:
     told = found.uncertainty
     for part, names in (("yaw", ("a", "k")), ("surge", ("f", "g", "h"))):
         std = np.where(np.isin(told.names, names), 100.0, told.coloured)
-        vague = replace(found, uncertainty=replace(told, std=std, coloured=std))
+        unidentifiable = replace(found, uncertainty=replace(told, std=std, coloured=std))
         with pytest.raises(LogError, match=f"nothing of the {part} is identifiable"):
-            vessel_toml(vague)
+            vessel_toml(unidentifiable)
 
 
 def test_a_model_that_is_not_the_ship_is_written_with_a_caution() -> None:

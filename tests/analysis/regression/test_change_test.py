@@ -10,9 +10,9 @@ from analysis.regression.change_test import (
     STRADDLE,
     TRIM,
     Blocks,
+    best_change,
     changed,
     largest_of_instants,
-    split_at_best,
 )
 from analysis.regression.weak_form import Equation
 from shiplog.types import FloatArray
@@ -89,14 +89,14 @@ def brute_instant(X: FloatArray, y: FloatArray, column: int) -> int:
 @pytest.mark.parametrize("column", [0, 1])
 def test_the_instant_is_that_of_a_search_through_all_regressions(seed: int, column: int) -> None:
     X, y = regression(seed, 0.3)
-    found = split_at_best(blocks_of(X, y), (column,))
+    found = best_change(blocks_of(X, y), (column,))
     assert found is not None
     assert found.at == brute_instant(X, y, column)
 
 
 def test_values_errors_and_chances_are_those_of_the_rows_themselves() -> None:
     X, y = regression(3, 0.3)
-    found = split_at_best(blocks_of(X, y), (0,))
+    found = best_change(blocks_of(X, y), (0,))
     assert found is not None
     clear = int(np.ceil(STRADDLE * OVERLAP / SIZE)) * SIZE
     block = np.arange(len(y))
@@ -142,6 +142,6 @@ def test_a_side_on_which_nothing_moves_tells_nothing() -> None:
     X, y = regression(1, 0.4)
     still = blocks_of(X, y)
     still.tallies[: len(still.tallies) // 2, 1:] = 1.0
-    moving = split_at_best(still._replace(least_excitation=0.1), (0,))
+    moving = best_change(still._replace(least_excitation=0.1), (0,))
     assert moving is not None
     assert moving.at > len(still.tallies) // 2

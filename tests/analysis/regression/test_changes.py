@@ -4,7 +4,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from analysis.regression.changes import MOST_BLOCKS, Change, ChangeWatch, ShipWatch
+from analysis.regression.changes import MOST_BLOCKS, Change, ChangeTest, ShipChangeTest
 from analysis.regression.first_model import BARE
 from analysis.regression.weak_form import (
     CHANNELS,
@@ -23,7 +23,7 @@ from benchmarks.changed_ship import changed_trial
 from benchmarks.changes import Case, halfway, told, unchanged
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
-from recorders.simulated.trajectory import Gust, Unrest
+from recorders.simulated.trajectory import Gust, RandomForcing
 from shiplog import TrialLog, Vessel, load_vessel, resample
 
 ZIGZAG = Case("table1", guessed=False, manoeuvre="zigzag-20-20", noise="paper")
@@ -61,9 +61,9 @@ def test_unrest_of_the_sea_is_no_change(vessel: Vessel) -> None:
     for seed in range(4):
         sailed = simulate(
             vessel, "zigzag-20-20", duration_secs=1200.0, seed=seed, sensors=suite("paper"),
-            unrest=Unrest(np.radians(0.2), 0.005),
+            random_forcing=RandomForcing(np.radians(0.2), 0.005),
         )  # fmt: skip
-        assert told(TrialLog("unrest", sailed.channels), ZIGZAG) == ()
+        assert told(TrialLog("random_forcing", sailed.channels), ZIGZAG) == ()
 
 
 def test_a_steady_moment_that_sets_in_is_no_coefficient(vessel: Vessel) -> None:
@@ -108,7 +108,7 @@ def made(changes: dict[int, float], n: int = 3000, seed: int = 0) -> Rows:
 
 
 def watched(rows: Rows, cuts: list[int] | None = None) -> tuple[Change, ...]:
-    watch = ChangeWatch(rows.equation, len(rows.target))
+    watch = ChangeTest(rows.equation, len(rows.target))
     edges = [0, *(cuts or []), len(rows.target)]
     for start, stop in pairwise(edges):
         watch.add(rows.part(start, stop))
@@ -125,7 +125,7 @@ def test_what_comes_and_goes_is_told_twice() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_where_slabs_are_cut_changes_no_bit(seed: int) -> None:
+def test_where_chunks_are_cut_changes_no_bit(seed: int) -> None:
     rows = made({1200: 1.3}, seed=seed)
     rows.target[100:140] = np.nan
     cuts = np.sort(np.random.default_rng(seed).integers(0, 3001, 12)).tolist()
@@ -150,9 +150,9 @@ def test_less_than_a_hundredth_is_not_worth_telling() -> None:
 
 def test_of_a_month_no_more_is_kept_than_of_a_day() -> None:
     yaw = Equation(("a", "b1", "b2", "b3", "d", "e", "constant"), 1.0, 60.0)
-    watch = ChangeWatch(yaw, 31 * 86400)
+    watch = ChangeTest(yaw, 31 * 86400)
     assert len(watch._factors) <= MOST_BLOCKS
-    assert ChangeWatch(yaw, 0).result() == ()
+    assert ChangeTest(yaw, 0).result() == ()
 
 
 @pytest.fixture(scope="module")
@@ -208,4 +208,4 @@ def test_the_ship_is_watched_as_its_two_equations_are(vessel: Vessel) -> None:
     found = watched(with_constant(yaw)) + watched(surge)
     assert found == told(log, ZIGZAG)
     equations = WeakForm(BARE, len(signals), signals.dt_secs, (1, 1, 1, 1))
-    assert ShipWatch(equations, guessed=True).result() == ()
+    assert ShipChangeTest(equations, guessed=True).result() == ()

@@ -4,7 +4,7 @@ import pytest
 from analysis.regression.coefficients import Identifier
 from analysis.regression.first_model import BARE, fit_first_model
 from analysis.regression.weak_form import weak_form
-from analysis.signals.signal_stats import gauge
+from analysis.signals.signal_stats import signal_stats
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import LogError, Signals, TrialLog, Vessel, resample
@@ -26,7 +26,7 @@ def fitted(signals: Signals, name: str) -> Vessel:
     )
     yaw.add(yaw_rows)
     surge.add(surge_rows)
-    return fit_first_model(yaw, surge, gauge(signals, BARE), name)
+    return fit_first_model(yaw, surge, signal_stats(signals, BARE), name)
 
 
 def test_a_ship_that_obeys_the_first_model_is_found(vessel: Vessel) -> None:

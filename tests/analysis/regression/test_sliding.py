@@ -13,7 +13,7 @@ from analysis.regression.sliding import (
     fit,
 )
 from analysis.regression.weak_form import Equation, Rows, weak_form
-from analysis.signals.concat import stacked
+from analysis.signals.concat import concatenate
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, Vessel, resample
@@ -136,13 +136,13 @@ def with_gaps(rows: Rows) -> Rows:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_windows_of_rows_in_slabs_are_those_of_the_whole_to_the_last_bit(
+def test_windows_of_rows_in_chunks_are_those_of_the_whole_to_the_last_bit(
     vessel: Vessel, seed: int
 ) -> None:
     for rows in rows_of(vessel, "pseudo-random", "paper"):
         holed = with_gaps(rows)
         windows = Windows(holed.equation, len(holed.target))
-        found = stacked([windows.step(slab) for slab in parted(holed, seed)])
+        found = concatenate([windows.step(chunk) for chunk in parted(holed, seed)])
         expected = identify(holed)[1]
         assert np.isfinite(expected.stds).any()
         for name in ("time_secs", "values", "stds", "conditions"):
@@ -150,17 +150,17 @@ def test_windows_of_rows_in_slabs_are_those_of_the_whole_to_the_last_bit(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_fit_of_rows_in_slabs_is_that_of_the_whole_to_the_last_bit(
+def test_a_fit_of_rows_in_chunks_is_that_of_the_whole_to_the_last_bit(
     vessel: Vessel, seed: int
 ) -> None:
     for rows in rows_of(vessel, "pseudo-random", "paper"):
         holed = with_gaps(rows)
         regression = Regression(holed.equation)
-        for slab in parted(holed, seed):
-            regression.add(slab)
+        for chunk in parted(holed, seed):
+            regression.add(chunk)
         errors = Errors(regression.solve())
-        for slab in parted(holed, seed + 10):
-            errors.add(slab)
+        for chunk in parted(holed, seed + 10):
+            errors.add(chunk)
         found, expected = errors.result(), fit(holed)
         assert (found.values == expected.values).all()
         assert (found.stds == expected.stds).all()

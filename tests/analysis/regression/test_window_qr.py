@@ -102,8 +102,8 @@ def test_how_the_rows_are_parted_changes_no_bit(seed: int) -> None:
     cuts = np.sort(rng.integers(0, 701, rng.integers(1, 60)))
     stacks = no_rows(length, 3)
     parts = [
-        push(stacks, *slab)
-        for slab in zip(*(np.split(a, cuts) for a in (X, y, X[:, 0])), strict=True)
+        push(stacks, *chunk)
+        for chunk in zip(*(np.split(a, cuts) for a in (X, y, X[:, 0])), strict=True)
     ]
     for name in whole.solutions._fields:
         together = np.concatenate([getattr(w.solutions, name) for w in parts], axis=-1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from faults import bias, dropout, freeze, spike
 from places import KVLCC2, LAYOUTS
-from trial_logs import InSlabs, as_log
+from trial_logs import InChunks, as_log
 
 from analysis.regression.weak_form import weak_form
 from analysis.replay.plan import FITTED, NEEDED
@@ -27,7 +27,7 @@ def without(log: TrialLog, name: str) -> TrialLog:
 
 def test_the_steps_are_told_in_their_order(zigzag_log: TrialLog) -> None:
     told: list[tuple[str, float]] = []
-    analyse(zigzag_log, on_step=lambda step, share: told.append((step, share)))
+    analyse(zigzag_log, on_progress=lambda step, share: told.append((step, share)))
     smoothing = "look ahead"  # which is asked for elsewhere
     assert list(dict.fromkeys(step for step, _ in told)) == [s for s in STEPS if s != smoothing]
     shares = [share for step, share in told if step == "replay"]
@@ -284,10 +284,10 @@ def flat(result: object, name: str = "") -> dict[str, str | np.ndarray]:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("model", ["carried", "fitted"])
-def test_the_slabs_of_a_log_change_nothing_to_the_last_bit(
+def test_the_chunks_of_a_log_change_nothing_to_the_last_bit(
     zigzag_log: TrialLog, model: str, seed: int
 ) -> None:
-    """Gaps across the cuts, slabs of a few samples and of thousands, channels of many rates."""
+    """Gaps across the cuts, chunks of a few samples and of thousands, channels of many rates."""
     rng = np.random.default_rng(seed)
     log = dropout("rudder", 150.0, 20.0)(dropout("yaw_rate", 0.0, 7.0)(zigzag_log))
     log = dropout("heading", 300.0, 40.0)(dropout("speed", 400.0, 9.0)(log))
@@ -297,7 +297,7 @@ def test_the_slabs_of_a_log_change_nothing_to_the_last_bit(
         log = replace(log, vessel_toml=None)
     edges = {0: [6.9, 150.0, 150.1, 169.9, 410.0], 1: np.arange(1.0, 500.0, 1.3).tolist()}
     cuts = edges.get(seed, np.sort(rng.uniform(0, 500, 9)).tolist())
-    whole, parted = flat(analyse(log)), flat(analyse(InSlabs(log, cuts)))
+    whole, parted = flat(analyse(log)), flat(analyse(InChunks(log, cuts)))
     assert whole.keys() == parted.keys()
     for place, numbers in whole.items():
         if isinstance(numbers, np.ndarray):
@@ -330,14 +330,14 @@ def test_a_sensor_that_speaks_in_bursts_is_identified_with(zigzag_log: TrialLog)
     assert analyse(replace(log, vessel_toml=None)).model_origin == FITTED
 
 
-def test_impossible_positions_are_counted_whatever_the_slabs(zigzag_log: TrialLog) -> None:
+def test_impossible_positions_are_counted_whatever_the_chunks(zigzag_log: TrialLog) -> None:
     at = zigzag_log["yaw_rate"].measured_ns[:3000:10]
     values = np.column_stack((np.full(300, 95.0), np.linspace(10, 10.1, 300), np.zeros(300)))
     for nans in (0, 1):
         values[200, :] = np.nan if nans else values[200]
         fixes = Channel("position", "gps", "deg", at, at, values, GEOGRAPHIC)
         log = with_channel(zigzag_log, fixes)
-        for cut in (log, InSlabs(log, [150.0])):
+        for cut in (log, InChunks(log, [150.0])):
             said = f"{300 - nans} impossible positions"
             assert any(said in warning for warning in analyse(cut).warnings)
 
@@ -361,21 +361,21 @@ def test_a_model_for_which_there_is_no_observer_is_refused_as_one_that_runs_away
         analyse(zigzag_log, away)
 
 
-def test_the_slabs_of_a_replay_come_once(zigzag_log: TrialLog) -> None:
+def test_the_chunks_of_a_replay_come_once(zigzag_log: TrialLog) -> None:
     replay = Replay(zigzag_log)
-    with pytest.raises(ValueError, match="go through the slabs first"):
+    with pytest.raises(ValueError, match="go through the chunks first"):
         _ = replay.findings
-    assert sum(len(slab.signals) for slab in replay.slabs()) == replay.plan.clock.count
+    assert sum(len(chunk.signals) for chunk in replay.chunks()) == replay.plan.clock.count
     assert replay.findings.clock is replay.plan.clock
     with pytest.raises(ValueError, match="come once"):
-        next(replay.slabs())
+        next(replay.chunks())
 
 
 @pytest.mark.parametrize("kind", ["pseudo-input", "extended"])
 def test_a_log_cut_anywhere_is_smoothed_the_same(zigzag_log: TrialLog, kind: str) -> None:
     settings = {"filter.kind": kind, "filter.smooth": True}
     whole = analyse(zigzag_log, settings=settings)
-    cut = analyse(InSlabs(zigzag_log, [0.05, 100.0, 100.3, 333.0]), settings=settings)
+    cut = analyse(InChunks(zigzag_log, [0.05, 100.0, 100.3, 333.0]), settings=settings)
     for one, other in (
         (whole.estimates.states, cut.estimates.states),
         (whole.estimates.stds, cut.estimates.stds),
@@ -427,7 +427,7 @@ def test_settings_that_do_not_do_are_refused_before_any_work(zigzag_log: TrialLo
     told: list[str] = []
     for log in (zigzag_log, replace(zigzag_log, vessel_toml=None)):
         with pytest.raises(UsageError, match=r"filter\.kind must be one of"):
-            Replay(log, settings={"filter.kind": "kalman"}, on_step=lambda s, _: told.append(s))
+            Replay(log, settings={"filter.kind": "kalman"}, on_progress=lambda s, _: told.append(s))
     assert not told
 
 

@@ -6,14 +6,14 @@ import pytest
 from analysis.replay.track import EARTH_RADIUS, Track, Tracker
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Channel, Signals, TrialLog, resample
-from shiplog.checks.channel_stats import survey_log
+from shiplog.checks.channel_stats import compute_log_stats
 from shiplog.resampling import Clock
 
 
 def tracked(
     log: TrialLog, signals: Signals, yaw_rate: np.ndarray, speed: np.ndarray
 ) -> tuple[Track, str]:
-    found = survey_log(log)
+    found = compute_log_stats(log)
     channels = {name: found[name] for name in signals.values if name in found}
     clock = Clock(signals.start_ns, signals.dt_secs, len(signals), channels)
     tracking = Tracker(clock, found.get("position"))
@@ -87,7 +87,7 @@ def test_after_a_long_silence_the_gyro_goes_on_alone(monkeypatch: pytest.MonkeyP
     signals = Signals(0, 1.0, {"yaw_rate": np.zeros(count), "heading": heading})
     stamps = np.arange(count) * 10**9
     compass = Channel("heading", "a", "rad", stamps, stamps, heading)
-    channels = {"heading": survey_log(TrialLog("x", (compass,)))["heading"]}
+    channels = {"heading": compute_log_stats(TrialLog("x", (compass,)))["heading"]}
     tracks = {}
     for size in (1, 50, count):
         tracking = Tracker(Clock(0, 1.0, count, channels), None)

@@ -3,7 +3,7 @@ import pytest
 
 from analysis.signals.hold import InputHold, held_throughout
 from shiplog import Channel, Signals, TrialLog
-from shiplog.checks.channel_stats import survey_log
+from shiplog.checks.channel_stats import compute_log_stats
 from shiplog.resampling import Clock
 
 START = 1_700_000_000 * 10**9
@@ -24,14 +24,14 @@ def log_of(rudder: list[float], rpm: list[float]) -> TrialLog:
 def test_what_is_missing_is_the_last_known_even_from_before_the_clock() -> None:
     nan = float("nan")
     log = log_of([0.1, 0.2, nan, nan, 0.3, nan], [80, nan, 81, nan, nan, 82])
-    found = survey_log(log)
+    found = compute_log_stats(log)
     clock = Clock(START, 1.0, 4, {name: found[name] for name in ("rudder", "rpm")})
     signals = Signals(START, 1.0, {c.name: c.values[2:] for c in log})
     for cuts in ([], [1], [1, 2, 3]):
         holding = InputHold(clock)
         holding.add_raw(log.channels)
-        slabs = [signals.part(a, b) for a, b in zip([0, *cuts], [*cuts, 4], strict=True)]
-        rows = list(held_throughout(slabs, holding))
+        chunks = [signals.part(a, b) for a, b in zip([0, *cuts], [*cuts, 4], strict=True)]
+        rows = list(held_throughout(chunks, holding))
         rudder = np.concatenate([held["rudder"] for _, held, _ in rows])
         rpm = np.concatenate([held["rpm"] for _, held, _ in rows])
         assert rudder.tolist() == [0.2, 0.2, 0.3, 0.3]
@@ -46,7 +46,7 @@ def test_what_is_missing_is_the_last_known_even_from_before_the_clock() -> None:
 
 def test_nothing_is_said_where_nothing_is_missing() -> None:
     log = log_of([0.1, 0.2, 0.3], [80, 80, 80])
-    found = survey_log(log)
+    found = compute_log_stats(log)
     holding = InputHold(Clock(START, 1.0, 1, {n: found[n] for n in ("rudder", "rpm")}))
     signals = Signals(START, 1.0, {"rudder": np.array([0.3]), "rpm": np.array([80.0])})
     assert holding.step(signals)["rudder"] == pytest.approx([0.3])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.signals.signal_stats import Gauger, gauge, noise_level
+from analysis.signals.signal_stats import SignalStatsCollector, noise_level, signal_stats
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, Vessel, resample
@@ -13,22 +13,22 @@ def test_what_is_usual_is_what_numpy_makes_of_the_whole(vessel: Vessel) -> None:
     sensors = suite("white", {"speed.rate_hz": 2.0, "yaw_rate.dropout": 0.1})
     trial = simulate(vessel, "pseudo-random", duration_secs=300.0, sensors=sensors)
     signals = resample(TrialLog("x", trial.channels), channels=NAMES)
-    usual, w, v = gauge(signals, vessel.coefficients), signals["yaw_rate"], signals["speed"]
-    assert (usual.count, usual.dt_secs) == (len(w), signals.dt_secs)
-    assert usual.measured == (np.isfinite(w).sum(), np.isfinite(v).sum())
-    assert usual.first.tolist() == [w[np.isfinite(w)][0], v[np.isfinite(v)][0]]
-    assert usual.spread == pytest.approx([np.nanstd(w), np.nanstd(v)], rel=1e-12)
-    assert usual.interval_secs == pytest.approx([0.1, 0.5])
-    assert usual.turning == pytest.approx(np.sqrt(np.nanmean(w**2)), rel=1e-12)
-    assert (usual.ahead, usual.fastest) == (np.nanmedian(v), np.nanmax(v))
-    assert usual.rpm == np.median(signals["rpm"])
-    parted = Gauger(vessel.coefficients)
+    stats, w, v = signal_stats(signals, vessel.coefficients), signals["yaw_rate"], signals["speed"]
+    assert (stats.count, stats.dt_secs) == (len(w), signals.dt_secs)
+    assert stats.measured == (np.isfinite(w).sum(), np.isfinite(v).sum())
+    assert stats.first.tolist() == [w[np.isfinite(w)][0], v[np.isfinite(v)][0]]
+    assert stats.spread == pytest.approx([np.nanstd(w), np.nanstd(v)], rel=1e-12)
+    assert stats.interval_secs == pytest.approx([0.1, 0.5])
+    assert stats.turning == pytest.approx(np.sqrt(np.nanmean(w**2)), rel=1e-12)
+    assert (stats.ahead, stats.fastest) == (np.nanmedian(v), np.nanmax(v))
+    assert stats.rpm == np.median(signals["rpm"])
+    parted = SignalStatsCollector(vessel.coefficients)
     for cuts in zip([0, 1, 999], [1, 999, len(w)], strict=True):
         parted.add(signals.part(*cuts))
     again = parted.result()
     for name in ("first", "spread", "interval_secs", "noise"):
-        assert np.array_equal(getattr(usual, name), getattr(again, name))
-    assert (usual.turning, usual.steering) == (again.turning, again.steering)
+        assert np.array_equal(getattr(stats, name), getattr(again, name))
+    assert (stats.turning, stats.steering) == (again.turning, again.steering)
 
 
 def test_noise_is_found_below_the_ships_motion(vessel: Vessel) -> None:

@@ -19,7 +19,7 @@ from analysis.view.identification_review import write_review
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import ShiplogError, TrialLog, load_vessel
-from shiplog.ships.motion import OUTPUTS
+from shiplog.ships.motion import MODEL_OUTPUTS
 
 
 def a_log(manoeuvre: str, seed: int, seconds: float = 400.0) -> TrialLog:
@@ -149,7 +149,7 @@ def test_held_out_runs_have_a_track_of_both_ships() -> None:
 def test_a_run_without_a_heading_is_drawn_too() -> None:
     assert not a_trial().has("heading")
     names = [panel.name.split("/")[1] for panel in next(run_sheets(ship())).outputs]
-    assert names == [name for name in OUTPUTS if name in ("yaw_rate", "speed")]
+    assert names == [name for name in MODEL_OUTPUTS if name in ("yaw_rate", "speed")]
 
 
 def test_the_same_ship_has_the_same_names(review: Path, tmp_path: Path) -> None:

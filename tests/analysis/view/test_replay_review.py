@@ -15,7 +15,7 @@ import shiplog
 from analysis.disturbance.observer import Disturbance
 from analysis.filters.base import Estimates
 from analysis.regression.sliding import History
-from analysis.replay.replay import Analysis, Slab, analyse
+from analysis.replay.replay import Analysis, ReplayChunk, analyse
 from analysis.replay.track import NOWHERE
 from analysis.view.panels import Drawn, coefficient_panels, equation_panels, limits
 from analysis.view.replay_review import write_review
@@ -53,11 +53,11 @@ def cut_of(whole: Whole, cut: slice) -> Whole:
     return replace(whole, **{name: a[cut] for name, a in arrays.items() if a is not None})
 
 
-def part_of(analysis: Analysis, start: int, stop: int) -> Slab:
-    """A slab of the trial, though what was identified and the track are whole in each."""
+def part_of(analysis: Analysis, start: int, stop: int) -> ReplayChunk:
+    """A chunk of the trial, though what was identified and the track are whole in each."""
     cut = slice(start, stop)
     estimates, found = analysis.estimates, analysis.disturbance
-    return Slab(
+    return ReplayChunk(
         analysis.signals.part(start, stop),
         cut_of(estimates, cut),
         cut_of(found, cut),
@@ -68,7 +68,7 @@ def part_of(analysis: Analysis, start: int, stop: int) -> Slab:
 
 
 def drawn_of(analysis: Analysis) -> Drawn:
-    sketch = Sketch(analysis.clock, analysis.usual)
+    sketch = Sketch(analysis.clock, analysis.stats)
     sketch.add(analysis)
     return sketch.result()
 
@@ -250,7 +250,7 @@ def test_a_gap_is_not_drawn(gappy: Analysis, tmp_path: Path) -> None:
 
 
 def measured_only(values: np.ndarray, cuts: tuple[int, ...] = ()) -> tuple[list[int], list[float]]:
-    """Instants and values that are drawn of a sensor, its values given in slabs."""
+    """Instants and values that are drawn of a sensor, its values given in chunks."""
     steps = np.diff(np.flatnonzero(np.isfinite(values)))
     samples = _Samples(max(5.0 * np.median(steps), 10.0) if len(steps) else 10.0)
     found = [
@@ -324,9 +324,9 @@ def test_a_long_trial_is_thinned_and_in_full_it_is_not(
         assert static(path, "yaw_rate/state", "SeriesLines:names") == ["±2σ", "±2σ", "estimate"]
 
 
-def test_a_review_drawn_in_slabs_is_the_same(analysis: Analysis) -> None:
+def test_a_review_drawn_in_chunks_is_the_same(analysis: Analysis) -> None:
     whole = drawn_of(analysis)
-    sketch = Sketch(analysis.clock, analysis.usual)
+    sketch = Sketch(analysis.clock, analysis.stats)
     count = len(analysis.signals)
     for start in range(0, count, 777):
         sketch.add(part_of(analysis, start, min(start + 777, count)))

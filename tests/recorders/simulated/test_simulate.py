@@ -10,10 +10,10 @@ from places import SAMPLE_DATA
 from recorders.record import record
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
-from recorders.simulated.trajectory import Unrest
+from recorders.simulated.trajectory import RandomForcing
 from shiplog import UsageError, Vessel, read
 
-UNREST = Unrest(rudder=radians(0.5), force=0.01)
+UNREST = RandomForcing(rudder=radians(0.5), force=0.01)
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(
@@ -63,8 +63,10 @@ def test_what_a_seed_gave_when_the_sample_data_were_made_it_still_gives(
 def test_an_unrest_repeats_with_its_seed_and_leaves_the_sensors_noise_alone(
     vessel: Vessel,
 ) -> None:
-    def given(seed: int, unrest: Unrest | None) -> dict[str, np.ndarray]:
-        trial = simulate(vessel, "pseudo-random", duration_secs=60.0, seed=seed, unrest=unrest)
+    def given(seed: int, random_forcing: RandomForcing | None) -> dict[str, np.ndarray]:
+        trial = simulate(
+            vessel, "pseudo-random", duration_secs=60.0, seed=seed, random_forcing=random_forcing
+        )
         times = {c.name: (c.measured_ns - c.measured_ns[0]) * 1e-9 for c in trial.channels}
         noise = {
             c.name: c.values - trial.trajectory.at(times[c.name])[c.name] for c in trial.channels
@@ -83,7 +85,9 @@ def test_an_unrest_repeats_with_its_seed_and_leaves_the_sensors_noise_alone(
 def test_an_unrests_bytes_are_those_of_its_seed(vessel: Vessel, tmp_path: Path) -> None:
     def bytes_of(seed: int) -> bytes:
         path = tmp_path / "a.mcap"
-        record(simulate(vessel, "spiral", duration_secs=60.0, seed=seed, unrest=UNREST), path)
+        record(
+            simulate(vessel, "spiral", duration_secs=60.0, seed=seed, random_forcing=UNREST), path
+        )
         return path.read_bytes()
 
     assert bytes_of(7) == bytes_of(7) != bytes_of(8)
@@ -91,14 +95,14 @@ def test_an_unrests_bytes_are_those_of_its_seed(vessel: Vessel, tmp_path: Path) 
 
 def test_an_unrest_of_nothing_changes_no_sample(vessel: Vessel) -> None:
     calm = simulate(vessel, "zigzag-20-20", duration_secs=150.0)
-    still = simulate(vessel, "zigzag-20-20", duration_secs=150.0, unrest=Unrest())
+    still = simulate(vessel, "zigzag-20-20", duration_secs=150.0, random_forcing=RandomForcing())
     for one, other in zip(calm.channels, still.channels, strict=True):
         assert np.array_equal(one.values, other.values)
 
 
 def test_the_truth_tells_of_a_surge_force_only_where_there_was_an_unrest(vessel: Vessel) -> None:
     calm = simulate(vessel, "spiral", duration_secs=20.0).truth()
-    pushed = simulate(vessel, "spiral", duration_secs=20.0, unrest=UNREST).truth()
+    pushed = simulate(vessel, "spiral", duration_secs=20.0, random_forcing=UNREST).truth()
     assert "surge_disturbance" not in [c.name for c in calm]
     assert pushed["surge_disturbance"].unit == "m/s²"
     assert len(pushed["surge_disturbance"]) == 201
@@ -106,7 +110,7 @@ def test_the_truth_tells_of_a_surge_force_only_where_there_was_an_unrest(vessel:
 
 def test_a_longer_trial_begins_with_the_unrest_of_the_shorter(vessel: Vessel) -> None:
     short, long = (
-        simulate(vessel, "spiral", duration_secs=duration, unrest=UNREST).truth()
+        simulate(vessel, "spiral", duration_secs=duration, random_forcing=UNREST).truth()
         for duration in (30.0, 60.0)
     )
     for name in ("yaw_disturbance", "surge_disturbance"):
@@ -115,12 +119,12 @@ def test_a_longer_trial_begins_with_the_unrest_of_the_shorter(vessel: Vessel) ->
 
 @pytest.mark.parametrize("size", [-0.1, nan, inf])
 def test_an_unrest_that_is_none_is_refused(vessel: Vessel, size: float) -> None:
-    for unrest in (Unrest(rudder=size), Unrest(force=size)):
+    for random_forcing in (RandomForcing(rudder=size), RandomForcing(force=size)):
         with pytest.raises(UsageError, match="must be finite and not negative"):
-            simulate(vessel, "spiral", duration_secs=10.0, unrest=unrest)
+            simulate(vessel, "spiral", duration_secs=10.0, random_forcing=random_forcing)
 
 
-def test_slabs_hold_every_sample_once_in_the_order_of_reception(
+def test_chunks_hold_every_sample_once_in_the_order_of_reception(
     vessel: Vessel, tmp_path: Path
 ) -> None:
     trial = simulate(vessel, "pull-out", duration_secs=1500.0)

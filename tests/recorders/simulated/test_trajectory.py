@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
 from recorders.simulated.manoeuvres import Manoeuvre, manoeuvre
-from recorders.simulated.trajectory import Gust, Trajectory, Unrest, WaveMoment, sail
+from recorders.simulated.trajectory import Gust, RandomForcing, Trajectory, WaveMoment, sail
 from shiplog import UsageError, Vessel, load_vessel
 from shiplog.ships import ship_model
 from shiplog.ships.paper import rudder_effect, steady_speed
@@ -143,7 +143,7 @@ def test_a_wave_moment_has_its_period_and_amplitude(vessel: Vessel) -> None:
     assert truth[1] == pytest.approx(0, abs=1e-18)
 
 
-# ---- unrest
+# ---- random_forcing
 
 
 def straight(vessel: Vessel, duration: float) -> Manoeuvre:
@@ -168,8 +168,8 @@ def linear(vessel: Vessel) -> Vessel:
 def test_an_unrests_mean_over_a_second_has_the_standard_deviation_asked_for(
     vessel: Vessel,
 ) -> None:
-    asked, rng = Unrest(rudder=radians(0.3), force=0.02), np.random.default_rng(1)
-    truth = sail(vessel, straight(vessel, 6e3), 6e3, unrest=asked, rng=rng).at(
+    asked, rng = RandomForcing(rudder=radians(0.3), force=0.02), np.random.default_rng(1)
+    truth = sail(vessel, straight(vessel, 6e3), 6e3, random_forcing=asked, rng=rng).at(
         np.arange(60_000) / 10
     )
     sizes = {"yaw_disturbance": moment_of(vessel, asked.rudder), "surge_disturbance": asked.force}
@@ -182,9 +182,9 @@ def test_an_unrests_mean_over_a_second_has_the_standard_deviation_asked_for(
 
 
 def test_an_unrest_shakes_a_linear_ship_as_lyapunovs_equation_says(linear: Vessel) -> None:
-    asked, c = Unrest(rudder=radians(1), force=0.02), linear.coefficients
+    asked, c = RandomForcing(rudder=radians(1), force=0.02), linear.coefficients
     trajectory = sail(
-        linear, straight(linear, 2e4), 2e4, unrest=asked, rng=np.random.default_rng(2)
+        linear, straight(linear, 2e4), 2e4, random_forcing=asked, rng=np.random.default_rng(2)
     )
     truth = trajectory.at(np.arange(20.0, 2e4, 0.1))
     F, G = np.array([[0.0, 1.0], [c.b1, c.a]]), np.array([[0.0], [1.0]])
@@ -205,7 +205,7 @@ def test_an_independent_integrator_agrees_through_an_unrest_and_knots_off_the_gr
         vessel,
         manoeuvre("turning-circle", duration, vessel.approach_rpm),
         duration,
-        unrest=Unrest(rudder=radians(2), force=0.05),
+        random_forcing=RandomForcing(rudder=radians(2), force=0.05),
         rng=np.random.default_rng(3),
     )
     pushes = trajectory.at(np.arange(400) / 10 + 0.05)
@@ -237,7 +237,9 @@ def test_an_independent_integrator_agrees_through_an_unrest_and_knots_off_the_gr
 def test_at_every_tenth_of_a_second_the_unrest_is_that_of_the_step_to_come(
     vessel: Vessel,
 ) -> None:
-    trajectory = sail(vessel, straight(vessel, 100.0), 100.0, unrest=Unrest(force=0.01))
+    trajectory = sail(
+        vessel, straight(vessel, 100.0), 100.0, random_forcing=RandomForcing(force=0.01)
+    )
     tenths = np.arange(1000) / 10
     at, after = trajectory.at(tenths), trajectory.at(tenths + 0.05)
     assert np.array_equal(at["surge_disturbance"], after["surge_disturbance"])
@@ -247,20 +249,22 @@ def test_at_every_tenth_of_a_second_the_unrest_is_that_of_the_step_to_come(
 def test_an_unrest_adds_to_the_gust_and_the_wave(vessel: Vessel) -> None:
     ordered, times = straight(vessel, 60.0), np.arange(0.05, 60.0, 0.1)
     acting = {"gusts": (Gust(radians(2), 20.0, 20.0),), "wave": WaveMoment(radians(1), 8.0)}
-    both, unrest, rest = (
+    both, random_forcing, rest = (
         sail(vessel, ordered, 60.0, **kinds).at(times)["yaw_disturbance"]
         for kinds in (
-            {**acting, "unrest": Unrest(rudder=radians(1))},
-            {"unrest": Unrest(rudder=radians(1))},
+            {**acting, "random_forcing": RandomForcing(rudder=radians(1))},
+            {"random_forcing": RandomForcing(rudder=radians(1))},
             acting,
         )
     )
-    assert both == pytest.approx(unrest + rest, abs=1e-15)
+    assert both == pytest.approx(random_forcing + rest, abs=1e-15)
 
 
 def test_the_zigzags_rudder_turns_where_the_heading_is_reached_in_unrest(vessel: Vessel) -> None:
     ordered = manoeuvre("zigzag-20-20", 520.0, vessel.approach_rpm)
-    trajectory = sail(vessel, ordered, 520.0, unrest=Unrest(rudder=radians(1), force=0.02))
+    trajectory = sail(
+        vessel, ordered, 520.0, random_forcing=RandomForcing(rudder=radians(1), force=0.02)
+    )
     rate = trajectory.rows[:, 8]
     turns = np.flatnonzero((rate[1:] != 0) & (rate[:-1] == 0)) + 1
     headings = trajectory.rows[turns[1:], 4] / DEG
@@ -347,8 +351,8 @@ def test_the_yaw_acceleration_is_the_slope_of_the_yaw_rate(name: str) -> None:
 @pytest.mark.parametrize("name", SHIPS)
 def test_an_unrest_pushes_the_speed_of_every_model_by_its_force(name: str) -> None:
     vessel = vessel_of(name)
-    asked, rng = Unrest(force=0.02), np.random.default_rng(4)
-    pushed = sail(vessel, straight(vessel, 10.0), 10.0, unrest=asked, rng=rng)
+    asked, rng = RandomForcing(force=0.02), np.random.default_rng(4)
+    pushed = sail(vessel, straight(vessel, 10.0), 10.0, random_forcing=asked, rng=rng)
     edges = np.array([5.0, 5.1])
     speeds, force = pushed.at(edges)["speed"], pushed.at(np.array([5.05]))["surge_disturbance"]
     ahead = AHEAD[name]

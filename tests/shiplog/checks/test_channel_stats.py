@@ -1,14 +1,14 @@
-"""What a log holds, whatever the slabs it comes in."""
+"""What a log holds, whatever the chunks it comes in."""
 
 from dataclasses import fields
 
 import numpy as np
 import pytest
 from faults import dropout, freeze, spike
-from trial_logs import InSlabs
+from trial_logs import InChunks
 
 from shiplog import Channel, TrialLog
-from shiplog.checks.channel_stats import ChannelSurvey, possible, survey_log
+from shiplog.checks.channel_stats import ChannelStats, compute_log_stats, possible
 
 START = 1_700_000_000 * 10**9
 
@@ -18,11 +18,11 @@ def channel(name: str, seconds: list[float], values: list[float] | np.ndarray) -
     return Channel(name, "a", "1", at, at, np.array(values, float))
 
 
-def of(its: Channel, *, strict: bool = False) -> ChannelSurvey:
-    return survey_log(TrialLog("x", (its,)), strict=strict)[its.name]
+def of(its: Channel, *, strict: bool = False) -> ChannelStats:
+    return compute_log_stats(TrialLog("x", (its,)), strict=strict)[its.name]
 
 
-def told(found: ChannelSurvey) -> dict[str, str]:
+def told(found: ChannelStats) -> dict[str, str]:
     """All that is said of a channel, to the last digit."""
     said = {field.name: repr(getattr(found, field.name)) for field in fields(found)}
     return said | {"stuck": repr(found.stuck and vars(found.stuck))}
@@ -58,7 +58,7 @@ def test_the_usual_period_of_what_is_known_leaves_out_what_is_not() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_slabs_do_not_matter(zigzag_log: TrialLog, seed: int) -> None:
+def test_the_chunks_do_not_matter(zigzag_log: TrialLog, seed: int) -> None:
     rng = np.random.default_rng(seed)
     log = dropout("yaw_rate", 100.0, 20.0)(
         freeze("speed", 50.0, 60.0)(
@@ -66,7 +66,7 @@ def test_the_slabs_do_not_matter(zigzag_log: TrialLog, seed: int) -> None:
         )
     )
     cuts = np.sort(rng.uniform(0, 500, 40)).tolist()
-    whole, parted = survey_log(log), survey_log(InSlabs(log, cuts))
+    whole, parted = compute_log_stats(log), compute_log_stats(InChunks(log, cuts))
     for one, other in zip(whole, parted, strict=True):
         assert told(one) == told(other)
     assert whole["speed"].stuck is not None

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from shiplog.checks.interpolate import Probe
+from shiplog.checks.interpolate import Interpolator
 
 
 def probed(times: np.ndarray, values: np.ndarray, at: np.ndarray, gap: float, cuts: list[int]):  # noqa: ANN201
-    probe = Probe(at, gap)
+    probe = Interpolator(at, gap)
     for t, v in zip(np.split(times, cuts), np.split(values, cuts), strict=True):
         probe.add(t, v)
     return probe.result()
@@ -29,7 +29,7 @@ def test_in_a_gap_there_is_nothing(cuts: list[int]) -> None:
 
 
 def test_without_samples_nothing_is_known() -> None:
-    assert np.isnan(Probe(np.arange(3.0)).result()).all()
+    assert np.isnan(Interpolator(np.arange(3.0)).result()).all()
 
 
 @pytest.mark.parametrize("cuts", [[], [1], [2], [3], [1, 2, 3]])

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import shiplog.checks.quantiles
-from shiplog.checks.quantiles import Thinned
+from shiplog.checks.quantiles import Quantiles
 
 
 @pytest.fixture(autouse=True)
@@ -10,8 +10,8 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shiplog.checks.quantiles, "HELD", 5000)
 
 
-def thinned(*parts: np.ndarray) -> Thinned:
-    found = Thinned()
+def thinned(*parts: np.ndarray) -> Quantiles:
+    found = Quantiles()
     for part in parts:
         found.add(part)
     return found

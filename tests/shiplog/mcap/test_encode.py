@@ -10,7 +10,7 @@ from mcap.writer import Writer
 
 import shiplog.mcap.encode
 from shiplog import Channel, LogWriter, TrialLog, write
-from shiplog.mcap.encode import Part, chunks
+from shiplog.mcap.encode import Part, mcap_chunks
 from shiplog.mcap.schema import GEOGRAPHIC, encode, schema_for
 from shiplog.mcap.writer import CHUNK_BYTES
 
@@ -54,7 +54,7 @@ def test_every_message_is_the_one_mcaps_own_writer_would_write(seed: int) -> Non
         writer.add_message(number, got, data, was, k)
     writer.finish()
     parts = [Part(number, 0, c) for number, c in enumerate(log, start=1)]
-    for chunk in chunks(parts, 8192):
+    for chunk in mcap_chunks(parts, 8192):
         ours.write(chunk.body.tobytes())
     theirs.seek(0)
     expected = b"".join(
@@ -79,9 +79,9 @@ def test_laid_out_little_by_little_it_is_the_same_as_all_at_once(
         fields = GEOGRAPHIC if name == "geo" else ()
         values = rng.normal(size=(count, len(fields)) if fields else count)
         parts.append(Part(number, 7, Channel(name, "a", "1", at, at, values, fields)))
-    at_once = b"".join(chunk.body.tobytes() for chunk in chunks(parts, 4096))
+    at_once = b"".join(chunk.body.tobytes() for chunk in mcap_chunks(parts, 4096))
     monkeypatch.setattr(shiplog.mcap.encode, "LAID_OUT_AT_ONCE", 100)
-    bits = list(chunks(parts, 4096))
+    bits = list(mcap_chunks(parts, 4096))
     assert b"".join(chunk.body.tobytes() for chunk in bits) == at_once
     assert len(bits) > len(at_once) / 4096 + 3
     for chunk in bits:
@@ -106,7 +106,7 @@ def test_the_index_says_where_each_message_stands(largest: int) -> None:
     log = trial(np.random.default_rng(9), 150)
     parts = [Part(number, 0, c) for number, c in enumerate(log, start=1)]
     seen = 0
-    for chunk in chunks(parts, largest):
+    for chunk in mcap_chunks(parts, largest):
         data = chunk.body.tobytes()
         assert len(data) <= largest + 200
         for channel_id, entries in chunk.index.items():
@@ -118,7 +118,7 @@ def test_the_index_says_where_each_message_stands(largest: int) -> None:
     assert seen == 600
 
 
-def test_small_slabs_are_gathered_into_large_chunks(tmp_path: pytest.TempPathFactory) -> None:
+def test_small_chunks_are_gathered_into_large_chunks(tmp_path: pytest.TempPathFactory) -> None:
     path = tmp_path / "a.mcap"
     with LogWriter(path) as writer:
         for k in range(3000):

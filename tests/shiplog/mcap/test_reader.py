@@ -17,11 +17,11 @@ from mcap_files import (
     START,
     UNIT,
     channel,
-    chunks,
     flipped,
     flushed,
     foreign,
     is_part_of,
+    mcap_chunks,
     position,
     samples,
     samples_by_mcap,
@@ -58,7 +58,7 @@ def test_we_read_what_mcap_reads_bit_for_bit(path: Path) -> None:
         position(50, GEOGRAPHIC),
     )
     write(TrialLog("t", held), path)
-    assert len(chunks(path.read_bytes())) > 1
+    assert len(mcap_chunks(path.read_bytes())) > 1
     assert samples(read(path)) == samples_by_mcap(path) == samples(TrialLog("t", held))
 
 
@@ -242,7 +242,7 @@ def test_damage_is_noticed_in_the_chunks_of_the_part_and_in_no_other(path: Path)
             writer.write(Channel(name, "test", UNIT[name], at, at, np.ones(100)))
             writer.flush()
     data = path.read_bytes()
-    start, end = chunks(data)[2]
+    start, end = mcap_chunks(data)[2]
     path.write_bytes(flipped(data, 4 * (start + end)))
     assert read(path, channels=["speed"]).warnings == ()
     assert len(read(path, channels=["speed"])["speed"]) == 300
@@ -449,7 +449,7 @@ def test_an_unfinished_flushed_file_is_read_whole(path: Path) -> None:
 def kept_at_least(data: bytes, cut: int, compression: str) -> int:
     """How many whole messages a plain decompressor finds before the cut."""
     whole = 0
-    for start, end in chunks(data):
+    for start, end in mcap_chunks(data):
         body = start + 9 + 32 + len(compression) + 8
         content = data[body : min(end, cut)] if cut > body else b""
         if compression == "zstd":
@@ -471,9 +471,9 @@ def test_a_cut_anywhere_keeps_every_whole_message_before_it(
     at = START + np.arange(12_000)
     held = Channel("yaw_rate", "gyro", "rad/s", at, at, values)
     data = written(path, held, compression=compression, chunk_size=1 << 18).read_bytes()
-    assert len(chunks(data)) >= 2
+    assert len(mcap_chunks(data)) >= 2
     name = "zstd" if compression == CompressionType.ZSTD else ""
-    edges = [edge + d for pair in chunks(data) for edge in pair for d in (-1, 0, 1, 9, 41, 60)]
+    edges = [edge + d for pair in mcap_chunks(data) for edge in pair for d in (-1, 0, 1, 9, 41, 60)]
     cuts = [*edges, *np.random.default_rng(1).integers(8, len(data), 60).tolist()]
     for cut in sorted({c for c in cuts if 8 <= c < len(data)}):
         path.write_bytes(data[:cut])
@@ -499,7 +499,7 @@ def test_zeros_from_any_point_on_lose_what_follows_and_invent_nothing(
     log = read(path)
     assert is_part_of(log, held)
     assert log.warnings
-    kept = sum(cut >= end for _, end in chunks(whole))
+    kept = sum(cut >= end for _, end in mcap_chunks(whole))
     assert all(len(c) >= 100 * kept for c in log)
     assert not kept or len(log.channels) == 2
 
@@ -533,7 +533,7 @@ def test_a_bit_flipped_anywhere_before_the_end_of_the_data_is_noticed_and_invent
 
 def test_a_bit_flipped_in_a_message_costs_its_chunk_and_no_other(path: Path) -> None:
     held, data = flushed(path)
-    start, end = chunks(data)[2]
+    start, end = mcap_chunks(data)[2]
     path.write_bytes(flipped(data, 8 * (start + end) // 2))
     log = read(path)
     assert samples(log) == {t: told[:200] + told[300:] for t, told in samples(held).items()}
@@ -544,7 +544,7 @@ def test_a_bit_flipped_in_a_message_costs_its_chunk_and_no_other(path: Path) -> 
 
 def test_a_damaged_first_chunk_does_not_cost_the_others(path: Path) -> None:
     held, data = flushed(path)
-    _, end = chunks(data)[0]
+    _, end = mcap_chunks(data)[0]
     path.write_bytes(flipped(data, 8 * (end - 20)))
     log = read(path)
     assert samples(log) == {topic: told[100:] for topic, told in samples(held).items()}
@@ -553,7 +553,7 @@ def test_a_damaged_first_chunk_does_not_cost_the_others(path: Path) -> None:
 
 def test_samples_that_nothing_describes_any_more_are_counted(path: Path) -> None:
     _, data = flushed(path)
-    _, end = chunks(data)[0]
+    _, end = mcap_chunks(data)[0]
     (data_end,) = (begin for opcode, begin, _ in top_level(data) if opcode == Opcode.DATA_END)
     path.write_bytes(flipped(data, 8 * (end - 20))[:data_end])
     log = read(path)

@@ -1,4 +1,4 @@
-"""A log in its file, slab by slab, is the log that is read whole."""
+"""A log in its file, chunk by chunk, is the log that is read whole."""
 
 import tracemalloc
 from collections import defaultdict
@@ -15,9 +15,9 @@ from mcap.writer import CompressionType, IndexType, Writer
 from mcap_files import (
     START,
     channel,
-    chunks,
     flipped,
     foreign,
+    mcap_chunks,
     position,
     samples_by_mcap,
     scalar,
@@ -33,7 +33,7 @@ from shiplog.mcap.stream import LogFile, open_log
 from shiplog.types import one_channel
 
 ANYWHERE = st.floats(0, 1, exclude_max=True)
-SLAB = 300
+CHUNK = 300
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shiplog.mcap.stream, "HELD_SAMPLES", 10)
-    monkeypatch.setattr(shiplog.mcap.stream, "SLAB_SAMPLES", SLAB)
+    monkeypatch.setattr(shiplog.mcap.stream, "CHUNK_SAMPLES", CHUNK)
 
 
 def in_its_file(path: Path) -> LogFile:
@@ -58,11 +58,11 @@ def in_its_file(path: Path) -> LogFile:
     return log
 
 
-def whole(slabs: Iterator[tuple[Channel, ...]]) -> dict[Any, Channel]:
-    """The slabs of each topic, one after the other."""
+def whole(chunks: Iterator[tuple[Channel, ...]]) -> dict[Any, Channel]:
+    """The chunks of each topic, one after the other."""
     parts: dict[Any, list[Channel]] = defaultdict(list)
-    for slab in slabs:
-        for part in slab:
+    for chunk in chunks:
+        for part in chunk:
             parts[part.key].append(part)
     return {key: one_channel(few) for key, few in parts.items()}
 
@@ -72,7 +72,7 @@ def described(c: Channel) -> tuple[object, ...]:
 
 
 def assert_as_read(log: LogFile, read_whole: TrialLog) -> None:
-    found = {key: c for key, c in whole(log.slabs()).items() if len(c)}
+    found = {key: c for key, c in whole(log.chunks()).items() if len(c)}
     expected = {c.key: c for c in read_whole if len(c)}
     assert found.keys() == expected.keys()
     for key, c in expected.items():
@@ -124,7 +124,7 @@ def trial() -> tuple[Channel, ...]:
     ],
     ids=str,
 )
-def test_the_slabs_are_what_is_read_whole_however_the_file_is_laid_out(
+def test_the_chunks_are_what_is_read_whole_however_the_file_is_laid_out(
     path: Path, options: dict[str, Any]
 ) -> None:
     written(path, *trial(), **{"chunk_size": 1 << 13, **options})
@@ -133,26 +133,26 @@ def test_the_slabs_are_what_is_read_whole_however_the_file_is_laid_out(
     assert_as_read(log, read(path))  # a second pass
 
 
-def test_the_slabs_are_the_samples_that_mcap_reads(path: Path) -> None:
+def test_the_chunks_are_the_samples_that_mcap_reads(path: Path) -> None:
     held = channel("yaw_rate", 3000, 1), channel("speed", 700, 2)
     written(path, *held, chunk_size=1 << 13)
     theirs = samples_by_mcap(path)
-    for c in whole(in_its_file(path).slabs()).values():
+    for c in whole(in_its_file(path).chunks()).values():
         assert [t[0] for t in theirs[c.topic]] == c.received_ns.tolist()
         assert b"".join(t[2] for t in theirs[c.topic]) == c.values.tobytes()
 
 
-def test_a_slab_has_about_as_many_samples_as_it_should_and_its_channels_in_order(
+def test_a_chunk_has_about_as_many_samples_as_it_should_and_its_channels_in_order(
     path: Path,
 ) -> None:
     written(path, *trial(), chunk_size=4000)
     topics = [c.topic for c in read(path)]
-    slabs = list(in_its_file(path).slabs())
-    assert len(slabs) > 5
-    for slab in slabs[:-1]:
-        assert SLAB <= sum(map(len, slab)) <= SLAB + 4000 // 40
-    for slab in slabs:
-        assert [c.topic for c in slab] == topics
+    chunks = list(in_its_file(path).chunks())
+    assert len(chunks) > 5
+    for chunk in chunks[:-1]:
+        assert CHUNK <= sum(map(len, chunk)) <= CHUNK + 4000 // 40
+    for chunk in chunks:
+        assert [c.topic for c in chunk] == topics
 
 
 def test_what_is_known_before_the_first_pass_is_what_the_summary_says(path: Path) -> None:
@@ -174,15 +174,15 @@ def test_a_short_log_is_read_whole(path: Path, monkeypatch: pytest.MonkeyPatch) 
             assert log.warnings == read(path).warnings
 
 
-def test_units_are_converted_in_every_slab(path: Path) -> None:
+def test_units_are_converted_in_every_chunk(path: Path) -> None:
     foreign(path, [scalar(float(k)) for k in range(1000)], unit="deg/s")
-    (yaw_rate,) = whole(in_its_file(path).slabs()).values()
+    (yaw_rate,) = whole(in_its_file(path).chunks()).values()
     assert yaw_rate.unit == "rad/s"
     np.testing.assert_allclose(yaw_rate.values, np.radians(np.arange(1000.0)), rtol=1e-15)
 
 
 @pytest.mark.parametrize("unfinished", [False, True])
-def test_a_topic_described_twice_is_one_channel_in_every_slab(
+def test_a_topic_described_twice_is_one_channel_in_every_chunk(
     path: Path, *, unfinished: bool
 ) -> None:
     with path.open("wb") as stream:
@@ -202,7 +202,7 @@ def test_a_topic_described_twice_is_one_channel_in_every_slab(
         path.write_bytes(path.read_bytes()[:-10])
     log = in_its_file(path)
     assert_as_read(log, read(path))
-    (yaw_rate,) = whole(log.slabs()).values()
+    (yaw_rate,) = whole(log.chunks()).values()
     assert yaw_rate.values.tolist() == list(range(1000))
     assert yaw_rate.metadata == {"run": "1"}
 
@@ -246,7 +246,7 @@ def test_messages_outside_chunks_are_read_whole(path: Path) -> None:
     assert sum(map(len, log)) == 3860
 
 
-def test_a_chosen_source_stands_alone_and_first_in_every_slab(path: Path) -> None:
+def test_a_chosen_source_stands_alone_and_first_in_every_chunk(path: Path) -> None:
     held = [
         channel("speed", 2000, 2),
         channel("yaw_rate", 2000, 1),
@@ -255,8 +255,8 @@ def test_a_chosen_source_stands_alone_and_first_in_every_slab(path: Path) -> Non
     written(path, *held, chunk_size=4000)
     chosen = {"yaw_rate": "imu"}
     log = in_its_file(path).preferring(chosen)
-    for slab in log.slabs():
-        topics = [c.topic for c in slab]
+    for chunk in log.chunks():
+        topics = [c.topic for c in chunk]
         assert topics == ["/yaw_rate/imu", "/speed/test"]
     assert_as_read(log, read(path).preferring(chosen))
 
@@ -293,9 +293,9 @@ def test_what_read_refuses_is_refused_when_opening(path: Path) -> None:
 def test_a_pass_that_is_given_up_leaves_the_file_closed(path: Path) -> None:
     written(path, *trial(), chunk_size=4000)
     log = in_its_file(path)
-    slabs = log.slabs()
-    next(slabs)
-    slabs.close()  # type: ignore[attr-defined]
+    chunks = log.chunks()
+    next(chunks)
+    chunks.close()  # type: ignore[attr-defined]
     assert_as_read(log, read(path))
 
 
@@ -322,7 +322,7 @@ def _same_or_both_refused(path: Path) -> None:
 def _gone_through(path: Path) -> None:
     log = open_log(path)
     assert isinstance(log, LogFile)
-    list(log.slabs())
+    list(log.chunks())
 
 
 @given(ANYWHERE, ANYWHERE, st.booleans())
@@ -352,9 +352,9 @@ def test_an_unfinished_file_is_said_to_be_what_it_is_read_as(
         _same_or_both_refused(path)
 
 
-def test_a_damaged_first_chunk_costs_the_slabs_no_other(path: Path) -> None:
+def test_a_damaged_first_chunk_costs_the_chunks_no_other(path: Path) -> None:
     data = recorded(path)
-    _, end = chunks(data)[0]
+    _, end = mcap_chunks(data)[0]
     (data_end,) = (begin for opcode, begin, _ in top_level(data) if opcode == Opcode.DATA_END)
     broken = flipped(data, 8 * (end - 20))
     for contents in (broken, broken[:data_end]):  # the summary describes it still, or nothing does
@@ -367,13 +367,13 @@ def test_a_damaged_first_chunk_costs_the_slabs_no_other(path: Path) -> None:
 def test_a_pass_takes_no_more_memory_the_longer_the_file(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shiplog.mcap.stream, "SLAB_SAMPLES", 1 << 15)
+    monkeypatch.setattr(shiplog.mcap.stream, "CHUNK_SAMPLES", 1 << 15)
     peaks = []
     for count in (100_000, 400_000):
         write(TrialLog("t", (channel("yaw_rate", count),)), path)
         log = in_its_file(path)
         tracemalloc.start()
-        samples = sum(len(c) for slab in log.slabs() for c in slab)
+        samples = sum(len(c) for chunk in log.chunks() for c in chunk)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert samples == count

@@ -9,7 +9,7 @@ import pytest
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import IndexType, Writer
-from mcap_files import channel, chunks, flipped, flushed, position, top_level, written
+from mcap_files import channel, flipped, flushed, mcap_chunks, position, top_level, written
 
 from shiplog import TrialLog, write
 from shiplog.mcap.summary import Summary, read_summary
@@ -44,7 +44,7 @@ def test_it_says_what_mcaps_own_reader_finds(path: Path, *, by_us: bool) -> None
     assert found.statistics == theirs.statistics
     assert found.metadata == dict(metadata)
     assert found.vessel_toml == (vessels[0] if vessels else None)
-    places = found.chunks()
+    places = found.chunk_places()
     assert places is not None
     assert len(places) > 1
     assert [(p.offset, p.first_ns, p.last_ns, p.channel_ids) for p in places] == [
@@ -52,7 +52,7 @@ def test_it_says_what_mcaps_own_reader_finds(path: Path, *, by_us: bool) -> None
          frozenset(i.message_index_offsets))
         for i in theirs.chunk_indexes
     ]  # fmt: skip
-    assert [p.offset for p in places] == [start for start, _ in chunks(path.read_bytes())]
+    assert [p.offset for p in places] == [start for start, _ in mcap_chunks(path.read_bytes())]
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_where_messages_stand_in_no_indexed_chunk_the_chunks_are_not_told(
     written(path, channel("speed", 100), **options)
     found = summary_of(path)
     assert found is not None
-    assert found.chunks() is None
+    assert found.chunk_places() is None
 
 
 def test_a_bit_flipped_anywhere_in_it_makes_it_none(path: Path) -> None:

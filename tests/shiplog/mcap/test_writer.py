@@ -13,7 +13,7 @@ from mcap.reader import NonSeekingReader, make_reader
 
 import shiplog.mcap.writer
 from shiplog import Channel, LogWriter, ShiplogError, TrialLog, UsageError, read, write
-from shiplog.mcap.encode import Chunk, Part, chunks
+from shiplog.mcap.encode import McapChunk, Part, mcap_chunks
 from shiplog.mcap.schema import GEOGRAPHIC
 
 START = 1_700_000_000_000_000_000
@@ -206,7 +206,7 @@ def test_a_log_read_and_written_again_is_the_same_file(tmp_path: Path) -> None:
     assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
 
-def test_slabs_written_one_by_one_make_one_channel(path: Path) -> None:
+def test_chunks_written_one_by_one_make_one_channel(path: Path) -> None:
     whole = channel("yaw_rate", 100)
     with LogWriter(path) as writer:
         for at in range(0, 100, 10):
@@ -228,7 +228,7 @@ def test_slabs_written_one_by_one_make_one_channel(path: Path) -> None:
     assert sequences == list(range(100))
 
 
-def test_slabs_of_many_channels_written_one_by_one_are_whole_again(path: Path) -> None:
+def test_chunks_of_many_channels_written_one_by_one_are_whole_again(path: Path) -> None:
     rng = np.random.default_rng(8)
     whole = [channel("yaw_rate", 5000, 1), channel("speed", 900, 2), channel("torque", 70, 3)]
     times = np.sort(rng.choice(whole[0].received_ns, 400, replace=False))
@@ -250,7 +250,7 @@ def test_slabs_of_many_channels_written_one_by_one_are_whole_again(path: Path) -
         assert of_it == list(range(len(c)))
 
 
-def test_a_long_slab_takes_little_memory_of_its_own(path: Path) -> None:
+def test_a_long_chunk_takes_little_memory_of_its_own(path: Path) -> None:
     count = 1_000_000
     at = START + np.arange(count)
     long = Channel("speed", "log", "m/s", at, at, np.ones(count))
@@ -329,11 +329,11 @@ def test_a_failure_midway_leaves_what_was_there(
         write(trial(channel("speed", 30)), path)
     before = path.read_bytes() if stands else None
 
-    def full_disk(parts: list[Part], largest: int) -> Iterator[Chunk]:
-        yield from chunks(parts, largest)
+    def full_disk(parts: list[Part], largest: int) -> Iterator[McapChunk]:
+        yield from mcap_chunks(parts, largest)
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(shiplog.mcap.writer, "chunks", full_disk)
+    monkeypatch.setattr(shiplog.mcap.writer, "mcap_chunks", full_disk)
     with pytest.raises(ShiplogError, match="no space left on device"):
         write(trial(channel("speed", 1000)), path)
     assert [p.read_bytes() for p in path.parent.iterdir()] == ([before] if stands else [])

@@ -17,7 +17,7 @@ from shiplog.ships import (
     Scale,
     ship_model,
 )
-from shiplog.ships.motion import OUTPUTS, Forcing, motion, observed
+from shiplog.ships.motion import MODEL_OUTPUTS, Forcing, motion, observed
 from shiplog.ships.path import path_of
 from shiplog.types import FloatArray
 
@@ -174,7 +174,7 @@ def test_every_model_moves_as_scipy_integrates_its_equations(name: str) -> None:
     )
     exact = integrated(name, parameters, state, signals, 0.02)
     assert np.ptp(exact[:, 3]) > 0.1
-    for output, got, right in zip(OUTPUTS, found.T, exact.T, strict=True):
+    for output, got, right in zip(MODEL_OUTPUTS, found.T, exact.T, strict=True):
         np.testing.assert_allclose(got, right, atol=TOLERANCES[output], err_msg=output)
 
 
@@ -272,4 +272,4 @@ def test_what_has_no_equations_says_so() -> None:
 
 def test_outputs_of_a_model_are_known_ones() -> None:
     for name in LADDER:
-        assert set(ship_model(name).outputs) <= set(OUTPUTS)
+        assert set(ship_model(name).outputs) <= set(MODEL_OUTPUTS)

@@ -1,11 +1,11 @@
-"""Courses from two priors: what of them is an echo."""
+"""ParameterHistory from two priors: what of them is an echo."""
 
 from types import SimpleNamespace
 
 import numpy as np
 
 from analysis.identification.comparison.history import (
-    Courses,
+    ParameterHistory,
     begins_secs,
     run_secs,
     two_priors,
@@ -15,11 +15,11 @@ from analysis.identification.comparison.history import (
 ANYWHERE = np.full(5, -np.inf), np.full(5, np.inf)
 
 
-def courses(high: list[float], low: list[float]) -> Courses:
+def courses(high: list[float], low: list[float]) -> ParameterHistory:
     values = np.array([high, low])[:, :, None]
     priors = np.array([[1.3], [0.7]])
     times = np.arange(float(len(high)))
-    return Courses("m", ("d",), times, values, np.full(values.shape, 0.1), priors)
+    return ParameterHistory("m", ("d",), times, values, np.full(values.shape, 0.1), priors)
 
 
 def test_a_copy_of_the_prior_echoes_wholly_and_what_came_together_not_at_all() -> None:
@@ -44,7 +44,7 @@ def test_a_gap_is_neither_echo_nor_knowledge() -> None:
 
 
 def test_without_a_prior_nothing_is_an_echo() -> None:
-    one = Courses(
+    one = ParameterHistory(
         "m", ("d",), np.arange(2.0), np.array([[[1.0], [np.nan]]]), np.ones((1, 2, 1)),
         np.full((1, 1), np.nan),
     )  # fmt: skip

@@ -7,8 +7,8 @@ from fitted_runs import TRUE, a_trial, fitted
 from analysis.identification.comparison.history import two_priors
 from analysis.identification.comparison.paper_scheme import (
     NINE,
-    papers_scheme,
-    papers_states,
+    paper_scheme,
+    paper_states,
     regression,
     solved,
     windowed,
@@ -23,7 +23,7 @@ PRIOR = load_vessel("table1")[0].coefficients
 
 def test_a_window_is_the_least_squares_of_its_rows() -> None:
     signals = a_trial().signals
-    states = papers_states(signals, PRIOR)
+    states = paper_states(signals, PRIOR)
     ends, found = windowed(signals, PRIOR, states)
     k = int(np.searchsorted(ends, 310.0))
     stop = round(ends[k] / 0.1)
@@ -39,7 +39,7 @@ def test_a_window_is_the_least_squares_of_its_rows() -> None:
 
 def test_with_the_truth_for_a_prior_it_finds_the_truth_whatever_it_is_worth() -> None:
     signals = a_trial().signals
-    states = papers_states(signals, PRIOR, as_printed=False)
+    states = paper_states(signals, PRIOR, as_printed=False)
     found = np.concatenate([solved(rows) for rows in regression(signals, PRIOR, states)])
     off = dict(zip(NINE, found / np.array(PRIOR[:9]) - 1, strict=True))
     assert abs(off["a"]) < 0.05
@@ -49,7 +49,7 @@ def test_with_the_truth_for_a_prior_it_finds_the_truth_whatever_it_is_worth() ->
 
 def test_from_two_priors_it_comes_apart_where_the_fit_does_not() -> None:
     fit, told = fitted()
-    found = papers_scheme(fit, two_priors(told, fit.problem.bounds))
+    found = paper_scheme(fit, two_priors(told, fit.problem.bounds))
     assert found is not None
     echo = dict(zip(found.names, found.usual_echo, strict=True))
     assert echo["d"] > 0.5
@@ -59,7 +59,7 @@ def test_from_two_priors_it_comes_apart_where_the_fit_does_not() -> None:
 
 def test_it_knows_the_papers_model_alone() -> None:
     fit, told = fitted("norrbin")
-    assert papers_scheme(fit, two_priors(told, fit.problem.bounds)) is None
+    assert paper_scheme(fit, two_priors(told, fit.problem.bounds)) is None
     assert windows(fit) is None
 
 

@@ -28,7 +28,7 @@ def test_a_stride_is_the_joint_least_squares_of_belief_and_samples(model: str) -
     problem = replace(fit.problem, waves=())
     covariance = np.diag((0.02 * np.abs(told.values)) ** 2)
     belief = _begun(fit, 0, told.values * 1.01, covariance)
-    path, part = next(_strides(problem.trials[0], 20.0))
+    path, part = next(_strides(problem.segments[0], 20.0))
     measured, weight = (column[part] for column in _calm(fit, 0))
     found = _taken_in(problem, belief, path, measured, weight)
     p, s = len(told.values), len(problem.model.state)
@@ -54,7 +54,7 @@ def test_a_stride_is_the_joint_least_squares_of_belief_and_samples(model: str) -
 
 def test_strides_put_together_are_the_whole_run() -> None:
     fit, told = fitted()
-    trial, model = fit.problem.trials[0], fit.problem.model
+    trial, model = fit.problem.segments[0], fit.problem.model
     state = fit.problem.start()[len(told.values) :][:4]
     whole = model.simulate(fit.parameters, state, trial.path, len(trial))
     parts = [whole[:1]]
@@ -86,10 +86,10 @@ def test_it_begins_at_its_priors() -> None:
 def test_what_was_never_told_stays_what_it_was() -> None:
     """b1 and e on a run that is over before the rudder moves."""
     fit, told = fitted()
-    quiet = replace(fit.problem, trials=(fit.problem.trials[0].part(0, 90),), waves=())
+    quiet = replace(fit.problem, segments=(fit.problem.segments[0].part(0, 90),), waves=())
     short = replace(
-        fit, problem=quiet, spreads=tuple(
-            type(s)(s.effective[:90], s.usual[:90]) for s in fit.spreads
+        fit, problem=quiet, residual_stds=tuple(
+            type(s)(s.effective[:90], s.usual[:90]) for s in fit.residual_stds
         ),
     )  # fmt: skip
     found = augmented(short, two_priors(told, fit.problem.bounds))
