@@ -15,28 +15,30 @@ from numba.extending import overload
 
 F = TypeVar("F", bound=Callable[..., object])
 
+HOME = Path(__file__).parents[1]
+PACKAGES = ("shiplog", "recorders", "analysis")
 OUTDATED_SECS = 86_400.0  # machine code of other sources may still be another process's
 
 
-def _kept() -> Path:
-    """Where machine code is kept: a folder named after all our sources.
+def _cache_folder() -> Path:
+    """The folder of the machine code, named after all our sources.
 
-    Machine code holds what it calls and the shape of what it is given, and numba looks at the file
-    of the caller alone: without this a change in one module would leave the old loops of another
-    running.
+    Numba checks the file of a compiled function alone. Its machine code also holds the functions
+    it calls, the constants it reads and the layout of the NamedTuples it takes; a change in
+    another file would leave outdated machine code running.
     """
-    ours, digest = Path(__file__).parents[1], sha256()
-    for package in ("shiplog", "recorders", "analysis"):
-        for path in sorted((ours / package).rglob("*.py")):
+    digest = sha256()
+    for package in PACKAGES:
+        for path in sorted((HOME / package).rglob("*.py")):
             digest.update(path.read_bytes())
-    where = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _usual_place()
+    where = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _default_folder()
     return where / f"shiplog-{digest.hexdigest()[:16]}"
 
 
-def _usual_place() -> Path:
-    """Beside the package, or, where the user may not write, beside their other caches.
+def _default_folder() -> Path:
+    """The folder beside the package, or the user's cache folder where that is not writable.
 
-    Never where another user could have laid something before: it will be run.
+    Never a folder in which another user could have placed files: their code would be run.
     """
     beside = Path(__file__).parent
     if os.access(beside, os.W_OK):
@@ -55,9 +57,9 @@ def _forget_others(kept: Path) -> None:
             shutil.rmtree(other, ignore_errors=True)
 
 
-KEPT = _kept()
-numba.config.CACHE_DIR = str(KEPT)
-_forget_others(KEPT)
+CACHE_FOLDER = _cache_folder()
+numba.config.CACHE_DIR = str(CACHE_FOLDER)
+_forget_others(CACHE_FOLDER)
 
 
 def compiled(function: F) -> F:
@@ -66,8 +68,9 @@ def compiled(function: F) -> F:
 
 
 def is_compiled(package: str) -> bool:
-    """Whether machine code of a package of ours is kept from an earlier run."""
-    return next(KEPT.rglob(f"{package}*/*.nbi"), None) is not None
+    """Whether machine code of one of our packages is kept from an earlier run."""
+    folders = {path.parent.name for path in (HOME / package).rglob("*.py")}
+    return any(next(CACHE_FOLDER.rglob(f"{folder}_*/*.nbi"), None) for folder in folders)
 
 
 def compiled_within(function: F) -> F:

@@ -15,7 +15,7 @@ from shiplog.compiled import compiled
 from shiplog.ships.paper import COEFFICIENT_UNITS
 from shiplog.types import FloatArray
 
-from .change_test import (
+from .change_point import (
     DOUBT,
     Blocks,
     ChangeFit,

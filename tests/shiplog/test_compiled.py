@@ -9,7 +9,7 @@ import shiplog
 CODE = """
 from shiplog.compiled import is_compiled
 print(is_compiled("shiplog"), is_compiled("analysis"), end=" ")
-from shiplog.ship import Coefficients, rudder_effect, surge_acceleration
+from shiplog.ships.paper import Coefficients, rudder_effect, surge_acceleration
 c = Coefficients(*[1.0] * 12)
 print(rudder_effect(c, 0.0, 2.0), is_compiled("shiplog"), is_compiled("analysis"))
 """
@@ -43,7 +43,7 @@ def test_machine_code_of_other_sources_is_not_taken(tmp_path: Path) -> None:
     kept = tmp_path / "kept"
     assert said(kept, tmp_path)[0] == "False"
     assert said(kept, tmp_path)[0] == "True"
-    other = tmp_path / "analysis" / "design" / "force.py"  # compiles nothing, but shapes arrays
+    other = tmp_path / "analysis" / "signals" / "signal_stats.py"  # compiles nothing
     other.write_text(other.read_text(encoding="utf-8") + "\n", encoding="utf-8")
     assert said(kept, tmp_path)[0] == "False"
 

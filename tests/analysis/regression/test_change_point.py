@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from analysis.regression.change_test import (
+from analysis.regression.change_point import (
     STRADDLE,
     TRIM,
     Blocks,
