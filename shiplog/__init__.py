@@ -2,7 +2,8 @@
 
 >>> import shiplog
 >>> log = shiplog.read("sample_data/zigzag_20_20.mcap")
->>> log["yaw_rate"].values
+>>> log["yaw_rate"].values.shape
+(6001,)
 """
 
 from shiplog.mcap.reader import read
