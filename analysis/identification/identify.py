@@ -1,6 +1,6 @@
 """From logs to a ship's coefficients, what they are worth, and what they say of other logs."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from analysis.identification.comparison.paper_scheme import paper_scheme
 from analysis.identification.comparison.parameter_ekf import augmented
 from analysis.identification.comparison.windows import windows
 from shiplog.errors import LogError, UsageError
+from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import LADDER, Model, ship_model
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray, Log
@@ -29,8 +30,6 @@ AUTO = "auto"
 ALPHAS = ("alpha1", "alpha2", "alpha3")
 UNEXPLAINED = 0.2  # of what was measured, in the rms: a fit that leaves more says little
 CONTRADICTING = 3.0  # times what noise explains: runs that differ so much are not one ship's
-
-ProgressCallback = Callable[..., None]  # of the step, and of the share of it that is done
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +87,7 @@ def identify(
     validation_logs: Sequence[Log] = (),
     known: Mapping[str, float] | None = None,
     vessel: Vessel | None = None,
-    on_progress: ProgressCallback = lambda *_: None,
+    on_progress: ProgressCallback = no_progress,
 ) -> IdentifiedShip:
     """Fit a model of `shiplog.ships` to logs of one ship, all at once.
 

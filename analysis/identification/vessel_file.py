@@ -10,12 +10,13 @@ from math import pi
 import numpy as np
 
 from shiplog.errors import LogError
+from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model, ship_model
 from shiplog.ships.paper import COEFFICIENT_UNITS, YAW_COEFFICIENTS, Coefficients, rudder_effect
 from shiplog.vessel.model_section import PAPERS
 from shiplog.vessel.vessel import Vessel
 
-from .identify import ALPHAS, IdentifiedShip, ProgressCallback
+from .identify import ALPHAS, IdentifiedShip
 from .output_error import USUAL_LENGTH, OutputError, output_error
 from .segment import usual
 from .uncertainty import ECHO, UNIDENTIFIABLE, Uncertainty, uncertainty
@@ -33,7 +34,7 @@ WITHOUT_PAPERS = (
 )
 
 
-def vessel_toml(found: IdentifiedShip, on_progress: ProgressCallback = lambda _: None) -> str:
+def vessel_toml(found: IdentifiedShip, on_progress: ProgressCallback = no_progress) -> str:
     """The text of the vessel file, each value with its 95 % interval or a caution.
 
     Raises `LogError` where nobody knows anything of the yaw or of the surge: the logs tell nothing

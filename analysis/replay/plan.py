@@ -24,6 +24,7 @@ from shiplog.checks.channel_stats import LogStats, compute_log_stats
 from shiplog.checks.data_quality import faults
 from shiplog.checks.gyro_bias import GyroBiasCheck
 from shiplog.checks.rudder_sign import RudderSignCheck
+from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, on_clock, set_clock
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
 from shiplog.types import FloatArray, Log
@@ -37,8 +38,6 @@ FEWEST = 4  # samples of an output: their third difference shows its noise
 OF_WINDOWS = ("yaw", "surge")
 NEEDED = (*PAPER_OUTPUTS, *PAPER_INPUTS)
 USUAL_SEA = 0.6  # rad/s, where no wave shows
-
-ProgressCallback = Callable[[str, float], None]  # the step, and the share of it that is done
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,10 +22,11 @@ from analysis.signals.concat import concatenate
 from analysis.signals.hold import InputHold, held_throughout
 from shiplog import LogError, Signals, Vessel
 from shiplog.errors import UsageError
+from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Log
 
-from .plan import FITTED, Plan, Planner, ProgressCallback, signals_of, weak_form_of
+from .plan import FITTED, Plan, Planner, signals_of, weak_form_of
 from .residuals import OutputResiduals, ResidualTest
 from .track import Track, Tracker
 
@@ -62,16 +63,12 @@ class Analysis(Findings, ReplayChunk):
     """All that a replay found: what it comes to, and the whole trial in one chunk."""
 
 
-def _silent(_step: str, _share: float) -> None:
-    """ProgressCallback nobody."""
-
-
 def analyse(
     log: Log,
     vessel: Vessel | None = None,
     *,
     settings: Mapping[str, object] | None = None,
-    on_progress: ProgressCallback = _silent,
+    on_progress: ProgressCallback = no_progress,
 ) -> Analysis:
     """Replay a log: check it, filter it, observe what disturbed it, identify the ship.
 
@@ -101,7 +98,7 @@ class Replay:
         vessel: Vessel | None = None,
         *,
         settings: Mapping[str, object] | None = None,
-        on_progress: ProgressCallback = _silent,
+        on_progress: ProgressCallback = no_progress,
     ) -> None:
         self._log, self._tell = log, on_progress
         planned = Planner(log, vessel, settings or {}, on_progress)

@@ -94,7 +94,7 @@ sensors, each setting in SI:
 
 def _add_info(verbs: Any) -> None:  # noqa: ANN401
     said = "what is in a log, without reading it all"
-    info = verbs.add_parser("info", help=said, description=f"ProgressCallback {said}.")
+    info = verbs.add_parser("info", help=said, description=f"Show {said}.")
     info.add_argument("log", metavar="LOG")
     info.add_argument("--json", metavar="FILE", help="as JSON, - for stdout")
     info.set_defaults(verb="info")
