@@ -11,7 +11,7 @@ from analysis.identification.comparison.parameter_ekf import augmented
 from analysis.identification.comparison.windows import windows
 from shiplog.errors import LogError, UsageError
 from shiplog.progress import ProgressCallback, no_progress
-from shiplog.ships import LADDER, Model, ship_model
+from shiplog.ships import Model, loadable_models, ship_model
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray, Log
 from shiplog.vessel.vessel import Vessel
@@ -82,7 +82,7 @@ class IdentifiedShip:
 
 def identify(
     logs: Sequence[Log],
-    model: str | None = None,
+    model: str | Model | None = None,
     *,
     validation_logs: Sequence[Log] = (),
     known: Mapping[str, float] | None = None,
@@ -91,10 +91,10 @@ def identify(
 ) -> IdentifiedShip:
     """Fit a model of `shiplog.ships` to logs of one ship, all at once.
 
-    `model` is a name of `LADDER`, or "auto": all are compared, and the one is taken that predicts
-    each run best from the others. Without a name it is the paper's model, tied where T3 is known.
-    `known` parameters are not sought. Length, the rudder's alphas and the steering gear are those
-    of `vessel`, or of the vessel file the logs carry.
+    `model` is a `Model`, the name of an installed one, or "auto": all installed ones are compared,
+    and the one is taken that predicts each run best from the others. Without a name it is the
+    paper's model, tied where T3 is known. `known` parameters are not sought. Length, the rudder's
+    alphas and the steering gear are those of `vessel`, or of the vessel file the logs carry.
 
     Raises `LogError` where the logs cannot identify anything or are of different ships, and
     `UsageError` for names nobody knows.
@@ -103,7 +103,7 @@ def identify(
         raise UsageError("no log to identify from; give at least one")
     stated = dict(known or {})
     model = model or ("burylin-tied" if "T3" in stated else "burylin")
-    considered = [ship_model(name) for name in (LADDER if model == AUTO else (model,))]
+    considered, warnings = _considered(model)
     _require_known(considered, stated)
     on_progress("read")
     runs, held_out = distinct_runs(logs, validation_logs)
@@ -115,7 +115,7 @@ def identify(
         candidates = _compared(segments, considered, stated, ship, length, on_progress)
         fit = _best(candidates)
     else:
-        on_progress(f"fit {model}")
+        on_progress(f"fit {considered[0].name}")
         settled = _settled(considered[0], stated, ship)
         fit = output_error(segments, considered[0], known=settled, length=length)
     on_progress("uncertainty")
@@ -128,7 +128,7 @@ def identify(
     on_progress("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
     every = [*runs, *held_out]
-    warnings = [w for run in every for w in run.warnings]
+    warnings += [w for run in every for w in run.warnings]
     warnings += [*contradictions(every), *_doubts(fit, found, echo, validations)]
     if fit.problem.scale.secs != 1.0 and length is None:
         warnings.append(
@@ -145,6 +145,14 @@ def identify(
         {name: told_by(name) for name in found.unidentifiable},
         tuple(warnings), any(run.data_lost for run in every),
     )  # fmt: skip
+
+
+def _considered(model: str | Model) -> tuple[list[Model], list[str]]:
+    """Return the models to fit, and a warning for each installed one that cannot be loaded."""
+    if model == AUTO:
+        models, warnings = loadable_models()
+        return list(models), list(warnings)
+    return [model if isinstance(model, Model) else ship_model(model)], []
 
 
 def _require_known(models: Sequence[Model], known: Mapping[str, float]) -> None:

@@ -24,12 +24,12 @@ class ModelSection:
 
 def model_section(table: object, length: float | None, faults: list[str]) -> ModelSection | None:
     """What a `[model]` says of a ship of that length; what is wrong with it goes to `faults`."""
-    from shiplog.ships import LADDER, ship_model  # noqa: PLC0415 - they bring numba
+    from shiplog.ships import model_names, ship_model  # noqa: PLC0415 - they bring numba
 
     if not isinstance(table, dict):
         faults.append("[model] must be a section")
         return None
-    name, ladder = table.get("name"), [each for each in LADDER if each not in PAPERS]
+    name, ladder = table.get("name"), [each for each in model_names() if each not in PAPERS]
     if name in PAPERS:
         faults.append(f"model.name = {name!r}: it stands in [yaw], [surge] and [rudder]")
         return None

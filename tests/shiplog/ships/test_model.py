@@ -12,9 +12,9 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
 from shiplog import Signals, UsageError, Vessel, resample
 from shiplog.ships import (
-    LADDER,
     Model,
     Scale,
+    model_names,
     ship_model,
 )
 from shiplog.ships.motion import MODEL_OUTPUTS, Forcing, motion, observed
@@ -165,7 +165,7 @@ def integrated(
     return np.asarray(outputs * [1 / units[0], units[1], units[1], 1.0])
 
 
-@pytest.mark.parametrize("name", LADDER)
+@pytest.mark.parametrize("name", model_names())
 def test_every_model_moves_as_scipy_integrates_its_equations(name: str) -> None:
     model, parameters, state, scale = a_ship(name)
     signals = a_run()
@@ -178,7 +178,7 @@ def test_every_model_moves_as_scipy_integrates_its_equations(name: str) -> None:
         np.testing.assert_allclose(got, right, atol=TOLERANCES[output], err_msg=output)
 
 
-@pytest.mark.parametrize("name", LADDER)
+@pytest.mark.parametrize("name", model_names())
 def test_sensitivities_are_the_derivatives(name: str) -> None:
     model, parameters, state, scale = a_ship(name)
     signals = a_run()
@@ -271,5 +271,5 @@ def test_what_has_no_equations_says_so() -> None:
 
 
 def test_outputs_of_a_model_are_known_ones() -> None:
-    for name in LADDER:
+    for name in model_names():
         assert set(ship_model(name).outputs) <= set(MODEL_OUTPUTS)

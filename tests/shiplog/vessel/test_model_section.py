@@ -84,7 +84,11 @@ def test_all_faults_are_named_at_once_in_one_line() -> None:
     ("old", "new", "says"),
     [
         ('"three-dof"', '"tree-dof"', "got 'tree-dof', did you mean 'three-dof'?"),
-        ('"three-dof"', "3", "model.name must be one of nomoto, norrbin, slipstream, drift-lag,"),
+        (
+            '"three-dof"',
+            "3",
+            "model.name must be one of drift-lag, nomoto, norrbin, slipstream, three-dof,",
+        ),
         ('name = "three-dof"', "", "but [model] has none"),
         ('"three-dof"', '"burylin"', "'burylin': it stands in [yaw], [surge] and [rudder]"),
         ("speed = 8.0", "speed = 0.0", "model.speed must be positive, got 0"),

@@ -1,0 +1,76 @@
+"""Objects that installed packages add to shiplog by entry point."""
+
+from importlib.metadata import EntryPoint, entry_points
+from typing import TypeVar
+
+from .errors import ShiplogError, UsageError
+from .units import did_you_mean
+
+T = TypeVar("T")
+
+
+def extension_names(group: str) -> tuple[str, ...]:
+    """List the names of a group of entry points, in alphabetical order, without importing any.
+
+    Examples
+    --------
+    >>> extension_names("shiplog.recorders")
+    ('simulate',)
+    """
+    return tuple(sorted({entry.name for entry in entry_points(group=group)}))
+
+
+def load_extension(group: str, name: str, kind: type[T], noun: str) -> T:
+    """Import the object that an installed package declares under a name.
+
+    Parameters
+    ----------
+    group
+        The group of entry points, such as ``shiplog.ship_models``.
+    name
+        The name within the group.
+    kind
+        The class of which the object must be an instance.
+    noun
+        What the object is, for error messages, such as ``ship model``.
+
+    Raises
+    ------
+    UsageError
+        No package declares the name.
+    ShiplogError
+        Two packages declare the name, the import fails, or the object is of another class. The
+        message names the package.
+    """
+    entry = _entry(group, name, noun)
+    package = _package(entry)
+    try:
+        found = entry.load()
+    except Exception as error:  # a foreign module may raise anything
+        raise ShiplogError(
+            f"the {noun} {name!r} cannot be loaded from {entry.value} "
+            f"({type(error).__name__}: {' '.join(str(error).split())}); "
+            f"reinstall or remove the package {package}"
+        ) from error
+    if not isinstance(found, kind):
+        raise ShiplogError(
+            f"the {noun} {name!r} of the package {package} must be a {kind.__name__}, "
+            f"but {entry.value} is a {type(found).__name__}"
+        )
+    return found
+
+
+def _entry(group: str, name: str, noun: str) -> EntryPoint:
+    entries = list(entry_points(group=group, name=name))
+    if not entries:
+        names = extension_names(group)
+        known = f"installed: {', '.join(names)}" if names else "none is installed: pip install -e ."
+        raise UsageError(f"no {noun} {name!r}{did_you_mean(name, names)}; {known}")
+    if len(entries) > 1:
+        packages = " and ".join(sorted(map(_package, entries)))
+        raise ShiplogError(f"the {noun} {name!r} is declared by {packages}; remove one of them")
+    return entries[0]
+
+
+def _package(entry: EntryPoint) -> str:
+    return entry.dist.name if entry.dist else entry.module.partition(".")[0]

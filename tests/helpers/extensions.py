@@ -1,0 +1,56 @@
+"""Install a package of tests/extensions into a folder, and run shiplog with it."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from places import PROJECT
+
+EXTENSIONS = PROJECT / "tests" / "extensions"
+
+
+def installed(name: str, target: Path) -> Mapping[str, str]:
+    """Install the package tests/extensions/NAME; return the environment in which it is found."""
+    options = ("--quiet", "--no-deps", "--no-index", "--no-build-isolation")
+    done = subprocess.run(
+        [sys.executable, "-m", "pip", "install", *options, "--target", target, EXTENSIONS / name],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return os.environ | {"PYTHONPATH": os.pathsep.join((str(target), str(PROJECT)))}
+
+
+def run_shiplog(
+    environment: Mapping[str, str], folder: Path, *arguments: object
+) -> subprocess.CompletedProcess[str]:
+    """Run `python -m shiplog` with the arguments in a folder."""
+    return run_python(environment, folder, "-m", "shiplog", *arguments)
+
+
+def run_python(
+    environment: Mapping[str, str], folder: Path, *arguments: object
+) -> subprocess.CompletedProcess[str]:
+    """Run Python with the arguments in a folder."""
+    return subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        env=environment,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def code_blocks(page: Path) -> dict[str, str]:
+    """Return the code blocks of a page by the file they are headed with, as `FILE`: before ```."""
+    found, lines = {}, page.read_text(encoding="utf-8").splitlines()
+    for i, line in enumerate(lines):
+        name = lines[i - 2].strip("`:") if i > 1 and line.startswith("```") else ""
+        if name and lines[i - 2] == f"`{name}`:":
+            end = lines.index("```", i + 1)
+            found[name] = "\n".join(lines[i + 1 : end]) + "\n"
+    return found
