@@ -10,7 +10,7 @@ from recorders.simulated.trajectory import Trajectory
 from shiplog import Channel, TrialLog, Vessel
 from shiplog.compiled import compiled
 from shiplog.ships.paper import Coefficients
-from shiplog.ships.under_way import Acting, Hull, step
+from shiplog.ships.under_way import Excitation, ShipConstants, runge_kutta_step
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
 from shiplog.vessel.ship import ship_of
@@ -39,21 +39,21 @@ def changed_trial(
     before, ship = vessel.paper, ship_of(vessel)
     rpm = ordered.orders[0].rpm
     speed = ship.steady_speed(rpm)
-    hull = ship.hull(speed, rpm)
+    constants = ship.constants(speed, rpm)
     changed = {name: factor * getattr(before, name) for name, factor in factors.items()}
     zigzag = ordered.zigzag
     rows = _sail(
         before,
         before._replace(**changed),
-        hull,
-        ship.begun(speed),
+        constants,
+        ship.straight_state(speed),
         at_secs,
         np.array([(o.time_secs, o.rudder, o.rpm) for o in ordered.orders]),
         (zigzag.start_secs, zigzag.rudder, zigzag.heading) if zigzag else (np.inf, 0.0, 0.0),
         vessel.rudder_rate,
         np.arange(round(duration_secs * RATE_HZ) + 1) / RATE_HZ,
     )
-    sailed, channels = Trajectory(ship, hull, rows), []
+    sailed, channels = Trajectory(ship, constants, rows), []
     for name in (name for name in CATALOGUE if name in sensors):
         times = np.arange(int(duration_secs * sensors[name].rate_hz) + 1) / sensors[name].rate_hz
         stamps = START_NS + np.round(times * 1e9).astype(np.int64)
@@ -68,7 +68,7 @@ def changed_trial(
 def _sail(
     before: Coefficients,
     after: Coefficients,
-    hull: Hull,
+    constants: ShipConstants,
     state: FloatArray,
     change: float,
     orders: FloatArray,
@@ -92,10 +92,12 @@ def _sail(
         elif state[3] * np.sign(aim) >= limit:
             aim = -aim
         turn = min(max(aim - delta, -rudder_rate * h), rudder_rate * h)
-        acting = Acting(delta, turn / h, orders[at, 2], 0.0, 0.0, 0.0, 0.0)
+        acting = Excitation(delta, turn / h, orders[at, 2], 0.0, 0.0, 0.0, 0.0)
         rows[k, 0] = t
         rows[k, 1:7] = state
         rows[k, 7:14] = acting
-        state[:] = step(before if t < change else after, hull, state, acting, t, h, work)
+        state[:] = runge_kutta_step(
+            before if t < change else after, constants, state, acting, t, h, work
+        )
         delta += turn
     return rows

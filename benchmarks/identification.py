@@ -149,7 +149,7 @@ def _std(sensor: Sensor, level: FloatArray, least: float) -> FloatArray:
 
 def sought(model: Model, known: Mapping[str, float]) -> tuple[str, ...]:
     """The parameters that are fitted."""
-    return tuple(p.name for p in model.parameters if not p.known and p.name not in known)
+    return tuple(p.name for p in model.parameters if not p.fixed and p.name not in known)
 
 
 def study(

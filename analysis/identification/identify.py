@@ -157,7 +157,7 @@ def _considered(model: str | Model) -> tuple[list[Model], list[str]]:
 
 def _require_known(models: Sequence[Model], known: Mapping[str, float]) -> None:
     for model in models:
-        if all(parameter.known or parameter.name in known for parameter in model.parameters):
+        if all(parameter.fixed or parameter.name in known for parameter in model.parameters):
             raise UsageError(
                 f"every parameter of {model.name} is known, and nothing is left to seek"
             )

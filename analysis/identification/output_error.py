@@ -85,11 +85,11 @@ def pose(
         raise UsageError("no segment to identify from; give at least one log")
     _require_steering(segments)
     _require_turning(segments)
-    values = model.starts()
+    values = model.start_values()
     for name, value in {**(start or {}), **(known or {})}.items():
         values[model.names.index(model.parameter(name).name)] = value
     sought = {model.parameter(name).name for name in free}
-    sought |= {p.name for p in model.parameters if not p.known}
+    sought |= {p.name for p in model.parameters if not p.fixed}
     sought -= set(known or {})
     speed, rpm = usual(segments, "speed"), usual(segments, "rpm")
     _require_way(segments, speed, rpm)

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 
 from shiplog.ships.motion import MODEL_OUTPUTS
-from shiplog.ships.path import path_of
+from shiplog.ships.path import input_path
 from shiplog.types import FloatArray, Signals
 
 from .least_squares import minimise
@@ -143,7 +143,7 @@ def zigzag_overshoots(
     while True:
         # the ship does not know of orders yet to come: each is found by sailing without it
         held = {"rudder": np.interp(time, times, angles), "rpm": np.full(len(time), rpm)}
-        path = path_of(Signals(0, ZIGZAG_STEP_SECS, held))
+        path = input_path(Signals(0, ZIGZAG_STEP_SECS, held))
         out = problem.model.simulate(fit.parameters, state, path, len(time), scale=problem.scale)
         side = np.sign(angles[-1])
         off = side * out[:, 3] - abs(heading)

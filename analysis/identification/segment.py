@@ -7,9 +7,9 @@ import numpy as np
 
 from shiplog.checks.channel_stats import longest_step_secs
 from shiplog.errors import LogError
-from shiplog.ships.motion import MODEL_OUTPUTS, Path
+from shiplog.ships.motion import MODEL_OUTPUTS, InputPath
 from shiplog.ships.paper import PAPER_INPUTS
-from shiplog.ships.path import path_of
+from shiplog.ships.path import input_path
 from shiplog.types import FloatArray, Signals
 
 LEAST_SECS = 60.0  # of a piece: a shorter one says nothing of a ship
@@ -21,7 +21,7 @@ class Segment:
 
     name: str
     signals: Signals
-    path: Path
+    path: InputPath
     measured: FloatArray  # (n, 4) in the order of MODEL_OUTPUTS; NaN where not measured
 
     def __len__(self) -> int:
@@ -40,7 +40,7 @@ class Segment:
     def part(self, start: int, stop: int) -> "Segment":
         """Its samples from `start` to before `stop`."""
         signals = self.signals.part(start, stop)
-        return Segment(self.name, signals, path_of(signals), self.measured[start:stop])
+        return Segment(self.name, signals, input_path(signals), self.measured[start:stop])
 
 
 def segments_of(signals: Signals, name: str) -> tuple[Segment, ...]:
@@ -69,7 +69,7 @@ def segments_of(signals: Signals, name: str) -> tuple[Segment, ...]:
 def _trial(signals: Signals, name: str) -> Segment:
     missing = np.full(len(signals), np.nan)
     columns = [signals.values.get(output, missing) for output in MODEL_OUTPUTS]
-    return Segment(name, signals, path_of(signals), np.column_stack(columns))
+    return Segment(name, signals, input_path(signals), np.column_stack(columns))
 
 
 def _bridged(values: FloatArray, dt: float) -> FloatArray:

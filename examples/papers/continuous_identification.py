@@ -37,7 +37,7 @@ from analysis.regression.weak_form import weak_form
 from recorders.simulated.manoeuvres import manoeuvre
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
-from recorders.simulated.trajectory import sail
+from recorders.simulated.trajectory import compute_trajectory
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
 from shiplog.ships.paper import (
     SURGE_COEFFICIENTS,
@@ -170,7 +170,9 @@ def measured(
 def truth_of(vessel: Vessel, name: str = "paper") -> FloatArray:
     """w'', w', w, v', v of a ship on the paper's run, every 0.1 s, (m, 5)."""
     c, times = vessel.coefficients, np.arange(int(DURATION / DT)) * DT
-    sailed = sail(vessel, manoeuvre(name, DURATION, vessel.approach_rpm), DURATION).at(times + 1e-9)
+    sailed = compute_trajectory(
+        vessel, manoeuvre(name, DURATION, vessel.approach_rpm), DURATION
+    ).at(times + 1e-9)
     w, w_dot, v, n = (sailed[k] for k in ("yaw_rate", "yaw_acceleration", "speed", "rpm"))
     delta = sailed["rudder"]
     rate = np.diff(delta, append=delta[-1]) / DT
@@ -256,7 +258,7 @@ def table1() -> None:
     circles = []
     for name, preset in READINGS.items():
         vessel = vessel_of(preset)
-        sailed = sail(vessel, manoeuvre("turning-circle-35", 4000.0, 80.0), 4000.0)
+        sailed = compute_trajectory(vessel, manoeuvre("turning-circle-35", 4000.0, 80.0), 4000.0)
         end = sailed.at(np.array([500.0, 3999.0]))
         w, v = end["yaw_rate"] / DEG, end["speed"]
         kept = 100 * v[1] / steady_speed(vessel.coefficients, 80.0)

@@ -13,7 +13,7 @@ from shiplog.units import CATALOGUE
 
 from .manoeuvres import manoeuvre
 from .sensors import Suite, corrupt, delays, sample_times, suite
-from .trajectory import Gust, RandomForcing, Trajectory, WaveMoment, sail
+from .trajectory import Gust, RandomForcing, Trajectory, WaveMoment, compute_trajectory
 
 CHUNK_SECS = 60.0  # of reception: what one damaged chunk can cost
 MOST_SAMPLES = 50_000_000  # of one sensor
@@ -48,8 +48,8 @@ class SimulatedTrial:
         """What really happened, as a log of source `truth`."""
         times = np.arange(int(self.duration_secs * rate_hz) + 1) / rate_hz
         stamps = _stamps(times)
-        ship, hull = self.trajectory.ship, self.trajectory.hull
-        units = _UNITS | {"yaw_disturbance": ship.moment(hull)[1]}
+        ship, constants = self.trajectory.ship, self.trajectory.constants
+        units = _UNITS | {"yaw_disturbance": ship.moment_per_rudder(constants)[1]}
         channels = [
             _channel(name, "truth", stamps, stamps, values, units.get(name))
             for name, values in self.trajectory.at(times).items()
@@ -82,7 +82,7 @@ def simulate(
         manoeuvre_name, duration_secs, vessel.approach_rpm, np.random.default_rng(orders_seed)
     )
     random_forcing_seed = np.random.SeedSequence(seed, spawn_key=(RANDOM_FORCING_CHILD,))
-    trajectory = sail(
+    trajectory = compute_trajectory(
         vessel,
         ordered,
         duration_secs,

@@ -12,7 +12,16 @@ import numpy as np
 from shiplog import Vessel
 from shiplog.compiled import compiled
 from shiplog.errors import UsageError
-from shiplog.ships.under_way import Acting, Hull, Kind, Ship, find_rates, seen, step, told
+from shiplog.ships.under_way import (
+    CoefficientTuple,
+    Excitation,
+    Ship,
+    ShipConstants,
+    observed_real,
+    outputs_si,
+    runge_kutta_step,
+    write_rates_si,
+)
 from shiplog.types import FloatArray, TimeArray
 from shiplog.vessel.ship import ship_of
 
@@ -59,7 +68,7 @@ class Trajectory:
     """A voyage: rows at the grid and at every knot, (n, s + 10)."""
 
     ship: Ship
-    hull: Hull
+    constants: ShipConstants
     rows: FloatArray
     has_random_forcing: bool = False
 
@@ -74,11 +83,17 @@ class Trajectory:
         ):  # the grid's 3 * 0.1 lies behind 0.3, where the next push is to be seen
             acting = self._rows_before(times_secs + INSTANT_SECS)
         states = _told_at(
-            self.ship.coefficients, self.hull, self.rows, found, acting, times_secs, self.ship.yaw
+            self.ship.coefficients,
+            self.constants,
+            self.rows,
+            found,
+            acting,
+            times_secs,
+            self.ship.yaw,
         )
         delta, delta_dot, rpm = self.rows[found, _INPUTS].T
         moment, wave, frequency, force = self.rows[acting, _PUSHES].T
-        per_rudder, _ = self.ship.moment(self.hull)
+        per_rudder, _ = self.ship.moment_per_rudder(self.constants)
         truth = {
             "yaw_rate": states[:, 0],
             "yaw_acceleration": states[:, 1],
@@ -96,7 +111,7 @@ class Trajectory:
         return np.searchsorted(self.rows[:, _TIME], times_secs, side="right") - 1
 
 
-def sail(
+def compute_trajectory(
     vessel: Vessel,
     ordered: Manoeuvre,
     duration_secs: float,
@@ -119,11 +134,11 @@ def sail(
             f"{vessel.name} finds no steady speed at {rpm:g} rpm, for nothing holds her back or "
             "nothing drives her; correct her model's surge or choose other revolutions"
         )
-    hull, zigzag = ship.hull(speed, rpm), ordered.zigzag
+    constants, zigzag = ship.constants(speed, rpm), ordered.zigzag
     sailed = _sail(
         ship.coefficients,
-        hull,
-        ship.begun(speed),
+        constants,
+        ship.straight_state(speed),
         _schedule(ordered, gusts),
         (zigzag.start_secs, zigzag.rudder, zigzag.heading) if zigzag else (inf, 0.0, 0.0),
         (wave.rudder, 2 * pi / wave.period_secs) if wave else (0.0, 0.0),
@@ -138,7 +153,7 @@ def sail(
             f"{vessel.name} runs away in {ordered.name}: its model is unstable there; "
             "correct its coefficients or choose a gentler manoeuvre"
         )
-    return Trajectory(ship, hull, sailed, random_forcing is not None)
+    return Trajectory(ship, constants, sailed, random_forcing is not None)
 
 
 def _random_forcing(
@@ -170,8 +185,8 @@ def _schedule(ordered: Manoeuvre, gusts: tuple[Gust, ...]) -> FloatArray:
 
 @compiled
 def _sail(
-    c: Kind,
-    hull: Hull,
+    c: CoefficientTuple,
+    constants: ShipConstants,
     state: FloatArray,
     schedule: FloatArray,
     zigzag: tuple[float, float, float],
@@ -200,7 +215,7 @@ def _sail(
         delta, delta_dot, arrival = _steer(delta, order, t, rudder_max, rudder_rate)
         push, force = random_forcing[min(grid_index, len(random_forcing)) - 1]
         moment = schedule[at, 3] + push
-        acting = Acting(delta, delta_dot, schedule[at, 2], moment, waves[0], waves[1], force)
+        acting = Excitation(delta, delta_dot, schedule[at, 2], moment, waves[0], waves[1], force)
         if count == len(rows):
             rows = np.concatenate((rows, np.empty_like(rows)))
         rows[count, _TIME] = t
@@ -214,10 +229,10 @@ def _sail(
         end = min(end, zigzag_start if t < zigzag_start else inf)
         # a zig-zag turns the rudder at the very instant the heading is reached
         side, within = np.sign(order), end - t
-        after = step(c, hull, state, acting, t, within, work)
-        if t >= zigzag_start and seen(c, after)[3] * side >= zigzag_heading:
-            end = t + _reaching(c, hull, state, acting, t, within, side, zigzag_heading, work)
-            after = step(c, hull, state, acting, t, end - t, work)
+        after = runge_kutta_step(c, constants, state, acting, t, within, work)
+        if t >= zigzag_start and observed_real(c, after)[3] * side >= zigzag_heading:
+            end = t + _reaching(c, constants, state, acting, t, within, side, zigzag_heading, work)
+            after = runge_kutta_step(c, constants, state, acting, t, end - t, work)
             order = -order
         delta += delta_dot * (end - t)
         state[:] = after
@@ -238,10 +253,10 @@ def _steer(
 
 @compiled
 def _reaching(
-    c: Kind,
-    hull: Hull,
+    c: CoefficientTuple,
+    constants: ShipConstants,
     state: FloatArray,
-    acting: Acting,
+    acting: Excitation,
     t: float,
     within: float,
     side: float,
@@ -252,7 +267,11 @@ def _reaching(
     low, high = 0.0, within
     for _ in range(60):
         middle = (low + high) / 2
-        if seen(c, step(c, hull, state, acting, t, middle, work))[3] * side >= heading:
+        if (
+            observed_real(c, runge_kutta_step(c, constants, state, acting, t, middle, work))[3]
+            * side
+            >= heading
+        ):
             high = middle
         else:
             low = middle
@@ -261,8 +280,8 @@ def _reaching(
 
 @compiled
 def _told_at(
-    c: Kind,
-    hull: Hull,
+    c: CoefficientTuple,
+    constants: ShipConstants,
     rows: FloatArray,
     found: TimeArray,
     acting: TimeArray,
@@ -274,12 +293,14 @@ def _told_at(
     work, rates = np.empty((3, own - 1)), np.empty(own - 1)
     for i in range(len(times)):
         row, then = rows[found[i]], rows[acting[i]]
-        state = step(c, hull, row[1:own], _acting(row[own:]), row[0], times[i] - row[0], work)
-        find_rates(c, hull, state, _acting(then[own:]), then[0], times[i] - then[0], rates)
-        out[i] = told(c, hull, state, rates, yaw)
+        state = runge_kutta_step(
+            c, constants, row[1:own], _acting(row[own:]), row[0], times[i] - row[0], work
+        )
+        write_rates_si(c, constants, state, _acting(then[own:]), then[0], times[i] - then[0], rates)
+        out[i] = outputs_si(c, constants, state, rates, yaw)
     return out
 
 
 @compiled
-def _acting(row: FloatArray) -> Acting:
-    return Acting(row[0], row[1], row[2], row[3], row[4], row[5], row[6])
+def _acting(row: FloatArray) -> Excitation:
+    return Excitation(row[0], row[1], row[2], row[3], row[4], row[5], row[6])

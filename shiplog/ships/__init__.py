@@ -73,7 +73,7 @@ def loadable_models() -> tuple[tuple["Model", ...], tuple[str, ...]]:
             models.append(ship_model(name))
         except ShiplogError as error:
             warnings.append(str(error))
-    models.sort(key=lambda model: sum(not parameter.known for parameter in model.parameters))
+    models.sort(key=lambda model: sum(not parameter.fixed for parameter in model.parameters))
     return tuple(models), tuple(warnings)
 
 

@@ -17,12 +17,12 @@ from .model import Model, Parameter, StateValue
 from .motion import (
     ComplexArray,
     Forcing,
-    Path,
+    InputPath,
     equations,
     exponential,
+    integrate,
     magnitude,
     observations,
-    sail,
 )
 from .paper import COEFFICIENT_UNITS, Coefficients
 
@@ -47,9 +47,9 @@ def _observed(c: Coefficients, x: ComplexArray) -> tuple[complex, complex, compl
 
 @compiled
 def _sail(
-    c: Coefficients, x: ComplexArray, offset: complex, path: Path, count: int
+    c: Coefficients, x: ComplexArray, offset: complex, path: InputPath, count: int
 ) -> ComplexArray:
-    return sail(c, x, offset, path, count)
+    return integrate(c, x, offset, path, count)
 
 
 def _tied(values: ComplexArray) -> Sequence[complex]:
@@ -58,10 +58,10 @@ def _tied(values: ComplexArray) -> Sequence[complex]:
 
 
 def _parameter(
-    name: str, start: float, highest: float = inf, *, known: bool = False, usual: float = 0.0
+    name: str, start: float, highest: float = inf, *, fixed: bool = False, typical: float = 0.0
 ) -> Parameter:
     unit = COEFFICIENT_UNITS[name]
-    return Parameter(name, unit, start, highest=highest, known=known, usual=usual)
+    return Parameter(name, unit, start, highest=highest, fixed=fixed, typical=typical)
 
 
 _STATE = (
@@ -72,14 +72,14 @@ _STATE = (
 )
 # a ship of 200 m, in general
 _A, _D = _parameter("a", -0.03), _parameter("d", 1.5e-4)
-_NONLINEAR = (_parameter("b2", -0.05), _parameter("b3", 0.0, usual=5.0))
+_NONLINEAR = (_parameter("b2", -0.05), _parameter("b3", 0.0, typical=5.0))
 _OTHERS = (
     _parameter("f", -200.0),
     _parameter("g", -3e-4, highest=0.0),
     _parameter("h", 4e-4),
-    _parameter("alpha1", 0.0171, known=True),
-    _parameter("alpha2", 0.0015, known=True),
-    _parameter("alpha3", 0.0654, known=True),
+    _parameter("alpha1", 0.0171, fixed=True),
+    _parameter("alpha2", 0.0015, fixed=True),
+    _parameter("alpha3", 0.0654, fixed=True),
 )
 BURYLIN = Model(
     "burylin", "the paper's model", Coefficients,

@@ -15,7 +15,16 @@ from typing import NamedTuple
 from shiplog.compiled import compiled
 
 from .model import Model, Parameter, StateValue
-from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, root, sail
+from .motion import (
+    ComplexArray,
+    Forcing,
+    InputPath,
+    equations,
+    integrate,
+    magnitude,
+    observations,
+    root,
+)
 from .slipstream import SURGE, YAW
 
 
@@ -61,15 +70,17 @@ def _observed(c: DriftLag, x: ComplexArray) -> tuple[complex, complex, complex, 
 
 
 @compiled
-def _sail(c: DriftLag, x: ComplexArray, offset: complex, path: Path, count: int) -> ComplexArray:
-    return sail(c, x, offset, path, count)
+def _sail(
+    c: DriftLag, x: ComplexArray, offset: complex, path: InputPath, count: int
+) -> ComplexArray:
+    return integrate(c, x, offset, path, count)
 
 
 DRIFT_LAG = Model(
     "drift-lag", "slipstream with drift lag, a sided propeller and surge from sway", DriftLag,
     (
         *YAW, *SURGE,
-        Parameter("c1", "1", -0.4), Parameter("c2", "1", 0.0, usual=0.3),
+        Parameter("c1", "1", -0.4), Parameter("c2", "1", 0.0, typical=0.3),
         Parameter("Td", "1", 0.3, 0.02, 5.0, prior_std=0.5),
         Parameter("e0", "1", 0.0, prior_std=0.1),
         Parameter("f1", "1", 0.5, prior_std=1.0),

@@ -12,7 +12,7 @@ from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 from shiplog.units import did_you_mean
 
-from .motion import MODEL_OUTPUTS, ComplexArray, Path
+from .motion import MODEL_OUTPUTS, ComplexArray, InputPath
 
 STEP = 1e-30  # along the imaginary axis: nothing is lost to rounding, however small
 
@@ -27,13 +27,13 @@ class Parameter:
     lowest: float = -inf  # and between which it stays
     highest: float = inf
     prior_std: float = inf  # how far from `start` it is believed to be, before any data
-    known: bool = False  # kept at `start` unless it is asked for
-    usual: float = 0.0  # its size of ships in general, where `start` is none
+    fixed: bool = False  # kept at `start` unless it is asked for
+    typical: float = 0.0  # its size of ships in general, where `start` is none
 
     @property
     def size(self) -> float:
         """What its size is of ships in general."""
-        return self.usual or abs(self.start) or self.prior_std
+        return self.typical or abs(self.start) or self.prior_std
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Scale:
             float(self.outputs[MODEL_OUTPUTS.index(channel)]) if channel in MODEL_OUTPUTS else 1.0
         )
 
-    def scaled(self, path: Path) -> Path:
+    def scaled(self, path: InputPath) -> InputPath:
         """A path in these units."""
         return path._replace(
             secs=path.secs / self.secs,
@@ -81,7 +81,7 @@ def _as_they_are(values: ComplexArray) -> Sequence[complex]:
 
 
 @dataclass(frozen=True, eq=False)
-class Advance:
+class Propagation:
     """A run of `count` samples, and how it changes along k directions."""
 
     outputs: FloatArray  # (count, 4) SI, in the order of MODEL_OUTPUTS
@@ -127,7 +127,7 @@ class Model:
             f"it has {', '.join(self.names)}"
         )
 
-    def starts(self) -> FloatArray:
+    def start_values(self) -> FloatArray:
         """(p,) where a search begins that knows nothing."""
         return np.array([p.start for p in self.parameters])
 
@@ -141,7 +141,7 @@ class Model:
         return self.kind(*(float(np.real(value)) for value in values))
 
     def simulate(
-        self, parameters: FloatArray, initial: FloatArray, path: Path, count: int,
+        self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
         *, offset: float = 0.0, scale: Scale = SI,
     ) -> FloatArray:  # fmt: skip
         """What would be measured, (count, 4), SI, in the order of `MODEL_OUTPUTS`.
@@ -160,7 +160,7 @@ class Model:
         return np.asarray(out.real * scale.outputs)
 
     def sensitivities(
-        self, parameters: FloatArray, initial: FloatArray, path: Path, count: int,
+        self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
         directions: FloatArray, *, offset: float = 0.0, scale: Scale = SI,
     ) -> FloatArray:  # fmt: skip
         """How the outputs change along each direction, (k, count, 4).
@@ -168,14 +168,14 @@ class Model:
         A direction is a row of `directions`: of the parameters, the initial state and the offset
         of the rudder, in this order, (k, p + s + 1). All else as `simulate`.
         """
-        return self.advance(
+        return self.propagate(
             parameters, initial, path, count, directions, offset=offset, scale=scale
         ).outputs_by
 
-    def advance(
-        self, parameters: FloatArray, initial: FloatArray, path: Path, count: int,
+    def propagate(
+        self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
         directions: FloatArray, *, offset: float = 0.0, scale: Scale = SI,
-    ) -> "Advance":  # fmt: skip
+    ) -> "Propagation":  # fmt: skip
         """A run, where it ends, and how both change along one or more `directions`.
 
         All as `sensitivities`.
@@ -188,10 +188,12 @@ class Model:
             ends[i] = initial + along[p:-1]
             out = self._sail(parameters + along[:p], ends[i], offset + along[-1], scaled, count)
             outputs_by[i] = out.imag / STEP * scale.outputs
-        return Advance(out.real * scale.outputs, ends[-1].real.copy(), outputs_by, ends.imag / STEP)
+        return Propagation(
+            out.real * scale.outputs, ends[-1].real.copy(), outputs_by, ends.imag / STEP
+        )
 
     def _sail(
-        self, parameters: ComplexArray, initial: ComplexArray, offset: complex, path: Path,
+        self, parameters: ComplexArray, initial: ComplexArray, offset: complex, path: InputPath,
         count: int,
     ) -> ComplexArray:  # fmt: skip
         """The outputs, (count, 4); `initial` is left where the run ends.

@@ -33,7 +33,7 @@ class Forcing(NamedTuple):
     n: float  # rpm
 
 
-class Path(NamedTuple):
+class InputPath(NamedTuple):
     """What a ship is given over a run, in m steps on which the rudder moves evenly."""
 
     secs: FloatArray  # (m,) how long each is
@@ -44,7 +44,7 @@ class Path(NamedTuple):
     samples: NDArray[np.int64]  # (m,) how many lie evenly within it, that one the last; or 0
 
 
-def motion(c: Any, x: Any, u: Forcing) -> tuple[complex, ...]:  # noqa: ANN401
+def state_rates(c: Any, x: Any, u: Forcing) -> tuple[complex, ...]:  # noqa: ANN401
     """The rates of the state's values `x`, under the coefficients `c`: a model's equations."""
     raise NotImplementedError(f"no equations for {type(c).__name__}")
 
@@ -56,7 +56,7 @@ def observed(c: Any, x: Any) -> tuple[complex, complex, complex, complex]:  # no
 
 def equations(kind: type) -> Callable[[F], F]:
     """Make a function the `motion` of a model whose coefficients are a `kind`."""
-    return case_of(motion, kind)
+    return case_of(state_rates, kind)
 
 
 def observations(kind: type) -> Callable[[F], F]:
@@ -96,7 +96,13 @@ def _real_root(x: float) -> float:
 
 
 @compiled_within
-def sail(c: Any, x: ComplexArray, offset: complex, path: Path, samples: int) -> ComplexArray:  # noqa: ANN401
+def integrate(
+    c: Any,  # noqa: ANN401
+    x: ComplexArray,
+    offset: complex,
+    path: InputPath,
+    samples: int,
+) -> ComplexArray:
     """The outputs at so many samples, (samples, 4), of a run that begins in the state `x`.
 
     `x` is left where the run ends, NaN where it ran away. `offset` is added to the rudder. One
@@ -113,17 +119,17 @@ def sail(c: Any, x: ComplexArray, offset: complex, path: Path, samples: int) -> 
         halfway = Forcing(delta + rate * (h / 2), rate + 0j, n)
         at_end = Forcing(delta + rate * h, rate + 0j, n)
         after[:] = x
-        leaving = motion(c, x, at_start)
+        leaving = state_rates(c, x, at_start)
         _add(after, x, leaving, h / 6, between, h / 2)
-        _add(after, x, motion(c, between, halfway), h / 3, between, h / 2)
-        _add(after, x, motion(c, between, halfway), h / 3, between, h)
-        _add(after, x, motion(c, between, at_end), h / 6, between, 0.0)
+        _add(after, x, state_rates(c, between, halfway), h / 3, between, h / 2)
+        _add(after, x, state_rates(c, between, halfway), h / 3, between, h)
+        _add(after, x, state_rates(c, between, at_end), h / 6, between, 0.0)
         if not abs(after[0].real) < 1e6:  # it has run away; NaN too
             x[:] = np.nan
             break
         count = path.samples[k]
         if count > 1:
-            arriving = motion(c, after, at_end)
+            arriving = state_rates(c, after, at_end)
             for j in range(1, count):
                 _interpolate(at_sample, x, leaving, after, arriving, h, j / count)
                 _note(out, path.sample[k] - count + j, observed(c, at_sample))

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from shiplog.compiled import compiled
 
 from .model import Model, Parameter, StateValue
-from .motion import ComplexArray, Forcing, Path, equations, observations, sail
+from .motion import ComplexArray, Forcing, InputPath, equations, integrate, observations
 
 
 class Norrbin(NamedTuple):
@@ -46,8 +46,10 @@ def _observed(c: Norrbin, x: ComplexArray) -> tuple[complex, complex, complex, c
 
 
 @compiled
-def _sail(c: Norrbin, x: ComplexArray, offset: complex, path: Path, count: int) -> ComplexArray:
-    return sail(c, x, offset, path, count)
+def _sail(
+    c: Norrbin, x: ComplexArray, offset: complex, path: InputPath, count: int
+) -> ComplexArray:
+    return integrate(c, x, offset, path, count)
 
 
 def _without_cube(values: ComplexArray) -> Sequence[complex]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from shiplog.types import FloatArray, Signals
 
-from .motion import Path
+from .motion import InputPath
 
 LONGEST_SECS = 2.0  # of a step: the fastest thing in a ship takes several
 JOINED_SECS = 0.5  # of a step over several samples: what lies between its ends is interpolated
@@ -16,7 +16,7 @@ STRAIGHT = 1e-6  # of the greatest slope: two that differ by less are one line
 _Step = tuple[int, int, float, float, float]  # first interval, samples, length, rudder, its slope
 
 
-def path_of(signals: Signals) -> Path:
+def input_path(signals: Signals) -> InputPath:
     """The path of a rudder and of revolutions that are known at every instant.
 
     Between samples the rudder moves evenly, the revolutions stay. Where the rudder goes in
@@ -33,15 +33,17 @@ def path_of(signals: Signals) -> Path:
         k = end
     first, count = (np.array([row[i] for row in rows], np.int64) for i in (0, 1))
     secs, begins, slopes = (np.array([row[i] for row in rows]) for i in (2, 3, 4))
-    return Path(secs, begins, slopes, rpm[first], np.where(count > 0, first + count, -1), count)
+    return InputPath(
+        secs, begins, slopes, rpm[first], np.where(count > 0, first + count, -1), count
+    )
 
 
-def part_of(path: Path, start: int, stop: int) -> Path:
+def path_part(path: InputPath, start: int, stop: int) -> InputPath:
     """The steps from `start` to before `stop`, samples counted from the one they begin at."""
     cut, before = slice(start, stop), path.sample[:start]
     first = int(before.max(initial=0))
     sample = np.where(path.sample[cut] >= 0, path.sample[cut] - first, -1)
-    return Path(
+    return InputPath(
         path.secs[cut], path.delta[cut], path.delta_dot[cut], path.rpm[cut], sample,
         path.samples[cut],
     )  # fmt: skip

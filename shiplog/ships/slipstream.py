@@ -16,7 +16,16 @@ from typing import NamedTuple
 from shiplog.compiled import compiled
 
 from .model import Model, Parameter, StateValue
-from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, root, sail
+from .motion import (
+    ComplexArray,
+    Forcing,
+    InputPath,
+    equations,
+    integrate,
+    magnitude,
+    observations,
+    root,
+)
 
 
 class Slipstream(NamedTuple):
@@ -56,8 +65,10 @@ def _observed(c: Slipstream, x: ComplexArray) -> tuple[complex, complex, complex
 
 
 @compiled
-def _sail(c: Slipstream, x: ComplexArray, offset: complex, path: Path, count: int) -> ComplexArray:
-    return sail(c, x, offset, path, count)
+def _sail(
+    c: Slipstream, x: ComplexArray, offset: complex, path: InputPath, count: int
+) -> ComplexArray:
+    return integrate(c, x, offset, path, count)
 
 
 YAW = (
@@ -75,7 +86,7 @@ SURGE = (
 )
 SLIPSTREAM = Model(
     "slipstream", "the paper's model with speed scaling, slipstream and drift", Slipstream,
-    (*YAW, *SURGE, Parameter("c1", "1", -0.4), Parameter("c2", "1", 0.0, usual=0.3)),
+    (*YAW, *SURGE, Parameter("c1", "1", -0.4), Parameter("c2", "1", 0.0, typical=0.3)),
     (
         StateValue("rho", "yaw_rate"),
         StateValue("rho_dot", prior_std=0.5),

@@ -30,7 +30,16 @@ from typing import NamedTuple
 from shiplog.compiled import compiled, compiled_within
 
 from .model import Model, Parameter, StateValue
-from .motion import ComplexArray, Forcing, Path, equations, magnitude, observations, root, sail
+from .motion import (
+    ComplexArray,
+    Forcing,
+    InputPath,
+    equations,
+    integrate,
+    magnitude,
+    observations,
+    root,
+)
 
 AFT = 0.8  # where the rudder feels the ship turn, in lengths: further aft than it is
 
@@ -97,8 +106,10 @@ def _observed(c: ThreeDof, x: ComplexArray) -> tuple[complex, complex, complex, 
 
 
 @compiled
-def _sail(c: ThreeDof, x: ComplexArray, offset: complex, path: Path, count: int) -> ComplexArray:
-    return sail(c, x, offset, path, count)
+def _sail(
+    c: ThreeDof, x: ComplexArray, offset: complex, path: InputPath, count: int
+) -> ComplexArray:
+    return integrate(c, x, offset, path, count)
 
 
 THREE_DOF = Model(

@@ -17,17 +17,17 @@ from shiplog.compiled import compiled, compiled_within
 from shiplog.types import FloatArray
 
 from .model import Model, Scale
-from .motion import Forcing, motion, observed
+from .motion import Forcing, observed, state_rates
 from .paper import Coefficients
 from .paper import steady_speed as papers_steady_speed
 
 SLOWEST, FASTEST = 1e-6, 1e3  # of a steady run, in a model's unit of speed
 HALVINGS = 100
 
-Kind = tuple[float, ...]  # a model's `kind`, real
+CoefficientTuple = tuple[float, ...]  # a model's `kind`, real
 
 
-class Acting(NamedTuple):
+class Excitation(NamedTuple):
     """What acts on the ship from one instant on, until something changes."""
 
     delta: float  # rad, at that instant
@@ -39,7 +39,7 @@ class Acting(NamedTuple):
     force: float  # m/s^2: a surge force, as it stands in the equation of the speed
 
 
-class Hull(NamedTuple):
+class ShipConstants(NamedTuple):
     """What compiled code must know of a ship beside her coefficients."""
 
     secs: float  # the units of her equations
@@ -57,26 +57,35 @@ class Ship:
     """
 
     model: Model
-    coefficients: Kind
+    coefficients: CoefficientTuple
     scale: Scale
 
-    def begun(self, speed: float) -> FloatArray:
+    def straight_state(self, speed: float) -> FloatArray:
         """The state of a ship that goes north at a speed, in m/s."""
         x = np.zeros(len(self.model.state) + 2)
         x[self._at("speed")] = speed / self.scale.speed
         return x
 
-    def hull(self, speed: float, rpm: float) -> Hull:
+    def constants(self, speed: float, rpm: float) -> ShipConstants:
         """The hull of a ship whose approach is at that speed, in m/s, and rpm."""
         count, ahead = len(self.model.state), self._at("speed")
-        hull = Hull(self.scale.secs, self.scale.speed, self.scale.rpm, ahead, np.zeros(count))
+        constants = ShipConstants(
+            self.scale.secs, self.scale.speed, self.scale.rpm, ahead, np.zeros(count)
+        )
         starboard, port = (
-            rates_of(self.coefficients, hull, self.begun(speed), straight(rpm, delta), 0.0, 0.0)
+            rates_si(
+                self.coefficients,
+                constants,
+                self.straight_state(speed),
+                straight_run(rpm, delta),
+                0.0,
+                0.0,
+            )
             for delta in (1.0, -1.0)
         )
-        return hull._replace(per_rudder=(starboard - port)[:count] / 2)
+        return constants._replace(per_rudder=(starboard - port)[:count] / 2)
 
-    def moment(self, hull: Hull) -> tuple[float, str]:
+    def moment_per_rudder(self, constants: ShipConstants) -> tuple[float, str]:
         """A moment of one rad of rudder as her equation of yaw has it, and its unit.
 
         In an equation of the second order that is rad/s³, in one of the first rad/s².
@@ -84,8 +93,8 @@ class Ship:
         names, yaw = [value.name for value in self.model.state], self.yaw
         acceleration = f"{names[yaw]}_dot"
         if acceleration not in names:
-            return float(hull.per_rudder[yaw] / self.scale.secs), "rad/s²"
-        return float(hull.per_rudder[names.index(acceleration)] / self.scale.secs**2), "rad/s³"
+            return float(constants.per_rudder[yaw] / self.scale.secs), "rad/s²"
+        return float(constants.per_rudder[names.index(acceleration)] / self.scale.secs**2), "rad/s³"
 
     def steady_speed(self, rpm: float) -> float:
         """The speed ahead, m/s, at which a straight run at so many revolutions settles; 0 if none.
@@ -94,11 +103,13 @@ class Ship:
         """
         if isinstance(self.coefficients, Coefficients):
             return papers_steady_speed(self.coefficients, rpm)
-        hull, ahead = self.hull(self.scale.speed, rpm), self._at("speed")
+        constants, ahead = self.constants(self.scale.speed, rpm), self._at("speed")
 
         def gains(nu: float) -> bool:
-            x = self.begun(nu * self.scale.speed)
-            return bool(rates_of(self.coefficients, hull, x, straight(rpm), 0.0, 0.0)[ahead] > 0)
+            x = self.straight_state(nu * self.scale.speed)
+            return bool(
+                rates_si(self.coefficients, constants, x, straight_run(rpm), 0.0, 0.0)[ahead] > 0
+            )
 
         low, high = SLOWEST, FASTEST
         if not gains(low) or gains(high):
@@ -117,32 +128,32 @@ class Ship:
         return [value.channel for value in self.model.state].index(channel)
 
 
-def straight(rpm: float, delta: float = 0.0) -> Acting:
+def straight_run(rpm: float, delta: float = 0.0) -> Excitation:
     """Nothing that acts but the revolutions and a rudder that rests."""
-    return Acting(float(delta), 0.0, float(rpm), 0.0, 0.0, 0.0, 0.0)
+    return Excitation(float(delta), 0.0, float(rpm), 0.0, 0.0, 0.0, 0.0)
 
 
 @compiled
-def rates_of(
-    c: Kind,
-    hull: Hull,
+def rates_si(
+    c: CoefficientTuple,
+    constants: ShipConstants,
     x: FloatArray,
-    u: Acting,
+    u: Excitation,
     t: float,
     after: float,
 ) -> FloatArray:
     """How the state changes, per s, `after` seconds from the instant `t` of what acts, (s + 2,)."""
     rates = np.empty_like(x)
-    find_rates(c, hull, x, u, t, after, rates)
+    write_rates_si(c, constants, x, u, t, after, rates)
     return rates
 
 
 @compiled_within
-def find_rates(
-    c: Kind,
-    hull: Hull,
+def write_rates_si(
+    c: CoefficientTuple,
+    constants: ShipConstants,
     x: FloatArray,
-    u: Acting,
+    u: Excitation,
     t: float,
     after: float,
     rates: FloatArray,
@@ -150,22 +161,22 @@ def find_rates(
     """Put them into `rates`."""
     delta = u.delta + u.delta_dot * after
     moment = u.moment + u.wave * sin(u.wave_frequency * (t + after))
-    own = motion(c, x, Forcing(delta, u.delta_dot * hull.secs, u.n / hull.rpm))
-    secs, per_rudder = hull.secs, hull.per_rudder
+    own = state_rates(c, x, Forcing(delta, u.delta_dot * constants.secs, u.n / constants.rpm))
+    secs, per_rudder = constants.secs, constants.per_rudder
     for i in range(len(own)):
         rates[i] = own[i] / secs + per_rudder[i] * moment
-    rates[hull.ahead] += u.force / hull.speed
-    _, ahead, sway, heading = seen(c, x)
-    rates[len(own)] = hull.speed * (ahead * cos(heading) - sway * sin(heading))
-    rates[len(own) + 1] = hull.speed * (ahead * sin(heading) + sway * cos(heading))
+    rates[constants.ahead] += u.force / constants.speed
+    _, ahead, sway, heading = observed_real(c, x)
+    rates[len(own)] = constants.speed * (ahead * cos(heading) - sway * sin(heading))
+    rates[len(own) + 1] = constants.speed * (ahead * sin(heading) + sway * cos(heading))
 
 
 @compiled_within
-def step(
-    c: Kind,
-    hull: Hull,
+def runge_kutta_step(
+    c: CoefficientTuple,
+    constants: ShipConstants,
     x: FloatArray,
-    u: Acting,
+    u: Excitation,
     t: float,
     h: float,
     work: FloatArray,
@@ -176,43 +187,43 @@ def step(
     """
     after: FloatArray = work[0]
     between, rates = work[1], work[2]
-    find_rates(c, hull, x, u, t, 0.0, rates)
+    write_rates_si(c, constants, x, u, t, 0.0, rates)
     after[:] = x
     for i in range(len(x)):
         after[i] += h / 6 * rates[i]
         between[i] = x[i] + h / 2 * rates[i]
-    find_rates(c, hull, between, u, t, h / 2, rates)
+    write_rates_si(c, constants, between, u, t, h / 2, rates)
     for i in range(len(x)):
         after[i] += h / 3 * rates[i]
         between[i] = x[i] + h / 2 * rates[i]
-    find_rates(c, hull, between, u, t, h / 2, rates)
+    write_rates_si(c, constants, between, u, t, h / 2, rates)
     for i in range(len(x)):
         after[i] += h / 3 * rates[i]
         between[i] = x[i] + h * rates[i]
-    find_rates(c, hull, between, u, t, h, rates)
+    write_rates_si(c, constants, between, u, t, h, rates)
     for i in range(len(x)):
         after[i] += h / 6 * rates[i]
     return after
 
 
 @compiled_within
-def seen(c: Kind, x: FloatArray) -> tuple[float, float, float, float]:
+def observed_real(c: CoefficientTuple, x: FloatArray) -> tuple[float, float, float, float]:
     """What is observed of a state, in the units of the equations, real."""
     values: tuple[Any, Any, Any, Any] = observed(c, x)  # of a real state real
     return values
 
 
 @compiled_within
-def told(
-    c: Kind,
-    hull: Hull,
+def outputs_si(
+    c: CoefficientTuple,
+    constants: ShipConstants,
     x: FloatArray,
     rates: FloatArray,
     yaw: int,
 ) -> tuple[float, float, float, float, float, float, float]:
     """Yaw rate and acceleration, speed ahead, sway, heading, north and east, SI."""
-    rho, ahead, sway, heading = seen(c, x)
-    acceleration = rates[yaw] / hull.secs
+    rho, ahead, sway, heading = observed_real(c, x)
+    acceleration = rates[yaw] / constants.secs
     north, east = x[-2], x[-1]
-    ahead, sway = ahead * hull.speed, sway * hull.speed
-    return rho / hull.secs, acceleration, ahead, sway, heading, north, east
+    ahead, sway = ahead * constants.speed, sway * constants.speed
+    return rho / constants.secs, acceleration, ahead, sway, heading, north, east

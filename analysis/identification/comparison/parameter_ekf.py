@@ -19,8 +19,8 @@ from analysis.identification.least_squares import weighed
 from analysis.identification.output_error import OutputError
 from analysis.identification.problem import Problem, residuals
 from analysis.identification.segment import Segment
-from shiplog.ships.motion import Path
-from shiplog.ships.path import part_of
+from shiplog.ships.motion import InputPath
+from shiplog.ships.path import path_part
 from shiplog.types import FloatArray
 
 from .history import ParameterHistory, begins_secs, run_secs
@@ -102,7 +102,7 @@ def _begun(fit: OutputError, i: int, values: FloatArray, covariance: FloatArray)
     return _Belief(mean, whole)
 
 
-def _strides(segment: Segment, stride: float) -> Iterator[tuple[Path, slice]]:
+def _strides(segment: Segment, stride: float) -> Iterator[tuple[InputPath, slice]]:
     """A segment's path in pieces of about `stride` s, and the samples of each, ends included."""
     path = segment.path
     ends = np.flatnonzero(path.sample >= 0)
@@ -111,11 +111,11 @@ def _strides(segment: Segment, stride: float) -> Iterator[tuple[Path, slice]]:
     edges = [-1, *ends[last].tolist()]
     for before, end in pairwise(edges):
         first = int(path.sample[before]) if before >= 0 else 0
-        yield part_of(path, before + 1, end + 1), slice(first, int(path.sample[end]) + 1)
+        yield path_part(path, before + 1, end + 1), slice(first, int(path.sample[end]) + 1)
 
 
 def _taken_in(
-    problem: Problem, belief: _Belief, path: Path, measured: FloatArray, weight: FloatArray
+    problem: Problem, belief: _Belief, path: InputPath, measured: FloatArray, weight: FloatArray
 ) -> _Belief:
     """What is believed at the end of a stride, its samples taken in but for the first.
 
@@ -158,10 +158,12 @@ def _directions(problem: Problem) -> FloatArray:
     return np.eye(p + s + 1)[[*problem.free, *range(p, p + s + has_offset)]]
 
 
-def _run(problem: Problem, mean: FloatArray, path: Path, count: int, moved: FloatArray) -> _Run:
+def _run(
+    problem: Problem, mean: FloatArray, path: InputPath, count: int, moved: FloatArray
+) -> _Run:
     p, s = len(problem.free), len(problem.model.state)
     offset = float(mean[p + s]) if problem.nuisance.rudder_std > 0 else 0.0
-    run = problem.model.advance(
+    run = problem.model.propagate(
         problem.parameters(mean), mean[p : p + s], path, count, moved, offset=offset,
         scale=problem.scale,
     )  # fmt: skip

@@ -16,7 +16,7 @@ from analysis.filters.noise_model import NoiseModel
 from recorders.simulated.manoeuvres import manoeuvre
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
-from recorders.simulated.trajectory import sail
+from recorders.simulated.trajectory import compute_trajectory
 from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
 from shiplog.ships.paper import (
     PAPER_INPUTS,
@@ -105,7 +105,9 @@ def with_nine(c: Coefficients, values: np.ndarray) -> Coefficients:
 def truth(vessel: Vessel, run: str) -> np.ndarray:
     """w'', w', w, v', v every 0.1 s just after the instant, where a rudder may start, (n, 5)."""
     c, times = vessel.coefficients, np.arange(int(DURATION / DT)) * DT + 1e-9
-    at = sail(vessel, manoeuvre(run, DURATION, vessel.approach_rpm), DURATION).at(times)
+    at = compute_trajectory(vessel, manoeuvre(run, DURATION, vessel.approach_rpm), DURATION).at(
+        times
+    )
     w, w_dot, v, n, delta = (
         at[k] for k in ("yaw_rate", "yaw_acceleration", "speed", "rpm", "rudder")
     )
@@ -128,7 +130,7 @@ def test_hard_over_is_a_ship_of_200_m_in_degrees_and_hardly_felt_in_radians(
     preset: str, rate: float | None, diameter: float | None, kept: float
 ) -> None:
     vessel = ship(preset)
-    sailed = sail(vessel, manoeuvre("turning-circle-35", 4000.0, 80.0), 4000.0)
+    sailed = compute_trajectory(vessel, manoeuvre("turning-circle-35", 4000.0, 80.0), 4000.0)
     end = sailed.at(np.array([3999.0]))
     w, v = end["yaw_rate"][0], end["speed"][0]
     assert 100 * v / steady_speed(vessel.coefficients, 80.0) == pytest.approx(kept, abs=0.5)

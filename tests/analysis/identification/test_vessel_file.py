@@ -19,7 +19,7 @@ from analysis.replay.replay import analyse
 from recorders.simulated.manoeuvres import manoeuvre
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
-from recorders.simulated.trajectory import sail
+from recorders.simulated.trajectory import compute_trajectory
 from shiplog import LogError, TrialLog, Vessel
 from shiplog.types import FloatArray
 from shiplog.vessel.ship import ship_of
@@ -49,7 +49,7 @@ def found_of(name: str) -> tuple[IdentifiedShip, str]:
 
 
 def truth(vessel: Vessel, run: str) -> dict[str, FloatArray]:
-    voyage = sail(vessel, manoeuvre(run, 400.0, vessel.approach_rpm), 400.0)
+    voyage = compute_trajectory(vessel, manoeuvre(run, 400.0, vessel.approach_rpm), 400.0)
     return voyage.at(np.arange(400.0))
 
 

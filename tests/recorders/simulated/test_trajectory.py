@@ -9,7 +9,13 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
 from recorders.simulated.manoeuvres import Manoeuvre, manoeuvre
-from recorders.simulated.trajectory import Gust, RandomForcing, Trajectory, WaveMoment, sail
+from recorders.simulated.trajectory import (
+    Gust,
+    RandomForcing,
+    Trajectory,
+    WaveMoment,
+    compute_trajectory,
+)
 from shiplog import UsageError, Vessel, load_vessel
 from shiplog.ships import ship_model
 from shiplog.ships.paper import rudder_effect, steady_speed
@@ -31,7 +37,7 @@ REFERENCES = [
 
 
 def sailed(vessel: Vessel, name: str, duration: float = 520.0) -> Trajectory:
-    return sail(vessel, manoeuvre(name, duration, vessel.approach_rpm), duration)
+    return compute_trajectory(vessel, manoeuvre(name, duration, vessel.approach_rpm), duration)
 
 
 @pytest.mark.parametrize(("name", "time", "w", "w_dot", "v", "heading"), REFERENCES)
@@ -126,7 +132,7 @@ def test_both_readings_of_the_table_sail_and_differ() -> None:
 def test_a_gust_acts_like_so_much_rudder(vessel: Vessel) -> None:
     straight = manoeuvre("turning-circle-1", 400.0, 80.0)
     straight = replace(straight, orders=straight.orders[:1])
-    blown = sail(vessel, straight, 400.0, gusts=(Gust(radians(2), 50.0, 100.0),))
+    blown = compute_trajectory(vessel, straight, 400.0, gusts=(Gust(radians(2), 50.0, 100.0),))
     truth = blown.at(np.array([49.9, 50.1, 149.9, 150.1]))
     c = vessel.coefficients
     size = c.d * rudder_effect(c, steady_speed(c, 80), 80) * radians(2)
@@ -136,7 +142,7 @@ def test_a_gust_acts_like_so_much_rudder(vessel: Vessel) -> None:
 
 def test_a_wave_moment_has_its_period_and_amplitude(vessel: Vessel) -> None:
     ordered = manoeuvre("turning-circle", 100.0, 80.0)
-    wavy = sail(vessel, ordered, 100.0, wave=WaveMoment(radians(1), 8.0))
+    wavy = compute_trajectory(vessel, ordered, 100.0, wave=WaveMoment(radians(1), 8.0))
     truth = wavy.at(np.array([2.0, 4.0, 6.0]))["yaw_disturbance"]
     assert truth[0] == pytest.approx(-truth[2])
     assert truth[0] > 0
@@ -169,9 +175,9 @@ def test_an_unrests_mean_over_a_second_has_the_standard_deviation_asked_for(
     vessel: Vessel,
 ) -> None:
     asked, rng = RandomForcing(rudder=radians(0.3), force=0.02), np.random.default_rng(1)
-    truth = sail(vessel, straight(vessel, 6e3), 6e3, random_forcing=asked, rng=rng).at(
-        np.arange(60_000) / 10
-    )
+    truth = compute_trajectory(
+        vessel, straight(vessel, 6e3), 6e3, random_forcing=asked, rng=rng
+    ).at(np.arange(60_000) / 10)
     sizes = {"yaw_disturbance": moment_of(vessel, asked.rudder), "surge_disturbance": asked.force}
     for name, size in sizes.items():
         means = truth[name].reshape(-1, 10).mean(axis=1)
@@ -183,7 +189,7 @@ def test_an_unrests_mean_over_a_second_has_the_standard_deviation_asked_for(
 
 def test_an_unrest_shakes_a_linear_ship_as_lyapunovs_equation_says(linear: Vessel) -> None:
     asked, c = RandomForcing(rudder=radians(1), force=0.02), linear.coefficients
-    trajectory = sail(
+    trajectory = compute_trajectory(
         linear, straight(linear, 2e4), 2e4, random_forcing=asked, rng=np.random.default_rng(2)
     )
     truth = trajectory.at(np.arange(20.0, 2e4, 0.1))
@@ -201,7 +207,7 @@ def test_an_independent_integrator_agrees_through_an_unrest_and_knots_off_the_gr
 ) -> None:
     vessel = replace(vessel, rudder_rate=2.3456 * DEG)
     c, duration = vessel.coefficients, 40.0
-    trajectory = sail(
+    trajectory = compute_trajectory(
         vessel,
         manoeuvre("turning-circle", duration, vessel.approach_rpm),
         duration,
@@ -237,7 +243,7 @@ def test_an_independent_integrator_agrees_through_an_unrest_and_knots_off_the_gr
 def test_at_every_tenth_of_a_second_the_unrest_is_that_of_the_step_to_come(
     vessel: Vessel,
 ) -> None:
-    trajectory = sail(
+    trajectory = compute_trajectory(
         vessel, straight(vessel, 100.0), 100.0, random_forcing=RandomForcing(force=0.01)
     )
     tenths = np.arange(1000) / 10
@@ -250,7 +256,7 @@ def test_an_unrest_adds_to_the_gust_and_the_wave(vessel: Vessel) -> None:
     ordered, times = straight(vessel, 60.0), np.arange(0.05, 60.0, 0.1)
     acting = {"gusts": (Gust(radians(2), 20.0, 20.0),), "wave": WaveMoment(radians(1), 8.0)}
     both, random_forcing, rest = (
-        sail(vessel, ordered, 60.0, **kinds).at(times)["yaw_disturbance"]
+        compute_trajectory(vessel, ordered, 60.0, **kinds).at(times)["yaw_disturbance"]
         for kinds in (
             {**acting, "random_forcing": RandomForcing(rudder=radians(1))},
             {"random_forcing": RandomForcing(rudder=radians(1))},
@@ -262,7 +268,7 @@ def test_an_unrest_adds_to_the_gust_and_the_wave(vessel: Vessel) -> None:
 
 def test_the_zigzags_rudder_turns_where_the_heading_is_reached_in_unrest(vessel: Vessel) -> None:
     ordered = manoeuvre("zigzag-20-20", 520.0, vessel.approach_rpm)
-    trajectory = sail(
+    trajectory = compute_trajectory(
         vessel, ordered, 520.0, random_forcing=RandomForcing(rudder=radians(1), force=0.02)
     )
     rate = trajectory.rows[:, 8]
@@ -286,14 +292,14 @@ def test_an_independent_integrator_agrees_with_every_model(name: str) -> None:
     vessel = replace(vessel_of(name), rudder_rate=2.3456 * DEG)
     gust, wave = Gust(radians(3), 33.33, 40.0), WaveMoment(radians(1), 9.0)
     circle = manoeuvre("turning-circle", 300.0, RPM)
-    trajectory = sail(vessel, circle, 300.0, gusts=(gust,), wave=wave)
+    trajectory = compute_trajectory(vessel, circle, 300.0, gusts=(gust,), wave=wave)
 
     def rates(t: float, x: np.ndarray) -> np.ndarray:
         blown = gust.rudder if 33.33 <= t < 73.33 else 0.0
         worth = blown + wave.rudder * np.sin(2 * np.pi * t / 9)
         return rates_in_si(name, x, rudder_at(t, vessel), RPM, worth=worth)
 
-    x = trajectory.ship.begun(approach(name))
+    x = trajectory.ship.straight_state(approach(name))
     knots = [0.0, 10.0, 10 + 35 * DEG / vessel.rudder_rate, 33.33, 73.33, 300.0]
     for start, end in pairwise(knots):
         span = (start + 1e-12, end - 1e-12)
@@ -318,9 +324,9 @@ def test_a_gust_turns_every_ship_as_its_rudder_would(name: str) -> None:
     calm, blown, steered = (
         sailed.at(times)
         for sailed in (
-            sail(vessel, ahead, 600.0),
-            sail(vessel, ahead, 600.0, gusts=(Gust(0.1 * DEG, 50.0),)),
-            sail(vessel, replace(ahead, orders=(*ahead.orders, order)), 600.0),
+            compute_trajectory(vessel, ahead, 600.0),
+            compute_trajectory(vessel, ahead, 600.0, gusts=(Gust(0.1 * DEG, 50.0),)),
+            compute_trajectory(vessel, replace(ahead, orders=(*ahead.orders, order)), 600.0),
         )
     )
     for channel in ("yaw_rate", "sway"):
@@ -352,7 +358,7 @@ def test_the_yaw_acceleration_is_the_slope_of_the_yaw_rate(name: str) -> None:
 def test_an_unrest_pushes_the_speed_of_every_model_by_its_force(name: str) -> None:
     vessel = vessel_of(name)
     asked, rng = RandomForcing(force=0.02), np.random.default_rng(4)
-    pushed = sail(vessel, straight(vessel, 10.0), 10.0, random_forcing=asked, rng=rng)
+    pushed = compute_trajectory(vessel, straight(vessel, 10.0), 10.0, random_forcing=asked, rng=rng)
     edges = np.array([5.0, 5.1])
     speeds, force = pushed.at(edges)["speed"], pushed.at(np.array([5.05]))["surge_disturbance"]
     ahead = AHEAD[name]

@@ -17,8 +17,8 @@ from shiplog.ships import (
     model_names,
     ship_model,
 )
-from shiplog.ships.motion import MODEL_OUTPUTS, Forcing, motion, observed
-from shiplog.ships.path import path_of
+from shiplog.ships.motion import MODEL_OUTPUTS, Forcing, observed, state_rates
+from shiplog.ships.path import input_path
 from shiplog.types import FloatArray
 
 DT = 1.0
@@ -132,7 +132,7 @@ def a_run(seconds: float = 120.0) -> Signals:
 def a_ship(name: str) -> tuple[Model, FloatArray, FloatArray, Scale]:
     """A model, parameters at which all of it acts, an initial state, and its scale."""
     model = ship_model(name)
-    start = model.starts()
+    start = model.start_values()
     parameters = start + 0.1 * np.where(start == 0, 1.0, np.abs(start))
     if not model.dimensionless:
         parameters[model.names.index("b3")] = -0.5
@@ -170,7 +170,7 @@ def test_every_model_moves_as_scipy_integrates_its_equations(name: str) -> None:
     model, parameters, state, scale = a_ship(name)
     signals = a_run()
     found = model.simulate(
-        parameters, state, path_of(signals), len(signals), offset=0.02, scale=scale
+        parameters, state, input_path(signals), len(signals), offset=0.02, scale=scale
     )
     exact = integrated(name, parameters, state, signals, 0.02)
     assert np.ptp(exact[:, 3]) > 0.1
@@ -182,7 +182,7 @@ def test_every_model_moves_as_scipy_integrates_its_equations(name: str) -> None:
 def test_sensitivities_are_the_derivatives(name: str) -> None:
     model, parameters, state, scale = a_ship(name)
     signals = a_run()
-    path, n, p = path_of(signals), len(signals), len(parameters)
+    path, n, p = input_path(signals), len(signals), len(parameters)
     directions = np.eye(p + len(state) + 1)
     found = model.sensitivities(parameters, state, path, n, directions, offset=0.01, scale=scale)
     at = np.concatenate((parameters, state, [0.01]))
@@ -210,7 +210,7 @@ def test_the_papers_model_is_the_one_that_is_simulated(
     model = ship_model("burylin")
     state = np.array([0.0, 0.0, signals["speed"][0], 0.0])
     parameters = np.array(vessel.coefficients)
-    out = model.simulate(parameters, state, path_of(signals), len(signals))
+    out = model.simulate(parameters, state, input_path(signals), len(signals))
     # the rudder's knots lie between samples: without them these would be off by 3e-6
     np.testing.assert_allclose(out[:, 0], signals["yaw_rate"], atol=2e-9)
     np.testing.assert_allclose(out[:, 1], signals["speed"], atol=1e-7)
@@ -220,7 +220,7 @@ def test_knots_between_samples_are_put_back() -> None:
     time = np.arange(0.0, 40.0, 1.0)
     knots, angles = [10.3, 14.7, 25.45, 33.2], [0.0, 0.2, 0.2, -0.1]
     rudder = np.interp(time, knots, angles)
-    path = path_of(Signals(0, 1.0, {"rudder": rudder, "rpm": np.full(40, 80.0)}))
+    path = input_path(Signals(0, 1.0, {"rudder": rudder, "rpm": np.full(40, 80.0)}))
     begins = np.concatenate(([0.0], np.cumsum(path.secs)))[:-1]
     assert set(np.round(knots, 6)) <= set(np.round(begins, 6))
     np.testing.assert_allclose(path.delta, np.interp(begins, knots, angles), atol=1e-9)
@@ -229,13 +229,13 @@ def test_knots_between_samples_are_put_back() -> None:
 
 def test_a_rudder_that_is_not_straight_is_left_as_it_was_measured() -> None:
     rudder = np.random.default_rng(1).normal(size=50)
-    path = path_of(Signals(0, 1.0, {"rudder": rudder, "rpm": np.full(50, 80.0)}))
+    path = input_path(Signals(0, 1.0, {"rudder": rudder, "rpm": np.full(50, 80.0)}))
     assert len(path.secs) == 49
     np.testing.assert_array_equal(path.delta, rudder[:-1])
 
 
 def test_a_slow_clock_is_walked_in_short_steps() -> None:
-    path = path_of(Signals(0, 10.0, {"rudder": np.linspace(0, 1, 4), "rpm": np.full(4, 80.0)}))
+    path = input_path(Signals(0, 10.0, {"rudder": np.linspace(0, 1, 4), "rpm": np.full(4, 80.0)}))
     assert path.secs.max() <= 2.0
     assert path.sample[path.sample >= 0].tolist() == [1, 2, 3]
     np.testing.assert_allclose(path.secs.sum(), 30.0)
@@ -251,7 +251,7 @@ def test_the_ties_leave_the_papers_own_coefficients(vessel: Vessel) -> None:
 def test_a_ship_that_runs_away_ends_in_nan() -> None:
     model, parameters, state, scale = a_ship("slipstream")
     parameters[model.names.index("b2")] = 50.0
-    out = model.simulate(parameters, state, path_of(a_run()), 121, scale=scale)
+    out = model.simulate(parameters, state, input_path(a_run()), 121, scale=scale)
     assert np.isnan(out[-1]).all()
     assert np.isfinite(out[0]).all()
 
@@ -265,7 +265,7 @@ def test_unknown_models_and_parameters_are_refused_with_the_nearest() -> None:
 
 def test_what_has_no_equations_says_so() -> None:
     with pytest.raises(NotImplementedError, match="tuple"):
-        motion((), (), Forcing(0, 0, 0))
+        state_rates((), (), Forcing(0, 0, 0))
     with pytest.raises(NotImplementedError, match="tuple"):
         observed((), ())
 

@@ -18,7 +18,7 @@ from shiplog.ships.paper import (
     surge_acceleration,
     yaw_acceleration_rate,
 )
-from shiplog.ships.under_way import Acting, Ship, rates_of, step, straight
+from shiplog.ships.under_way import Excitation, Ship, rates_si, runge_kutta_step, straight_run
 from shiplog.vessel.ship import ship_of
 
 TABLE1 = load_vessel("table1")[0].paper
@@ -33,10 +33,12 @@ def papers(c: Coefficients = TABLE1) -> Ship:
 
 def test_the_papers_ship_moves_by_the_equations_filters_have_to_the_last_bit() -> None:
     rng, ship = np.random.default_rng(0), papers()
-    hull = ship.hull(9.0, 80.0)
+    constants = ship.constants(9.0, 80.0)
     for w, w_dot, v, delta, rate in rng.normal(size=(100, 5)) * (0.01, 1e-4, 3.0, 0.3, 0.04):
         x = np.array([w, w_dot, 9 + v, 0.3, 5.0, 6.0])
-        found = rates_of(TABLE1, hull, x, straight(80, delta)._replace(delta_dot=rate), 0.0, 0.0)
+        found = rates_si(
+            TABLE1, constants, x, straight_run(80, delta)._replace(delta_dot=rate), 0.0, 0.0
+        )
         w_ddot = yaw_acceleration_rate(TABLE1, w, w_dot, 9 + v, 80.0, delta, rate)
         surge = surge_acceleration(TABLE1, w, 9 + v, 80.0)
         assert found[:4].tolist() == [w_dot, w_ddot, surge, w]
@@ -44,26 +46,28 @@ def test_the_papers_ship_moves_by_the_equations_filters_have_to_the_last_bit() -
 
 
 def test_a_moment_of_the_papers_ship_stands_in_her_yaw_alone() -> None:
-    hull = papers().hull(9.0, 80.0)
+    constants = papers().constants(9.0, 80.0)
     size = TABLE1.d * rudder_effect(TABLE1, 9.0, 80.0)
-    assert hull.per_rudder.tolist() == [0.0, size, 0.0, 0.0]
-    assert papers().moment(hull) == (size, "rad/s³")
+    assert constants.per_rudder.tolist() == [0.0, size, 0.0, 0.0]
+    assert papers().moment_per_rudder(constants) == (size, "rad/s³")
 
 
 def test_a_moment_and_a_force_add_to_yaw_and_surge_alone() -> None:
-    hull, x = papers().hull(9.0, 80.0), np.array([0.01, 1e-4, 8.0, 0.3, 5.0, 6.0])
-    calm = Acting(0.2, 0.01, 80.0, 0.0, 0.0, 0.0, 0.0)
-    free = rates_of(TABLE1, hull, x, calm, 3.0, 0.1)
-    pushed = rates_of(TABLE1, hull, x, calm._replace(moment=0.02, force=0.03), 3.0, 0.1)
+    constants, x = papers().constants(9.0, 80.0), np.array([0.01, 1e-4, 8.0, 0.3, 5.0, 6.0])
+    calm = Excitation(0.2, 0.01, 80.0, 0.0, 0.0, 0.0, 0.0)
+    free = rates_si(TABLE1, constants, x, calm, 3.0, 0.1)
+    pushed = rates_si(TABLE1, constants, x, calm._replace(moment=0.02, force=0.03), 3.0, 0.1)
     size = 0.02 * TABLE1.d * rudder_effect(TABLE1, 9.0, 80.0)
     assert pushed - free == pytest.approx([0, size, 0.03, 0, 0, 0], abs=1e-15)
 
 
 def test_a_ship_that_nothing_holds_back_gains_what_the_forces_give() -> None:
     free = papers(Coefficients(*[0.0] * 12))
-    hull = free.hull(1.0, 0.0)._replace(per_rudder=np.array([0.0, 1.0, 0.0, 0.0]))
-    pushed = straight(0)._replace(moment=2e-5, force=0.03)
-    after = step(free.coefficients, hull, free.begun(1.0), pushed, 0.0, 2.0, np.empty((3, 6)))
+    constants = free.constants(1.0, 0.0)._replace(per_rudder=np.array([0.0, 1.0, 0.0, 0.0]))
+    pushed = straight_run(0)._replace(moment=2e-5, force=0.03)
+    after = runge_kutta_step(
+        free.coefficients, constants, free.straight_state(1.0), pushed, 0.0, 2.0, np.empty((3, 6))
+    )
     assert after[:3] == pytest.approx([4e-5, 4e-5, 1.06])
 
 
@@ -79,8 +83,13 @@ def test_a_straight_run_settles_where_nothing_changes_the_speed(name: str) -> No
     ship = ship_of(vessel_of(name))
     speed = ship.steady_speed(RPM)
     assert speed == pytest.approx(approach(name), rel=1e-12)
-    rates = rates_of(
-        ship.coefficients, ship.hull(speed, RPM), ship.begun(speed), straight(RPM), 0.0, 0.0
+    rates = rates_si(
+        ship.coefficients,
+        ship.constants(speed, RPM),
+        ship.straight_state(speed),
+        straight_run(RPM),
+        0.0,
+        0.0,
     )
     surge = [value.channel for value in ship.model.state].index("speed")
     assert rates[surge] == pytest.approx(0, abs=1e-14)
@@ -98,11 +107,13 @@ def test_a_ship_without_a_steady_speed_has_none(changes: dict[str, float]) -> No
 def test_the_rates_in_si_are_those_of_the_equations_as_printed(name: str) -> None:
     ship, rng = ship_of(vessel_of(name)), np.random.default_rng(1)
     speed = approach(name)
-    hull, begun = ship.hull(speed, RPM), ship.begun(speed)
+    constants, straight_state = ship.constants(speed, RPM), ship.straight_state(speed)
     for _ in range(50):
-        x = begun + rng.normal(size=len(begun)) * np.where(begun > 0, 0.1, 0.05)
-        acting = Acting(*rng.normal(size=2) * (0.3, 0.03), 80.0, 0.02, 0.01, 0.7, 0.03)
-        found = rates_of(ship.coefficients, hull, x, acting, 3.0, 0.5)
+        x = straight_state + rng.normal(size=len(straight_state)) * np.where(
+            straight_state > 0, 0.1, 0.05
+        )
+        acting = Excitation(*rng.normal(size=2) * (0.3, 0.03), 80.0, 0.02, 0.01, 0.7, 0.03)
+        found = rates_si(ship.coefficients, constants, x, acting, 3.0, 0.5)
         moment = 0.02 + 0.01 * np.sin(0.7 * 3.5)
         rudder = acting.delta + 0.5 * acting.delta_dot, acting.delta_dot
         expected = rates_in_si(name, x, rudder, 80.0, worth=moment, force=0.03)
@@ -112,11 +123,11 @@ def test_the_rates_in_si_are_those_of_the_equations_as_printed(name: str) -> Non
 @pytest.mark.parametrize("name", SHIPS)
 def test_a_moment_pushes_to_its_side_and_slows_nobody(name: str) -> None:
     ship = ship_of(vessel_of(name))
-    hull = ship.hull(SPEED, RPM)
-    size, unit = ship.moment(hull)
+    constants = ship.constants(SPEED, RPM)
+    size, unit = ship.moment_per_rudder(constants)
     assert size > 0
     assert unit == ("rad/s³" if name in ("slipstream", "drift-lag") else "rad/s²")
-    assert hull.per_rudder[hull.ahead] == 0
+    assert constants.per_rudder[constants.ahead] == 0
 
 
 # ---- Runge and Kutta's error
@@ -130,12 +141,12 @@ def hard_over(t: float, start: float, rate: float) -> float:
 def stepped(start: float, rate: float) -> np.ndarray:
     """w, w' and v every 0.1 s of 200 s, (2000, 3): a step a sample, whatever the rudder does."""
     ship, found, work = papers(), [], np.empty((3, 6))
-    state = ship.begun(steady_speed(TABLE1, 80.0))
-    hull = ship.hull(state[2], 80.0)
+    state = ship.straight_state(steady_speed(TABLE1, 80.0))
+    constants = ship.constants(state[2], 80.0)
     for k in range(2000):
         delta, after = (hard_over(k * 0.1 + h, start, rate) for h in (0.0, 0.1))
-        moving = straight(80, delta)._replace(delta_dot=(after - delta) / 0.1)
-        state = step(TABLE1, hull, state, moving, 0.0, 0.1, work).copy()
+        moving = straight_run(80, delta)._replace(delta_dot=(after - delta) / 0.1)
+        state = runge_kutta_step(TABLE1, constants, state, moving, 0.0, 0.1, work).copy()
         found.append(state[:3])
     return np.array(found)
 

@@ -59,7 +59,7 @@ def test_strides_put_together_are_the_whole_run() -> None:
     whole = model.simulate(fit.parameters, state, trial.path, len(trial))
     parts = [whole[:1]]
     for path, part in _strides(trial, 2.0):
-        run = model.advance(fit.parameters, state, path, part.stop - part.start, np.eye(17)[:1])
+        run = model.propagate(fit.parameters, state, path, part.stop - part.start, np.eye(17)[:1])
         parts.append(run.outputs[1:])
         state = run.end
     np.testing.assert_allclose(np.concatenate(parts), whole, rtol=1e-12, atol=1e-15)
