@@ -4,8 +4,13 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from analysis.identification.comparison.paper_scheme import NINE, paper_states, regression, solved
-from analysis.identification.comparison.parameter_ekf import augmented
+from analysis.identification.comparison.paper_scheme import (
+    IDENTIFIED_NAMES,
+    paper_states,
+    regression_rows,
+    solve_window,
+)
+from analysis.identification.comparison.parameter_ekf import parameter_ekf
 from analysis.identification.output_error import OutputError, output_error
 from analysis.identification.segment import Segment
 from analysis.regression.coefficients import Coefficient, identify
@@ -43,20 +48,22 @@ def methods(
     print(TEXT.format(seeds=len(SEEDS), off=100 * OFF))
     for manoeuvre in MANOEUVRES:
         least = 100 * bound(manoeuvre) / np.abs(truth[:9])
-        every: dict[str, list[Found]] = {BOUND: [dict(zip(NINE, least.tolist(), strict=True))]}
+        every: dict[str, list[Found]] = {
+            BOUND: [dict(zip(IDENTIFIED_NAMES, least.tolist(), strict=True))]
+        }
         for seed in SEEDS:
             trial = sail(manoeuvre, seed)
             for name, found in _by_each(trial, truth, seed):
                 every.setdefault(name, []).append(found)
         print(f"\n**{manoeuvre}**\n")
-        print(f"| % | {' | '.join(NINE)} | rms w (°/s) | rms v (m/s) |")
-        print("|---" * (len(NINE) + 3) + "|")
+        print(f"| % | {' | '.join(IDENTIFIED_NAMES)} | rms w (°/s) | rms v (m/s) |")
+        print("|---" * (len(IDENTIFIED_NAMES) + 3) + "|")
         for name, founds in every.items():
             print(f"| {name} | {' | '.join(_row(founds))} |")
 
 
 def _row(founds: list[Found]) -> Iterator[str]:
-    for key in (*NINE, "rms w", "rms v"):
+    for key in (*IDENTIFIED_NAMES, "rms w", "rms v"):
         median = np.median([abs(found.get(key, np.nan)) for found in founds])
         yield f"{median:.2g}" if np.isfinite(median) else "–"
 
@@ -68,12 +75,12 @@ def _by_each(trial: Segment, truth: Coefficients, seed: int) -> Iterator[tuple[s
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], len(true))
     wrong = true * (1 + OFF * signs)
     yield "the paper's scheme, the truth for a prior", _errors(trial, truth, _paper(trial, truth))
-    misled = truth._replace(**dict(zip(NINE, wrong.tolist(), strict=True)))
+    misled = truth._replace(**dict(zip(IDENTIFIED_NAMES, wrong.tolist(), strict=True)))
     yield "the paper's scheme, a prior off", _errors(trial, truth, _paper(trial, misled))
     priors = np.array([wrong, true * (1 - OFF * signs)])
     yield (
         "extended Kalman filter, a prior off",
-        _errors(trial, truth, augmented(free, priors).values[0, -1]),
+        _errors(trial, truth, parameter_ekf(free, priors).values[0, -1]),
     )
     yield "integral form, no prior", _errors(trial, truth, _integral(trial, truth))
     yield "output error, no prior", _errors(trial, truth, _nine(free))
@@ -83,14 +90,16 @@ def _by_each(trial: Segment, truth: Coefficients, seed: int) -> Iterator[tuple[s
 
 def _paper(trial: Segment, prior: Coefficients) -> FloatArray:
     states = paper_states(trial.signals, prior)
-    return np.concatenate([solved(rows) for rows in regression(trial.signals, prior, states)])
+    return np.concatenate(
+        [solve_window(rows) for rows in regression_rows(trial.signals, prior, states)]
+    )
 
 
 def _integral(trial: Segment, truth: Coefficients) -> FloatArray:
     found: dict[str, Coefficient] = {}
     for rows in weak_form(trial.signals, truth):  # of the truth the alphas alone are used
         found |= identify(rows)[0].coefficients
-    return np.array([found[name].value for name in NINE])
+    return np.array([found[name].value for name in IDENTIFIED_NAMES])
 
 
 def _nine(fit: OutputError) -> FloatArray:
@@ -107,5 +116,5 @@ def _errors(trial: Segment, truth: Coefficients, found: FloatArray) -> Found:
         for nine in (found, true)
     ]
     off = np.sqrt(np.mean((runs[0] - runs[1]) ** 2, axis=0))
-    errors = dict(zip(NINE, 100 * (found / true - 1), strict=True))
+    errors = dict(zip(IDENTIFIED_NAMES, 100 * (found / true - 1), strict=True))
     return errors | {"rms w": float(np.degrees(off[0])), "rms v": float(off[1])}

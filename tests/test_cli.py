@@ -522,7 +522,7 @@ def test_a_ship_is_identified_validated_written_sailed_and_replayed(
     assert "vessel file: found.toml" in said.err
     found = json.loads(Path("f.json").read_text())
     assert found["coefficients"]["d"]["value"] == pytest.approx(1 / 7500, rel=3e-3)
-    assert found["known"]["T3"] == 0.5
+    assert found["fixed"]["T3"] == 0.5
     (validation,) = found["validation"]
     assert validation["rms"]["yaw_rate"] < np.radians(0.02)
     simulate = "record simulate zigzag-20-20 --vessel found.toml --duration 200 -o again.mcap"

@@ -28,13 +28,13 @@ TOLD_BY = {
 }
 
 
-def told_by(name: str) -> str:
+def manoeuvres_to_identify(name: str) -> str:
     """The manoeuvre that would tell a parameter of any model, in words."""
     return TOLD_BY.get(name, "a manoeuvre that moves what it multiplies")
 
 
 @dataclass(frozen=True)
-class Ties:
+class TieCheck:
     """Whether b1 = -d holds, by a fit in the free form."""
 
     sum_over_d: float  # (b1 + d) / d: zero where it holds
@@ -65,7 +65,7 @@ class Ties:
         )
 
 
-def ties_of(fit: OutputError) -> Ties | None:
+def check_ties(fit: OutputError) -> TieCheck | None:
     """Whether the paper's ties hold for the ship of a fit to either of its forms; else None."""
     if fit.problem.model.name not in ("burylin", "burylin-tied"):
         return None
@@ -78,7 +78,7 @@ def ties_of(fit: OutputError) -> Ties | None:
     covariance = found.covariance[np.ix_((i, j), (i, j))]
     slope = np.array([1 / d, -b1 / d**2])
     std = float(np.sqrt(slope @ covariance @ slope))
-    return Ties(float((b1 + d) / d), std, bool(b1 + 1.96 * found.std[i] >= 0))
+    return TieCheck(float((b1 + d) / d), std, bool(b1 + 1.96 * found.std[i] >= 0))
 
 
 def _in_free_form(fit: OutputError) -> OutputError:

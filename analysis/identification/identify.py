@@ -7,8 +7,8 @@ import numpy as np
 
 from analysis.identification.comparison.history import ParameterHistory, two_priors
 from analysis.identification.comparison.paper_scheme import paper_scheme
-from analysis.identification.comparison.parameter_ekf import augmented
-from analysis.identification.comparison.windows import windows
+from analysis.identification.comparison.parameter_ekf import parameter_ekf
+from analysis.identification.comparison.windows import window_estimates
 from shiplog.errors import LogError, UsageError
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model, loadable_models, ship_model
@@ -16,15 +16,15 @@ from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray, Log
 from shiplog.vessel.vessel import Vessel
 
-from .advice import Ties, ties_of, told_by
-from .model_selection import Candidate, compare
+from .advice import TieCheck, check_ties, manoeuvres_to_identify
+from .model_selection import Candidate, rank_models
 from .output_error import OutputError, output_error, pose
 from .prior_sensitivity import PriorSensitivity, prior_sensitivity
 from .problem import residuals
 from .runs import contradictions, distinct_runs, ship_of
 from .segment import Segment
 from .uncertainty import Uncertainty, uncertainty
-from .validation import Validation, rms_of, validate
+from .validation import Validation, nan_rms, validate
 
 AUTO = "auto"
 ALPHAS = ("alpha1", "alpha2", "alpha3")
@@ -51,15 +51,15 @@ class IdentifiedShip:
     model: Model
     fit: OutputError
     uncertainty: Uncertainty
-    echo: PriorSensitivity
-    courses: tuple[ParameterHistory, ...]  # of other methods, for comparison
+    prior_sensitivity: PriorSensitivity
+    histories: tuple[ParameterHistory, ...]  # of other methods, for comparison
     runs: tuple[RunFit, ...]
     validations: tuple[Validation, ...]
     candidates: tuple[Candidate, ...]  # the best first; empty where the model was named
-    ties: Ties | None  # of the paper's model
+    ties: TieCheck | None  # of the paper's model
     vessel: Vessel | None  # whose length and steering gear were taken
     length_given: bool
-    known: Mapping[str, float]  # parameters that were not sought
+    fixed: Mapping[str, float]  # parameters that were not sought
     advice: Mapping[str, str] = field(default_factory=dict)  # by parameter: what would tell it
     warnings: tuple[str, ...] = ()
     data_lost: bool = False
@@ -75,7 +75,7 @@ class IdentifiedShip:
         return self.uncertainty.covariance
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def identifiable(self) -> tuple[str, ...]:
         """The parameters that these logs do tell."""
         return tuple(n for n in self.uncertainty.names if n not in self.uncertainty.unidentifiable)
 
@@ -85,7 +85,7 @@ def identify(
     model: str | Model | None = None,
     *,
     validation_logs: Sequence[Log] = (),
-    known: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
     vessel: Vessel | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> IdentifiedShip:
@@ -101,7 +101,7 @@ def identify(
     """
     if not logs:
         raise UsageError("no log to identify from; give at least one")
-    stated = dict(known or {})
+    stated = dict(fixed or {})
     model = model or ("burylin-tied" if "T3" in stated else "burylin")
     considered, warnings = _considered(model)
     _require_known(considered, stated)
@@ -124,7 +124,7 @@ def identify(
     echo = prior_sensitivity(fit, found)
     found = replace(found, prior_share=np.fmax(found.prior_share, echo.shares))
     priors = two_priors(found, fit.problem.bounds)
-    courses = augmented(fit, priors), windows(fit), paper_scheme(fit, priors)
+    histories = parameter_ekf(fit, priors), window_estimates(fit), paper_scheme(fit, priors)
     on_progress("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
     every = [*runs, *held_out]
@@ -137,12 +137,12 @@ def identify(
             "little; state it in a vessel file"
         )
     return IdentifiedShip(
-        fit.problem.model, fit, found, echo, tuple(each for each in courses if each is not None),
+        fit.problem.model, fit, found, echo, tuple(each for each in histories if each is not None),
         tuple(_run_fits(fit)), tuple(validations),
-        tuple(candidates), ties_of(fit), ship, length is not None,
+        tuple(candidates), check_ties(fit), ship, length is not None,
         {n: v for n, v in zip(fit.problem.model.names, fit.parameters.tolist(), strict=True)
          if n not in found.names},
-        {name: told_by(name) for name in found.unidentifiable},
+        {name: manoeuvres_to_identify(name) for name in found.unidentifiable},
         tuple(warnings), any(run.data_lost for run in every),
     )  # fmt: skip
 
@@ -203,7 +203,7 @@ def _compared(
     found: list[Candidate] = []
     for i, model in enumerate(models):
         on_progress(f"cross-validate {model.name}", i / len(models))
-        found += compare(segments, [model], known=_settled(model, known, ship), length=length)
+        found += rank_models(segments, [model], known=_settled(model, known, ship), length=length)
     return sorted(found, key=lambda candidate: (candidate.fit is None, candidate.score))
 
 
@@ -226,7 +226,7 @@ def _run_fits(fit: OutputError) -> Iterator[RunFit]:
         omegas = own[waves :: 1 + 2 * len(problem.outputs)]
         yield RunFit(
             segment.name, (len(segment) - 1) * segment.dt_secs,
-            {output: rms_of(left[i][:, c]) for c, output in enumerate(problem.outputs)},
+            {output: nan_rms(left[i][:, c]) for c, output in enumerate(problem.outputs)},
             float(own[at]) if has_offset else 0.0,
             {problem.outputs[c]: float(own[biases + k])
              for k, (c, _) in enumerate(problem.biases)},
@@ -243,7 +243,7 @@ def _unexplained(fit: OutputError) -> Iterator[str]:
         for c, output in enumerate(problem.outputs):
             measured = segment.measured[:, MODEL_OUTPUTS.index(output)]
             white = max(float(np.mean(spread.usual[:, c] ** 2)) - fit.noises[c].slow ** 2, 0.0)
-            stays = np.sqrt(max(rms_of(left[:, c]) ** 2 - white, 0.0))
+            stays = np.sqrt(max(nan_rms(left[:, c]) ** 2 - white, 0.0))
             size = float(np.nanstd(measured)) if np.isfinite(measured).any() else 0.0
             if stays > UNEXPLAINED * size and stays**2 > white:
                 yield (
@@ -279,5 +279,5 @@ def _doubts(
     if set(found.unidentifiable) == set(found.names):
         yield "nothing is identifiable from these logs: no value of the model is to be believed"
     for validation in validations:
-        if validation.ran_away:
+        if validation.diverged:
             yield f"{validation.segment.name}: the simulated ship runs away: no prediction of it"

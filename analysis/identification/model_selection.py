@@ -41,7 +41,7 @@ class Candidate:
         return float(np.nanmean(judged)) if np.isfinite(judged).any() else WORST
 
 
-def compare(
+def rank_models(
     segments: Sequence[Segment],
     models: Sequence[Model],
     **settings: Any,  # noqa: ANN401

@@ -32,7 +32,7 @@ class Validation:
     figures: tuple[Figure, ...]  # of a circle or of a zig-zag
 
     @property
-    def ran_away(self) -> bool:
+    def diverged(self) -> bool:
         """Whether the simulated ship did."""
         return not bool(np.isfinite(self.simulated).all())
 
@@ -46,10 +46,10 @@ def validate(fit: OutputError, run: Run) -> list[Validation]:
 
 
 def _validation(fit: OutputError, segment: Segment, fixes: FloatArray | None) -> Validation:
-    course = 0.0 if fixes is None or segment.has("heading") else first_course(segment, fixes)
+    course = 0.0 if fixes is None or segment.has("heading") else initial_heading(segment, fixes)
     if course is None:  # the fixes are north and east of a ship that headed nobody knows where
         course, fixes = 0.0, None
-    measured = known_throughout(segment, course)
+    measured = filled_measurements(segment, course)
     simulated = predict(fit, _headed(segment, measured))
     track, sailed = made_good(simulated, segment.dt_secs), made_good(measured, segment.dt_secs)
     if fixes is not None:
@@ -57,16 +57,16 @@ def _validation(fit: OutputError, segment: Segment, fixes: FloatArray | None) ->
     off = simulated - segment.measured
     predicted = (*fit.problem.model.outputs, "heading")
     rms = {
-        name: rms_of(off[:, i])
+        name: nan_rms(off[:, i])
         for i, name in enumerate(MODEL_OUTPUTS)
         if segment.has(name) and name in predicted
     }
-    rms["track"] = rms_of(np.hypot(*(track - sailed).T))
+    rms["track"] = nan_rms(np.hypot(*(track - sailed).T))
     figures = tuple(figures_of(segment, measured, sailed, simulated, track))
     return Validation(segment, simulated, track, sailed, rms, figures)
 
 
-def known_throughout(segment: Segment, course: float = 0.0) -> FloatArray:
+def filled_measurements(segment: Segment, course: float = 0.0) -> FloatArray:
     """What was measured, its holes filled in.
 
     A heading nobody measured is the turning summed up, from the `course` she began on.
@@ -84,7 +84,7 @@ def _filled_in(values: FloatArray) -> FloatArray:
     return np.interp(np.arange(len(values)), at, values[at]) if len(at) > 1 else 0.0 * values
 
 
-def first_course(segment: Segment, fixes: FloatArray) -> float | None:
+def initial_heading(segment: Segment, fixes: FloatArray) -> float | None:
     """The course a ship without heading began on, in rad: that which lays her way on the fixes.
 
     Only those before the rudder moves are looked at, for in a turn she drifts. None where they are
@@ -96,10 +96,10 @@ def first_course(segment: Segment, fixes: FloatArray) -> float | None:
     known = np.flatnonzero(np.isfinite(fixes[:before]).all(axis=1))[:most]
     if len(known) <= least:
         return None
-    sailed = made_good(known_throughout(segment), segment.dt_secs)[known]
+    sailed = made_good(filled_measurements(segment), segment.dt_secs)[known]
     way, seen = ((each - each.mean(axis=0)) @ [1, 1j] for each in (sailed, fixes[known]))
     course = float(np.angle(np.vdot(way, seen)))
-    off = rms_of(np.abs(way * np.exp(1j * course) - seen))
+    off = nan_rms(np.abs(way * np.exp(1j * course) - seen))
     return course if off < ASTRAY * abs(way[-1] - way[0]) else None
 
 
@@ -118,7 +118,7 @@ def _from_first_fix(fixes: FloatArray, track: FloatArray) -> FloatArray:
     return fixes - fixes[known[0]] + track[known[0]] if len(known) else fixes
 
 
-def rms_of(off: FloatArray) -> float:
+def nan_rms(off: FloatArray) -> float:
     """The root of the mean square of what is known; NaN where nothing is."""
     known = off[np.isfinite(off)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan

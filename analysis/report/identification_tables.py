@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from analysis.identification.identify import IdentifiedShip
 from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
 from analysis.identification.validation import Validation
 from analysis.manoeuvres.indices import Figure
-from shiplog import __version__
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.units import CATALOGUE, factor
 
@@ -23,9 +21,9 @@ ALIKE, MOST_PAIRS = 0.97, 3  # of correlations that are told
 UNIT = {name: CATALOGUE[name].unit for name in MODEL_OUTPUTS} | {"track": "m"}
 
 
-def sections(found: IdentifiedShip) -> tuple[Section, ...]:
+def identification_tables(found: IdentifiedShip) -> tuple[Section, ...]:
     """Tables in the units people use, and what is to be said of them."""
-    made = [_coefficients(found), _echoes(found), _runs(found)]
+    made = [_coefficients(found), _prior_shares(found), _runs(found)]
     if found.validations:
         made += [_held_out(found), *(_figures(v) for v in found.validations if v.figures)]
     if found.candidates:
@@ -37,7 +35,7 @@ def _comparison(found: IdentifiedShip) -> Section:
     rows = []
     for candidate in found.candidates:
         told = candidate.fit is not None
-        off = _mean_misfits(candidate)
+        off = mean_misfits(candidate)
         rows.append(
             (
                 candidate.model.name,
@@ -56,7 +54,8 @@ def _comparison(found: IdentifiedShip) -> Section:
     return Section(title, columns, tuple(rows), (remark,))
 
 
-def _mean_misfits(candidate: Candidate) -> list[float]:
+def mean_misfits(candidate: Candidate) -> list[float]:
+    """Return the mean relative misfit of each judged output; NaN where none was measured."""
     columns = [column[np.isfinite(column)] for column in candidate.misfits[:, JUDGED_COLUMNS].T]
     return [float(np.mean(column)) if len(column) else np.nan for column in columns]
 
@@ -71,7 +70,7 @@ def _coefficients(found: IdentifiedShip) -> Section:
             rows.append((name, "not identifiable", "", "", share, unit))
         else:
             rows.append((name, f"{value:.5g}", f"± {half:.2g}", f"± {bound:.2g}", share, unit))
-    for name, value in found.known.items():
+    for name, value in found.fixed.items():
         rows.append((name, f"{value:.5g}", "stated", "", "", found.model.parameter(name).unit))
     columns = ("coefficient", "value", "95 %", "bound", "echo", "unit")
     title = f"Coefficients: {found.model.title}"
@@ -120,9 +119,9 @@ def _by_advice(found: IdentifiedShip) -> dict[str, list[str]]:
     return grouped
 
 
-def _echoes(found: IdentifiedShip) -> Section:
+def _prior_shares(found: IdentifiedShip) -> Section:
     """How much of each coefficient is prior, by each method that begins with one."""
-    by_method = _echoes_by_method(found)
+    by_method = prior_shares_by_method(found)
     rows = tuple(
         (name, *(_percent(shares.get(name, np.nan)) for shares in by_method.values()))
         for name in found.uncertainty.names
@@ -138,11 +137,14 @@ def _echoes(found: IdentifiedShip) -> Section:
     )
 
 
-def _echoes_by_method(found: IdentifiedShip) -> dict[str, dict[str, float]]:
+def prior_shares_by_method(found: IdentifiedShip) -> dict[str, dict[str, float]]:
+    """Return the share of prior of each parameter, by method."""
     told = {FITTED: dict(zip(found.uncertainty.names, found.uncertainty.prior_share, strict=True))}
-    for courses in found.courses:
-        if len(courses.priors) > 1:
-            told[courses.method] = dict(zip(courses.names, courses.usual_echo, strict=True))
+    for histories in found.histories:
+        if len(histories.priors) > 1:
+            told[histories.method] = dict(
+                zip(histories.names, histories.median_prior_share, strict=True)
+            )
     return told
 
 
@@ -214,105 +216,3 @@ def _unit(unit: str) -> str:
 def _shown(value: float, unit: str, digits: int = 3) -> str:
     """A number in the unit people use."""
     return f"{value * factor(unit, _unit(unit)):.{digits}g}" if isfinite(value) else ""
-
-
-def as_json(found: IdentifiedShip) -> dict[str, Any]:
-    """The same as plain numbers in SI; what is not a number is None."""
-    told = found.uncertainty
-    told_of = {
-        "shiplog": __version__,
-        "model": {"name": found.model.name, "title": found.model.title},
-        "scale": {
-            "secs": found.fit.problem.scale.secs,
-            "speed": found.fit.problem.scale.speed,
-            "rpm": found.fit.problem.scale.rpm,
-            "length_given": found.length_given,
-        },
-        "coefficients": {
-            name: _coefficient(found, i) for i, name in enumerate(told.names)
-        },
-        "known": dict(found.known),
-        "echo": {
-            method: {name: float(share) for name, share in shares.items()}
-            for method, shares in _echoes_by_method(found).items()
-        },
-        "covariance": {"of": list(told.names), "values": told.covariance.tolist()},
-        "correlation": told.correlation.tolist(),
-        "condition": told.condition,
-        "enlarged": told.enlarged,
-        "agreement": {
-            "logs": list(told.agreement.names),
-            "by_own_noise": list(told.agreement.by_own_noise),
-            "by_noise_of_all": list(told.agreement.by_noise_of_all),
-            "contradiction": told.agreement.contradiction,
-            "odd": told.agreement.odd,
-        },
-        "ties": None if found.ties is None else {
-            "sum_over_d": found.ties.sum_over_d,
-            "std": found.ties.std,
-            "contradicted": found.ties.contradicted,
-            "advice": found.ties.advice(tied=found.model.name == "burylin-tied"),
-        },
-        "fit": [
-            {
-                "log": run.name, "duration_secs": run.duration_secs, "rms": dict(run.rms),
-                "rudder_offset": run.rudder_offset, "biases": dict(run.biases),
-                "wave_secs": list(run.wave_secs),
-            }
-            for run in found.runs
-        ],
-        "validation": [_validation(each) for each in found.validations],
-        "models": [
-            {
-                "name": c.model.name, "score": c.score if c.fit is not None else None,
-                "misfits": dict(zip(
-                    (MODEL_OUTPUTS[i] for i in JUDGED_COLUMNS), _mean_misfits(c), strict=True
-                )),
-            }
-            for c in found.candidates
-        ],
-        "warnings": list(found.warnings),
-    }  # fmt: skip
-    return _finite(told_of)  # type: ignore[no-any-return]
-
-
-def _coefficient(found: IdentifiedShip, i: int) -> dict[str, Any]:
-    """A value that the logs do not tell stands as None: what is printed is believed."""
-    told = found.uncertainty
-    name = told.names[i]
-    unidentifiable = name in told.unidentifiable
-    return {
-        "value": None if unidentifiable else told.values[i],
-        "unit": found.model.parameter(name).unit,
-        "identifiable": not unidentifiable,
-        "interval": None if unidentifiable else told.interval[i].tolist(),
-        "std": told.std[i],
-        "cramer_rao_std": told.bound[i],
-        "prior_share": told.prior_share[i],
-        "what_would_tell": found.advice.get(name),
-    }
-
-
-def _validation(each: Validation) -> dict[str, Any]:
-    return {
-        "log": each.segment.name,
-        "ran_away": each.ran_away,
-        "rms": each.rms,
-        "figures": [
-            {
-                "name": f.name, "unit": f.unit, "measured": f.measured,
-                "simulated": f.simulated, "error": f.error,
-            }
-            for f in each.figures
-        ],
-    }  # fmt: skip
-
-
-def _finite(value: Any) -> Any:  # noqa: ANN401 - walks a tree of JSON
-    if isinstance(value, dict):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_finite(inner) for inner in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if isfinite(value) else None
-    return value

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.identification.comparison import paper_scheme, parameter_ekf, windows
 from analysis.identification.comparison.history import ParameterHistory, run_secs
+from analysis.identification.comparison.paper_scheme import PAPER_METHOD
+from analysis.identification.comparison.parameter_ekf import EKF_METHOD
+from analysis.identification.comparison.windows import WINDOW_METHOD
 from analysis.identification.identify import IdentifiedShip
 from analysis.identification.segment import Segment
 from analysis.identification.validation import Validation
@@ -34,13 +36,13 @@ from .track_chart import Chart, chart
 
 COLOURS = dict(zip(MODEL_OUTPUTS, (BLUE, ORANGE, CYAN, GREEN), strict=True))
 METHODS = {  # by what name, on top of those before it in the alphabet, and in which colour
-    paper_scheme.METHOD: ("a_paper", RED),
-    parameter_ekf.METHOD: ("kalman", BLUE),
-    windows.METHOD: ("windows", GREEN),
+    PAPER_METHOD: ("a_paper", RED),
+    EKF_METHOD: ("kalman", BLUE),
+    WINDOW_METHOD: ("windows", GREEN),
 }
 FAINT = 70  # of 255: how a course that echoes its prior is drawn
 LAG_SECS, LAGS_SHARE = 300.0, 0.25  # up to which lag, and up to which share of a run
-GUIDE = 2.0  # standard deviations
+SIGMA_LIMIT = 2.0  # standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +151,8 @@ def _residual(origin: str, segment: Segment, name: str, normalised: FloatArray) 
     ends = segment.signals.time_secs[[0, -1]]
     return Panel(
         f"{origin}/residual_{name}", f"{name.replace('_', ' ')} residual [usual std]",
-        (thinned(drawn), _guides(ends, GUIDE)),
-        limits(values, np.array([-2.0, 2.0]) * GUIDE),
+        (thinned(drawn), _guides(ends, SIGMA_LIMIT)),
+        limits(values, np.array([-2.0, 2.0]) * SIGMA_LIMIT),
     )  # fmt: skip
 
 
@@ -171,10 +173,10 @@ def _correlation(
         line = Line(name.replace("_", " "), found[1:], COLOURS[name], 1.5)
         series.append(thinned(Series(name, lags * segment.dt_secs, (line,))))
         counts.append(count)
-    bound = GUIDE / np.sqrt(max(min(counts, default=1), 1))
+    bound = SIGMA_LIMIT / np.sqrt(max(min(counts, default=1), 1))
     series.append(_guides(np.array([0.0, lag_secs]), bound))
-    courses = [line.values for drawn in series for line in drawn.lines]
-    axis = limits(*courses, np.array([-0.2, 1.0]))
+    histories = [line.values for drawn in series for line in drawn.lines]
+    axis = limits(*histories, np.array([-0.2, 1.0]))
     title = "autocorrelation of the residuals over the lag; grey: ±2σ if they were white"
     return Panel(f"{origin}/correlation", title, tuple(series), axis)
 
@@ -211,7 +213,7 @@ def _track(validation: Validation, length: float | None) -> Chart | None:
     )  # fmt: skip
 
 
-def coefficient_panels(found: IdentifiedShip) -> list[Panel]:
+def parameter_panels(found: IdentifiedShip) -> list[Panel]:
     """Each coefficient that was sought: its value and interval, and the courses of all methods."""
     end = run_secs(found.fit.problem.segments)
     return [_coefficient(found, i, end) for i in range(len(found.uncertainty.names))]
@@ -220,13 +222,13 @@ def coefficient_panels(found: IdentifiedShip) -> list[Panel]:
 def _coefficient(found: IdentifiedShip, i: int, end: float) -> Panel:
     told = found.uncertainty
     name, value, half = told.names[i], told.values[i], 1.96 * told.std[i]
-    courses = [each for each in found.courses if name in each.names]
-    priors = [each.priors[:, each.names.index(name)] for each in courses if len(each.priors) > 1]
+    histories = [each for each in found.histories if name in each.names]
+    priors = [each.priors[:, each.names.index(name)] for each in histories if len(each.priors) > 1]
     reach = max([float(np.ptp(each)) / 2 for each in priors], default=abs(value) / 3)
     unit = found.model.parameter(name).unit
     prefix, scale = ("", 1.0) if unit == "1" else thousands(abs(value))
     series = [_final(value * scale, half * scale, end, unidentifiable=name in told.unidentifiable)]
-    for each in courses:
+    for each in histories:
         series += _course(each, name, scale, limit=(value, 3 * reach))
     said = (
         "not identifiable" if name in told.unidentifiable else rounded(value * scale, half * scale)
@@ -244,21 +246,21 @@ def _final(value: float, half: float, end: float, *, unidentifiable: bool) -> Se
 
 
 def _course(
-    courses: ParameterHistory, name: str, scale: float, limit: tuple[float, float]
+    histories: ParameterHistory, name: str, scale: float, limit: tuple[float, float]
 ) -> Sequence[Series]:
     """One method's courses from its priors, faint where they echo; nothing beyond the limit."""
-    i, (slug, colour) = courses.names.index(name), METHODS[courses.method]
-    echoes = courses.echoing[:, i]
+    i, (slug, colour) = histories.names.index(name), METHODS[histories.method]
+    echoes = histories.mostly_prior[:, i]
     lines: list[Line] = []
-    for values, stds in zip(courses.values[:, :, i], courses.stds[:, :, i], strict=True):
+    for values, stds in zip(histories.values[:, :, i], histories.stds[:, :, i], strict=True):
         seen = np.where(np.abs(values - limit[0]) > limit[1], np.nan, values) * scale
         pale: Colour = (*colour[:3], FAINT)
-        lines.append(Line(f"{courses.method}, echoing", np.where(echoes, seen, np.nan), pale))
+        lines.append(Line(f"{histories.method}, echoing", np.where(echoes, seen, np.nan), pale))
         sure = np.where(echoes, np.nan, seen)
-        if len(courses.values) == 1:
+        if len(histories.values) == 1:
             # a window less sure than the panel is high says nothing, and swings wildly
-            sure = np.where(GUIDE * stds > limit[1] / 3, np.nan, sure)
-            lines += banded(courses.method, sure, GUIDE * stds * scale, colour)
+            sure = np.where(SIGMA_LIMIT * stds > limit[1] / 3, np.nan, sure)
+            lines += banded(histories.method, sure, SIGMA_LIMIT * stds * scale, colour)
         else:
-            lines.append(Line(courses.method, sure, colour, 1.5))
-    return [thinned(Series(slug, courses.time_secs, tuple(lines)))]
+            lines.append(Line(histories.method, sure, colour, 1.5))
+    return [thinned(Series(slug, histories.time_secs, tuple(lines)))]

@@ -9,10 +9,10 @@ import rerun.blueprint as rrb
 
 from analysis.identification.comparison.history import run_secs
 from analysis.identification.identify import IdentifiedShip
-from analysis.report.identification_tables import sections
+from analysis.report.identification_tables import identification_tables
 from analysis.report.replay_tables import page
 
-from .identification_panels import RunSheet, coefficient_panels, run_sheets
+from .identification_panels import RunSheet, parameter_panels, run_sheets
 from .panels import Panel
 from .rerun_io import (
     chart_view,
@@ -42,10 +42,12 @@ def write_review(found: IdentifiedShip, path: str | os.PathLike[str]) -> None:
     Raises `ShiplogError` where `path` cannot be written to.
     """
     recording = _recording(found)
-    sheets, coefficients = list(run_sheets(found)), coefficient_panels(found)
+    sheets, coefficients = list(run_sheets(found)), parameter_panels(found)
     with saving(recording, path):
         rr.send_blueprint(_blueprint(found, sheets, coefficients), recording=recording)
-        text = page(f"{found.model.title}, identified", sections(found), found.warnings)
+        text = page(
+            f"{found.model.title}, identified", identification_tables(found), found.warnings
+        )
         send_text(recording, "summary", KEY + text)
         _send(recording, coefficients, sheets[0].start_ns)
         for i, sheet in enumerate(sheets):

@@ -27,9 +27,9 @@ from analysis.identification.comparison.paper_scheme import (
     Q,
     R,
     paper_states,
-    regression,
-    solved,
-    windowed,
+    regression_rows,
+    solve_window,
+    window_coefficients,
 )
 from analysis.regression.coefficients import identify
 from analysis.regression.sliding import History
@@ -145,7 +145,7 @@ def estimates(signals: Signals, prior: Coefficients, *, jumps: bool = True) -> F
 
 def identified(signals: Signals, c: Coefficients, x: FloatArray) -> FloatArray:
     """The paper's nine coefficients from all of a run, (9,)."""
-    return np.concatenate([solved(rows) for rows in regression(signals, c, x)])
+    return np.concatenate([solve_window(rows) for rows in regression_rows(signals, c, x)])
 
 
 # ------------------------------------------------------------------------------------- the run
@@ -453,10 +453,10 @@ def states_figure(
 
 def coefficient_figures(signals: Signals, c: Coefficients, x: FloatArray) -> None:
     """Figures 3 and 4: the coefficients window by window, the paper's beside weak form."""
-    ends, found = windowed(signals, c, x)
+    ends, found = window_coefficients(signals, c, x)
     signs = np.where(np.arange(9) % 2, -1.0, 1.0)
     wrong = with_nine(c, nine(c) * (1 + 0.2 * signs))
-    _, misled = windowed(signals, c, estimates(signals, wrong, jumps=False))
+    _, misled = window_coefficients(signals, c, estimates(signals, wrong, jumps=False))
     yaw, surge = in_weak_form(signals, c)[1]
     for which, history, height in ((3, surge, 2.6), (4, yaw, 4.4)):
         names = history.names
@@ -496,7 +496,7 @@ def settling() -> None:
     worst, ended, right = [], [], []
     for seed in SEEDS:
         _, signals = measured("table1", "paper", seed)
-        ends, found = windowed(signals, c, estimates(signals, c, jumps=False))
+        ends, found = window_coefficients(signals, c, estimates(signals, c, jumps=False))
         worst.append(np.abs(percent(found[ends <= 50], nine(c))).max(axis=0))
         told = ends <= TOLD_SECS  # beyond, no window has a moving rudder, and e is zero
         ended.append(within(ends[told], found[told], found[told][-1]))
@@ -572,12 +572,12 @@ def circularity() -> None:
             x = estimates(signals, with_nine(c, draw))
             off.append(np.abs(percent(identified(signals, c, x), true)))
             for values, equation in zip(
-                (draw[:6], draw[6:]), regression(signals, c, x), strict=True
+                (draw[:6], draw[6:]), regression_rows(signals, c, x), strict=True
             ):
                 equation[:, -1] = (
                     equation[:, :-1] @ values
                 )  # w'' and v' as the prior's (4) has them
-                copied = max(copied, float(np.abs(percent(solved(equation), values)).max()))
+                copied = max(copied, float(np.abs(percent(solve_window(equation), values)).max()))
         rows.append((f"the paper's, {said}", *rounded(np.median(off, axis=0))))
         ours = np.abs(percent(in_weak_form(signals, c)[0], true))
         rows.append((f"weak form, {said}", *rounded(ours)))
@@ -667,7 +667,7 @@ def table2() -> None:
         x = estimates(signals, c, jumps=False)
         for name, values in (
             ("whole", identified(signals, c, x)),
-            ("last", windowed(signals, c, x)[1][-1]),
+            ("last", window_coefficients(signals, c, x)[1][-1]),
             ("weak", in_weak_form(signals, c)[0]),
         ):
             off = truth_of(replace(vessel, coefficients=with_nine(c, values))) - true

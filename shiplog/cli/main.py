@@ -169,7 +169,8 @@ def _run_identify(arguments: argparse.Namespace) -> int:
     from analysis.identification.identify import identify
     from analysis.identification.runs import require_distinct
     from analysis.identification.vessel_file import vessel_toml
-    from analysis.report.identification_tables import as_json, sections
+    from analysis.report.identification_json import identification_json
+    from analysis.report.identification_tables import identification_tables
     from shiplog.mcap.stream import open_log
     from shiplog.vessel.vessel import load_vessel
 
@@ -193,7 +194,7 @@ def _run_identify(arguments: argparse.Namespace) -> int:
             logs,
             arguments.model,
             validation_logs=validation_logs,
-            known=known(arguments.known),
+            fixed=known(arguments.known),
             vessel=vessel,
             on_progress=tell,
         )
@@ -202,12 +203,12 @@ def _run_identify(arguments: argparse.Namespace) -> int:
         with replacing(arguments.output) as part:
             part.write_text(text, encoding="utf-8")
     if arguments.json:
-        _write_json(as_json(found), arguments.json)
+        _write_json(identification_json(found), arguments.json)
     if review:
         from analysis.view.identification_review import write_review
 
         write_review(found, review)
-    _print_tables(sections(found), to_stderr=arguments.json == "-")
+    _print_tables(identification_tables(found), to_stderr=arguments.json == "-")
     _warn(found.warnings)
     if review:
         _show_review(review, view=arguments.view)

@@ -33,7 +33,7 @@ class ParameterHistory:
     priors: FloatArray  # (q, p); q is 1 and they are NaN where there are none
 
     @property
-    def echo(self) -> FloatArray:
+    def prior_share(self) -> FloatArray:
         """(k, p) of each value, how much of it is the prior: 0 for none of it, 1 for all.
 
         A method that makes errors grow goes beyond 1. Zero where there are no priors.
@@ -44,18 +44,18 @@ class ParameterHistory:
         return np.asarray(apart / np.abs(self.priors[0] - self.priors[1]))
 
     @property
-    def echoing(self) -> NDArray[np.bool_]:
+    def mostly_prior(self) -> NDArray[np.bool_]:
         """(k, p) where a value is more prior than data, or will be so again.
 
         Two courses that cross have learnt nothing there.
         """
-        later = np.fmax.accumulate(self.echo[::-1])[::-1]
+        later = np.fmax.accumulate(self.prior_share[::-1])[::-1]
         return np.asarray(later > ECHO)
 
     @property
-    def usual_echo(self) -> FloatArray:
+    def median_prior_share(self) -> FloatArray:
         """(p,) the median over the latter half; NaN where nothing is told."""
-        half = self.echo[len(self.time_secs) // 2 :]
+        half = self.prior_share[len(self.time_secs) // 2 :]
         return np.array([_median(column) for column in half.T])
 
 

@@ -20,10 +20,10 @@ from shiplog.vessel.settings import FilterSettings
 
 from .history import ParameterHistory, begins_secs, with_breaks
 
-METHOD = "the paper's scheme"
+PAPER_METHOD = "the paper's scheme"
 Q, R = 0.01, 400.0  # of its filter
 WINDOW_SECS, STRIDE_SECS = 200.0, 2.0
-NINE = Coefficients._fields[:9]  # what it identifies; the alphas are known
+IDENTIFIED_NAMES = Coefficients._fields[:9]  # what it identifies; the alphas are known
 
 
 def paper_scheme(fit: OutputError, priors: FloatArray) -> ParameterHistory | None:
@@ -35,15 +35,17 @@ def paper_scheme(fit: OutputError, priors: FloatArray) -> ParameterHistory | Non
     if problem.model.kind is not Coefficients:
         return None
     parts = [list(_courses(problem.segments, _coefficients(fit, prior))) for prior in priors]
-    wanted = [NINE.index(name) for name in problem.free_names if name in NINE]
-    columns = [i for i, name in enumerate(problem.free_names) if name in NINE]
+    wanted = [
+        IDENTIFIED_NAMES.index(name) for name in problem.free_names if name in IDENTIFIED_NAMES
+    ]
+    columns = [i for i, name in enumerate(problem.free_names) if name in IDENTIFIED_NAMES]
     times = with_breaks([time for time, _ in parts[0]])
     values = np.array([with_breaks([found for _, found in part]) for part in parts])
     values = values[:, :, wanted]
     values[values == 0] = np.nan  # of a column of zeros: the pseudo-inverse's 0 is nobody's
     names = tuple(problem.free_names[i] for i in columns)
     return ParameterHistory(
-        METHOD, names, times, values, np.full(values.shape, np.nan), priors[:, columns]
+        PAPER_METHOD, names, times, values, np.full(values.shape, np.nan), priors[:, columns]
     )
 
 
@@ -57,7 +59,9 @@ def _courses(
     segments: tuple[Segment, ...], prior: Coefficients
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
     for segment, begins in zip(segments, begins_secs(segments), strict=True):
-        ends, found = windowed(segment.signals, prior, paper_states(segment.signals, prior))
+        ends, found = window_coefficients(
+            segment.signals, prior, paper_states(segment.signals, prior)
+        )
         yield begins + ends, found
 
 
@@ -71,7 +75,7 @@ def paper_states(signals: Signals, prior: Coefficients, *, as_printed: bool = Tr
     return filter_states(signals, prior, noise, settings).states
 
 
-def windowed(
+def window_coefficients(
     signals: Signals, prior: Coefficients, states: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """When each window ends, in s, and its nine coefficients, (k,) and (k, 9).
@@ -82,15 +86,17 @@ def windowed(
     stride = max(1, round(STRIDE_SECS / dt))
     ends = np.arange(stride, len(states) + 1, stride)
     reach, parts = max(1, round(WINDOW_SECS / dt) // stride), []
-    for rows in regression(signals, prior, states):
+    for rows in regression_rows(signals, prior, states):
         strides = rows[: len(ends) * stride].reshape(len(ends), stride, -1)
         triangles = np.asarray(np.linalg.qr(strides, mode="r"))
         spans = ((max(0, k - reach), k) for k in range(1, len(ends) + 1))
-        parts.append([solved(np.concatenate(triangles[i:k])) for i, k in spans])
+        parts.append([solve_window(np.concatenate(triangles[i:k])) for i, k in spans])
     return ends * dt, np.concatenate([np.array(part) for part in parts], axis=1)
 
 
-def regression(signals: Signals, prior: Coefficients, states: FloatArray) -> Iterator[FloatArray]:
+def regression_rows(
+    signals: Signals, prior: Coefficients, states: FloatArray
+) -> Iterator[FloatArray]:
     """The rows of eq. (7), of yaw and of surge: regressors and, in the last column, the target.
 
     Of `prior` only the alphas are used.
@@ -103,7 +109,7 @@ def regression(signals: Signals, prior: Coefficients, states: FloatArray) -> Ite
     yield np.column_stack((w * w, v * v, n, v_dot))
 
 
-def solved(rows: FloatArray) -> FloatArray:
+def solve_window(rows: FloatArray) -> FloatArray:
     """Least squares by the pseudo-inverse of scaled columns; the last column is the target.
 
     NaN where the filter has run away.

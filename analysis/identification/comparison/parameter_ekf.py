@@ -25,7 +25,7 @@ from shiplog.types import FloatArray
 
 from .history import ParameterHistory, begins_secs, run_secs
 
-METHOD = "extended Kalman filter"
+EKF_METHOD = "extended Kalman filter"
 STRIDE_SECS, MOST_STRIDES = 2.0, 1000  # a ship's fastest motion takes several; of long runs more
 FIRST_STDS = 5.0  # of a sample's noise: how far off a first state may be
 ROUNDS = 2  # of linearisation, each where the one before has led
@@ -40,13 +40,13 @@ class _Belief:
     covariance: FloatArray
 
 
-def augmented(fit: OutputError, priors: FloatArray) -> ParameterHistory:
+def parameter_ekf(fit: OutputError, priors: FloatArray) -> ParameterHistory:
     """The courses of a fit's parameters by the extended Kalman filter, from two priors, (2, p)."""
     reach = np.abs(priors[0] - priors[1]) / 2
     parts = [list(_course(fit, prior, reach)) for prior in priors]
     times = np.array([time for time, _, _ in parts[0]])
     values, stds = (np.array([[row[i] for row in part] for part in parts]) for i in (1, 2))
-    return ParameterHistory(METHOD, fit.problem.free_names, times, values, stds, priors)
+    return ParameterHistory(EKF_METHOD, fit.problem.free_names, times, values, stds, priors)
 
 
 def _course(

@@ -13,10 +13,10 @@ from shiplog.types import FloatArray
 
 from .history import ParameterHistory, begins_secs, with_breaks
 
-METHOD = "windows in weak form"
+WINDOW_METHOD = "windows in weak form"
 
 
-def windows(fit: OutputError) -> ParameterHistory | None:
+def window_estimates(fit: OutputError) -> ParameterHistory | None:
     """The window by window histories of the paper's coefficients; else None.
 
     What a window cannot tell is NaN.
@@ -34,7 +34,7 @@ def windows(fit: OutputError) -> ParameterHistory | None:
     ]
     times, found, stds = (with_breaks(each) for each in zip(*parts, strict=True))
     return ParameterHistory(
-        METHOD, names, times, found[None], stds[None], np.full((1, len(names)), np.nan)
+        WINDOW_METHOD, names, times, found[None], stds[None], np.full((1, len(names)), np.nan)
     )
 
 

@@ -13,7 +13,8 @@ from analysis.identification.identify import IdentifiedShip, _best, identify
 from analysis.identification.prediction import predict
 from analysis.identification.runs import run_of
 from analysis.identification.vessel_file import vessel_toml
-from analysis.report.identification_tables import as_json, sections
+from analysis.report.identification_json import identification_json
+from analysis.report.identification_tables import identification_tables
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import Channel, LogError, TrialLog, UsageError, load_vessel
@@ -41,7 +42,7 @@ def a_log(
 def known_ship() -> IdentifiedShip:
     held_out = [a_log("turning-circle-35", 7, seconds=500.0), a_log("zigzag-10-10", 8, seconds=600)]
     return identify(
-        [a_log(), a_log(seed=1)], "burylin-tied", known={"T3": 0.5}, validation_logs=held_out
+        [a_log(), a_log(seed=1)], "burylin-tied", fixed={"T3": 0.5}, validation_logs=held_out
     )
 
 
@@ -67,8 +68,8 @@ def test_several_logs_give_the_ship_with_intervals_that_hold_her() -> None:
         middle = (low + high) / 2
         assert abs(truth[name] - middle) < 1.6 * (high - low) / 2, name
     assert found.coefficients["d"] == pytest.approx(truth["d"], rel=2e-3)
-    assert found.known == {"T3": 0.5, "alpha1": 0.0171, "alpha2": 0.0015, "alpha3": 0.0654}
-    assert found.told == found.uncertainty.names
+    assert found.fixed == {"T3": 0.5, "alpha1": 0.0171, "alpha2": 0.0015, "alpha3": 0.0654}
+    assert found.identifiable == found.uncertainty.names
     assert [run.name for run in found.runs] == ["zigzag-20-20-0.mcap", "zigzag-20-20-1.mcap"]
     assert found.warnings == ()
 
@@ -99,7 +100,7 @@ def test_the_model_is_chosen_by_what_it_never_saw() -> None:
     assert found.candidates[0].model is found.model
     assert found.model.name in ("burylin", "burylin-tied")
     assert len(found.candidates) == 7
-    assert "Models by cross-validation" in sections(found)[0].title
+    assert "Models by cross-validation" in identification_tables(found)[0].title
 
 
 def test_the_best_of_those_that_do_not_run_away_is_taken() -> None:
@@ -111,7 +112,7 @@ def test_the_best_of_those_that_do_not_run_away_is_taken() -> None:
 
 
 def test_t3_known_means_the_tied_form() -> None:
-    assert identify([a_log()], known={"T3": 0.5}).model.name == "burylin-tied"
+    assert identify([a_log()], fixed={"T3": 0.5}).model.name == "burylin-tied"
     assert identify([a_log()]).model.name == "burylin"
 
 
@@ -153,9 +154,9 @@ def test_the_vessel_file_is_the_ship_that_was_found() -> None:
 def test_what_is_not_identifiable_is_no_number_anywhere() -> None:
     found = identify([a_log("turning-circle-35", 3, seconds=500.0)])
     assert "b1" in found.uncertainty.unidentifiable
-    assert as_json(found)["coefficients"]["b1"]["value"] is None
-    assert "pull-out" in as_json(found)["coefficients"]["b1"]["what_would_tell"]
-    (row,) = [row for row in sections(found)[0].rows if row[0] == "b1"]
+    assert identification_json(found)["coefficients"]["b1"]["value"] is None
+    assert "pull-out" in identification_json(found)["coefficients"]["b1"]["what_would_tell"]
+    (row,) = [row for row in identification_tables(found)[0].rows if row[0] == "b1"]
     assert row[1:4] == ("not identifiable", "", "")
     line = next(line for line in vessel_toml(found).split("\n") if line.startswith("b1"))
     assert "NOT IDENTIFIABLE" in line
@@ -191,9 +192,9 @@ def test_no_logs_no_models_and_no_numbers_are_refused() -> None:
     with pytest.raises(UsageError, match="did you mean 'norrbin'"):
         identify([a_log()], "norbin")
     with pytest.raises(UsageError, match="no parameter 'T4'"):
-        identify([a_log()], known={"T4": 1.0})
+        identify([a_log()], fixed={"T4": 1.0})
     with pytest.raises(UsageError, match="finite"):
-        identify([a_log()], known={"b3": float("inf")})
+        identify([a_log()], fixed={"b3": float("inf")})
     with pytest.raises(UsageError, match="two logs or more"):
         identify([a_log()], "auto")
 
@@ -266,7 +267,7 @@ def test_a_log_slower_than_the_gyro_is_no_worse_than_its_samples_are_few(rate: f
     sensors = suite("paper", {"speed.rate_hz": rate})
     trial = simulate(vessel, "zigzag-20-20", duration_secs=400.0, seed=6, sensors=sensors,
                      vessel_toml=toml)  # fmt: skip
-    found = identify([as_log(trial, "slow.mcap")], known={"T3": 0.5})
+    found = identify([as_log(trial, "slow.mcap")], fixed={"T3": 0.5})
     truth = vessel.coefficients._asdict()
     for name, value, std in zip(
         found.uncertainty.names, found.uncertainty.values, found.uncertainty.std, strict=True
@@ -309,12 +310,12 @@ def test_a_gyro_that_never_moves_is_refused() -> None:
 def test_when_everything_is_known_nothing_is_sought() -> None:
     everything = VESSEL.coefficients._asdict()
     with pytest.raises(UsageError, match="nothing is left to seek"):
-        identify([a_log()], "burylin", known=everything)
+        identify([a_log()], "burylin", fixed=everything)
 
 
 def test_what_is_known_must_mean_the_same_in_all_models() -> None:
     with pytest.raises(UsageError, match="T3 is in 1 or s"):
-        identify([a_log(), a_log(seed=1)], "auto", known={"T3": 0.5})
+        identify([a_log(), a_log(seed=1)], "auto", fixed={"T3": 0.5})
 
 
 def test_a_coefficient_that_is_nearly_none_is_told_to_be_so() -> None:
@@ -349,7 +350,7 @@ def test_what_one_run_lacks_is_told_by_the_others(missing: str) -> None:
 def test_drift_lag_without_a_sway_has_courses_and_no_traceback() -> None:
     found = identify([a_log()], "drift-lag")
     assert "Td" in found.uncertainty.unidentifiable
-    assert np.isfinite(found.courses[0].values[0, 0]).all()
+    assert np.isfinite(found.histories[0].values[0, 0]).all()
 
 
 def test_a_piece_without_a_speed_is_fitted_with_the_others() -> None:
@@ -382,4 +383,4 @@ def test_how_a_window_is_chosen_is_no_matter_of_the_ship() -> None:
 
 def test_what_is_known_must_lie_within_the_models_limits() -> None:
     with pytest.raises(UsageError, match=r"a3 must be a finite number from -inf to 0, got 0\.5"):
-        identify([a_log()], "norrbin", known={"a3": 0.5})
+        identify([a_log()], "norrbin", fixed={"a3": 0.5})

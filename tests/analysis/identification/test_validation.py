@@ -11,7 +11,7 @@ from trial_logs import as_log
 
 from analysis.identification.output_error import OutputError, output_error
 from analysis.identification.runs import run_of
-from analysis.identification.validation import Validation, first_course, rms_of, validate
+from analysis.identification.validation import Validation, initial_heading, nan_rms, validate
 from analysis.manoeuvres.indices import Figure, _switch, first_order
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
@@ -97,10 +97,10 @@ def test_without_heading_fixes_that_tell_no_course_are_left_alone() -> None:
     assert late.rms["track"] < 5  # by speed and yaw rate
     (trial,), (places,) = run_of(log).segments, run_of(log).positions
     assert places is not None
-    assert first_course(trial, places) == pytest.approx(radians(90), abs=1e-3)
+    assert initial_heading(trial, places) == pytest.approx(radians(90), abs=1e-3)
     rough = places + np.random.default_rng(0).normal(0, 20, places.shape)
-    assert first_course(trial, rough) is None
-    assert first_course(trial, places[::-1] * 0.0) is None
+    assert initial_heading(trial, rough) is None
+    assert initial_heading(trial, places[::-1] * 0.0) is None
 
 
 def test_fixes_that_begin_late_are_laid_on_the_track_where_they_begin() -> None:
@@ -131,14 +131,14 @@ def test_a_ship_that_runs_away_on_a_held_out_log_is_said() -> None:
     fit = the_ship()
     fast = replace(fit.problem, values=fit.problem.values * -40.0)
     (found,) = validate(replace(fit, problem=fast), run_of(circle()))
-    assert found.ran_away
+    assert found.diverged
     assert found.figures == ()
     assert np.isfinite(found.measured_track).all()
 
 
 def test_the_rms_is_of_what_is_known() -> None:
-    assert rms_of(np.array([3.0, np.nan, -4.0])) == pytest.approx(np.sqrt(12.5))
-    assert np.isnan(rms_of(np.full(3, np.nan)))
+    assert nan_rms(np.array([3.0, np.nan, -4.0])) == pytest.approx(np.sqrt(12.5))
+    assert np.isnan(nan_rms(np.full(3, np.nan)))
 
 
 # ---- where figures begin
@@ -161,7 +161,7 @@ def test_a_noisy_heading_moves_no_figure_of_a_zigzag_by_much() -> None:
         off.append([noisy[name].measured - clean[name].measured for name in clean])
     turning, *overshoots, period = np.array(off).T
     assert len(overshoots) == 4
-    assert rms_of(np.degrees(overshoots)) < 0.2
+    assert nan_rms(np.degrees(overshoots)) < 0.2
     assert np.abs(np.degrees(overshoots)).max() < 0.4  # of which the first course has a half
     assert np.abs(turning).max() < 1.0
     assert np.abs(period).max() < 1.0

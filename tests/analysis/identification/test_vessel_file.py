@@ -178,9 +178,9 @@ def test_a_log_that_carries_such_a_file_gives_length_gear_and_alphas() -> None:
     assert again.fit.problem.scale.secs * again.fit.problem.scale.speed == pytest.approx(LENGTH)
     assert again.vessel is not None
     assert again.vessel.rudder_rate == 0.04
-    assert identify([log]).known["alpha3"] == 0.05
+    assert identify([log]).fixed["alpha3"] == 0.05
     bare = identify([logs_of("three-dof")[0]])  # its file has a [model] alone
-    assert bare.known["alpha3"] == 0.0654
+    assert bare.fixed["alpha3"] == 0.0654
 
 
 # ---- what is not known

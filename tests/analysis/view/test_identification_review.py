@@ -14,7 +14,7 @@ from trial_logs import as_log
 
 from analysis.identification.identify import IdentifiedShip, identify
 from analysis.identification.problem import residuals
-from analysis.view.identification_panels import autocorrelation, coefficient_panels, run_sheets
+from analysis.view.identification_panels import autocorrelation, parameter_panels, run_sheets
 from analysis.view.identification_review import write_review
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
@@ -111,7 +111,7 @@ def test_each_coefficient_has_its_interval_and_every_course(review: Path) -> Non
         for series in ("interval", "a_paper", "kalman", "windows"):
             assert f"/coefficient_{name}/{series}" in drawn
     i = told.names.index("d")
-    panel = coefficient_panels(ship())[i]
+    panel = parameter_panels(ship())[i]
     prefixed = float(panel.title.split()[1]), float(panel.title.split()[3])
     assert prefixed[0] * 1e-6 == pytest.approx(told.values[i], abs=told.std[i])
     interval = panel.series[0].lines
@@ -119,7 +119,7 @@ def test_each_coefficient_has_its_interval_and_every_course(review: Path) -> Non
 
 
 def test_what_echoes_is_faint() -> None:
-    d = next(p for p in coefficient_panels(ship()) if p.name == "coefficient_d")
+    d = next(p for p in parameter_panels(ship()) if p.name == "coefficient_d")
     paper = next(s for s in d.series if s.name == "a_paper")
     faint = [line for line in paper.lines if "echoing" in line.name]
     sure = [line for line in paper.lines if "echoing" not in line.name]
@@ -131,7 +131,7 @@ def test_what_echoes_is_faint() -> None:
 
 def test_a_value_nobody_knows_is_not_drawn_as_if_it_were_known() -> None:
     circle = identify([a_log("turning-circle-35", 2, 500.0)], "burylin")
-    b1 = next(p for p in coefficient_panels(circle) if p.name == "coefficient_b1")
+    b1 = next(p for p in parameter_panels(circle) if p.name == "coefficient_b1")
     assert "not identifiable" in b1.title
     assert np.isnan(b1.series[0].lines[0].values).all()
 

@@ -24,23 +24,23 @@ def courses(high: list[float], low: list[float]) -> ParameterHistory:
 
 def test_a_copy_of_the_prior_echoes_wholly_and_what_came_together_not_at_all() -> None:
     found = courses([1.3, 1.3, 1.15, 1.0], [0.7, 0.7, 0.85, 1.0])
-    np.testing.assert_allclose(found.echo[:, 0], [1.0, 1.0, 0.5, 0.0])
+    np.testing.assert_allclose(found.prior_share[:, 0], [1.0, 1.0, 0.5, 0.0])
 
 
 def test_errors_that_grow_are_more_than_an_echo() -> None:
-    assert courses([2.2], [-0.2]).echo[0, 0] > 3.9
+    assert courses([2.2], [-0.2]).prior_share[0, 0] > 3.9
 
 
 def test_courses_that_cross_and_part_again_have_learnt_nothing() -> None:
     found = courses([1.3, 1.0, 1.4, 1.0], [0.7, 1.0, 0.6, 1.0])
-    assert found.echoing[:, 0].tolist() == [True, True, True, False]
+    assert found.mostly_prior[:, 0].tolist() == [True, True, True, False]
 
 
 def test_a_gap_is_neither_echo_nor_knowledge() -> None:
     found = courses([1.3, np.nan, 1.4, 1.0], [0.7, 1.0, 0.6, 1.0])
-    assert np.isnan(found.echo[1, 0])
-    assert found.echoing[:3, 0].all()
-    assert found.usual_echo[0] == np.median(found.echo[2:, 0])
+    assert np.isnan(found.prior_share[1, 0])
+    assert found.mostly_prior[:3, 0].all()
+    assert found.median_prior_share[0] == np.median(found.prior_share[2:, 0])
 
 
 def test_without_a_prior_nothing_is_an_echo() -> None:
@@ -48,8 +48,8 @@ def test_without_a_prior_nothing_is_an_echo() -> None:
         "m", ("d",), np.arange(2.0), np.array([[[1.0], [np.nan]]]), np.ones((1, 2, 1)),
         np.full((1, 1), np.nan),
     )  # fmt: skip
-    assert one.echo[0, 0] == 0.0
-    assert np.isnan(one.echo[1, 0])
+    assert one.prior_share[0, 0] == 0.0
+    assert np.isnan(one.prior_share[1, 0])
 
 
 def test_priors_lie_to_either_side_and_further_off_where_little_is_told() -> None:

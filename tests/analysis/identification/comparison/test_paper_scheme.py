@@ -6,14 +6,14 @@ from fitted_runs import TRUE, a_trial, fitted
 
 from analysis.identification.comparison.history import two_priors
 from analysis.identification.comparison.paper_scheme import (
-    NINE,
+    IDENTIFIED_NAMES,
     paper_scheme,
     paper_states,
-    regression,
-    solved,
-    windowed,
+    regression_rows,
+    solve_window,
+    window_coefficients,
 )
-from analysis.identification.comparison.windows import windows
+from analysis.identification.comparison.windows import window_estimates
 from analysis.regression.coefficients import identify
 from analysis.regression.weak_form import weak_form
 from shiplog import load_vessel
@@ -24,11 +24,11 @@ PRIOR = load_vessel("table1")[0].coefficients
 def test_a_window_is_the_least_squares_of_its_rows() -> None:
     signals = a_trial().signals
     states = paper_states(signals, PRIOR)
-    ends, found = windowed(signals, PRIOR, states)
+    ends, found = window_coefficients(signals, PRIOR, states)
     k = int(np.searchsorted(ends, 310.0))
     stop = round(ends[k] / 0.1)
     expected = []
-    for rows in regression(signals, PRIOR, states):
+    for rows in regression_rows(signals, PRIOR, states):
         part = rows[stop - 2000 : stop]
         size = np.linalg.norm(part[:, :-1], axis=0)
         expected += (
@@ -40,8 +40,8 @@ def test_a_window_is_the_least_squares_of_its_rows() -> None:
 def test_with_the_truth_for_a_prior_it_finds_the_truth_whatever_it_is_worth() -> None:
     signals = a_trial().signals
     states = paper_states(signals, PRIOR, as_printed=False)
-    found = np.concatenate([solved(rows) for rows in regression(signals, PRIOR, states)])
-    off = dict(zip(NINE, found / np.array(PRIOR[:9]) - 1, strict=True))
+    found = np.concatenate([solve_window(rows) for rows in regression_rows(signals, PRIOR, states)])
+    off = dict(zip(IDENTIFIED_NAMES, found / np.array(PRIOR[:9]) - 1, strict=True))
     assert abs(off["a"]) < 0.05
     assert abs(off["d"]) < 0.05
     assert abs(off["h"]) < 0.05
@@ -51,26 +51,26 @@ def test_from_two_priors_it_comes_apart_where_the_fit_does_not() -> None:
     fit, told = fitted()
     found = paper_scheme(fit, two_priors(told, fit.problem.bounds))
     assert found is not None
-    echo = dict(zip(found.names, found.usual_echo, strict=True))
-    assert echo["d"] > 0.5
-    assert echo["b1"] > 1.0
-    assert found.echoing.mean() > 0.7
+    prior_share = dict(zip(found.names, found.median_prior_share, strict=True))
+    assert prior_share["d"] > 0.5
+    assert prior_share["b1"] > 1.0
+    assert found.mostly_prior.mean() > 0.7
 
 
 def test_it_knows_the_papers_model_alone() -> None:
     fit, told = fitted("norrbin")
     assert paper_scheme(fit, two_priors(told, fit.problem.bounds)) is None
-    assert windows(fit) is None
+    assert window_estimates(fit) is None
 
 
 def test_a_filter_that_ran_away_leaves_no_number() -> None:
-    assert np.isnan(solved(np.full((20, 4), np.nan))).all()
+    assert np.isnan(solve_window(np.full((20, 4), np.nan))).all()
 
 
 @pytest.mark.parametrize("model", ["burylin", "burylin-tied"])
 def test_windows_in_weak_form_are_the_replays(model: str) -> None:
     fit, _ = fitted(model, runs=2)
-    found = windows(fit)
+    found = window_estimates(fit)
     assert found is not None
     yaw = identify(weak_form(a_trial().signals, PRIOR)[0])[1]
     first = len(yaw.time_secs)

@@ -13,7 +13,7 @@ from analysis.identification.comparison.parameter_ekf import (
     _calm,
     _strides,
     _taken_in,
-    augmented,
+    parameter_ekf,
 )
 from analysis.identification.output_error import output_error
 from analysis.identification.problem import Nuisance
@@ -68,7 +68,7 @@ def test_strides_put_together_are_the_whole_run() -> None:
 @pytest.mark.parametrize("runs", [1, 2])
 def test_from_priors_a_third_off_it_ends_where_output_error_is(runs: int) -> None:
     fit, told = fitted(runs=runs)
-    found = augmented(fit, two_priors(told, fit.problem.bounds))
+    found = parameter_ekf(fit, two_priors(told, fit.problem.bounds))
     for values, stds in zip(found.values, found.stds, strict=True):
         np.testing.assert_array_less(np.abs(values[-1] - told.values), 1.0 * told.std)
         np.testing.assert_allclose(stds[-1], told.bound, rtol=0.25)
@@ -78,9 +78,9 @@ def test_from_priors_a_third_off_it_ends_where_output_error_is(runs: int) -> Non
 
 def test_it_begins_at_its_priors() -> None:
     fit, told = fitted()
-    found = augmented(fit, two_priors(told, fit.problem.bounds))
+    found = parameter_ekf(fit, two_priors(told, fit.problem.bounds))
     np.testing.assert_array_equal(found.values[:, 0], found.priors)
-    np.testing.assert_allclose(found.echo[0], 1.0)
+    np.testing.assert_allclose(found.prior_share[0], 1.0)
 
 
 def test_what_was_never_told_stays_what_it_was() -> None:
@@ -92,15 +92,15 @@ def test_what_was_never_told_stays_what_it_was() -> None:
             type(s)(s.effective[:90], s.usual[:90]) for s in fit.residual_stds
         ),
     )  # fmt: skip
-    found = augmented(short, two_priors(told, fit.problem.bounds))
-    assert found.echo[-1, told.names.index("e")] > 0.99
-    assert found.echoing[:, told.names.index("b1")].all()
+    found = parameter_ekf(short, two_priors(told, fit.problem.bounds))
+    assert found.prior_share[-1, told.names.index("e")] > 0.99
+    assert found.mostly_prior[:, told.names.index("b1")].all()
 
 
 def test_nothing_but_states_and_parameters_will_do() -> None:
     fit = output_error([a_trial()], ship_model("burylin"), nuisance=Nuisance.none())
     told = uncertainty(fit)
-    found = augmented(fit, two_priors(told, fit.problem.bounds))
+    found = parameter_ekf(fit, two_priors(told, fit.problem.bounds))
     d = told.names.index("d")
     np.testing.assert_allclose(found.values[:, -1, d], TRUE["d"], rtol=0.005)
 
@@ -109,7 +109,7 @@ def test_a_ship_that_runs_away_leaves_no_number() -> None:
     fit, told = fitted()
     priors = two_priors(told, fit.problem.bounds)
     priors[0, told.names.index("a")] = 50.0
-    found = augmented(fit, priors)
+    found = parameter_ekf(fit, priors)
     a = told.names.index("a")
     assert np.isnan(found.values[0, 5:, a]).all()
-    assert np.isnan(found.echo[-1, a])
+    assert np.isnan(found.prior_share[-1, a])
