@@ -8,7 +8,7 @@ import pytest
 from places import KVLCC2, PROJECT
 from trial_logs import as_log
 
-from analysis.identification.model_selection import compare
+from analysis.identification.model_selection import rank_models
 from analysis.identification.output_error import OutputError, output_error
 from analysis.identification.prediction import made_good, misfit, predict, turn, zigzag_overshoots
 from analysis.identification.segment import Segment, segments_of
@@ -85,7 +85,7 @@ def test_the_tankers_circle_is_predicted_from_hsvas_zigzags_of_another_tank() ->
 
 def test_zigzags_alone_choose_the_model_that_predicts_the_circle() -> None:
     names = ("nomoto", "norrbin", "slipstream", "three-dof")
-    found = compare(
+    found = rank_models(
         [marin("zz_10")[1], marin("zz_20")[1]], [ship_model(name) for name in names], length=LENGTH
     )
     assert found[0].model.name == "three-dof"
@@ -176,4 +176,4 @@ def test_a_ship_that_does_not_come_round_has_no_diameter() -> None:
 
 def test_one_run_chooses_no_model() -> None:
     with pytest.raises(UsageError, match="two logs or more, or name the model"):
-        compare([marin("zz_10")[1]], [ship_model("nomoto")])
+        rank_models([marin("zz_10")[1]], [ship_model("nomoto")])
