@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from shiplog import LogWriter, TrialLog, read
-from shiplog.mcap.schema import encode, schema_for
+from shiplog.mcap.schema import encode_messages, schema_for
 from shiplog.mcap.writer import channel_metadata
 
 from .bench import Bench
@@ -115,7 +115,7 @@ def write_messages(log: TrialLog, path: Path) -> None:
             stamps = zip(channel.received_ns.tolist(), channel.measured_ns.tolist(), strict=True)
             messages += [
                 (received, channel_id, measured, data)
-                for (received, measured), data in zip(stamps, encode(channel), strict=True)
+                for (received, measured), data in zip(stamps, encode_messages(channel), strict=True)
             ]
         messages.sort(key=lambda message: message[0])
         for received, channel_id, measured, data in messages:

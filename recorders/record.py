@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from shiplog.errors import ShiplogError
-from shiplog.files import cannot_write, is_device
+from shiplog.files import is_device, write_error
 from shiplog.mcap.writer import LogWriter
 
 from .source import Source
@@ -35,7 +35,7 @@ def record(
     final = Path(path)
     part = final if is_device(final) else final.with_name(final.name + ".part")
     if final.is_dir():
-        raise cannot_write(final, IsADirectoryError())
+        raise write_error(final, IsADirectoryError())
     if part != final and part.exists():
         raise ShiplogError(
             "a recording that was not finished lies there; rescue it with `shiplog convert`, "

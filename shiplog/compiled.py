@@ -73,7 +73,7 @@ def is_compiled(package: str) -> bool:
     return any(next(CACHE_FOLDER.rglob(f"{folder}_*/*.nbi"), None) for folder in folders)
 
 
-def compiled_within(function: F) -> F:
+def compiled_in_caller(function: F) -> F:
     """Compile `function` as a part of the compiled function that calls it, and keep it there.
 
     For what many modules share and each compiles in its own way: kept by itself, its machine code
@@ -82,7 +82,7 @@ def compiled_within(function: F) -> F:
     return cast("F", numba.njit(error_model="numpy")(function))
 
 
-def case_of(generic: Callable[..., object], kind: type) -> Callable[[F], F]:
+def overload_for(generic: Callable[..., object], kind: type) -> Callable[[F], F]:
     """Make a function what compiled code calls as `generic` when its first argument is a `kind`.
 
     `kind` is a NamedTuple, float or complex. Numba would have to compile anew in each process what

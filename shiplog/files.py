@@ -9,7 +9,7 @@ from .errors import ShiplogError
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a sibling name to write to; it takes the final name only when the block succeeds.
 
     Raises `ShiplogError` where the place cannot be written to. After an error the partial file
@@ -20,17 +20,17 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield final
         return
     if final.is_dir():
-        raise cannot_write(final, IsADirectoryError())
+        raise write_error(final, IsADirectoryError())
     part = final.with_name(f".{final.name}.{os.getpid()}.part")
     try:
         part.touch()
     except OSError as error:
-        raise cannot_write(final, error) from error
+        raise write_error(final, error) from error
     try:
         yield part
         part.replace(final)
     except OSError as error:
-        raise cannot_write(final, error) from error
+        raise write_error(final, error) from error
     finally:
         part.unlink(missing_ok=True)
 
@@ -40,7 +40,7 @@ def is_device(path: Path) -> bool:
     return path.exists() and not (path.is_file() or path.is_dir())
 
 
-def cannot_write(path: Path, error: OSError) -> ShiplogError:
+def write_error(path: Path, error: OSError) -> ShiplogError:
     """The error of an output that cannot be written, with its remedy."""
     if path.is_dir():
         return ShiplogError(f"cannot write: it is a folder; name a file in it: {path}")

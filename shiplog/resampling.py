@@ -15,7 +15,7 @@ from shiplog.checks.channel_stats import ChannelStats, LogStats, compute_log_sta
 from shiplog.checks.interpolate import known_samples
 
 from .errors import LogError, UsageError
-from .types import Channel, FloatArray, Log, Signals, ascending, joined
+from .types import Channel, FloatArray, Log, Signals, concatenate_signals, is_sorted
 from .units import CATALOGUE
 
 MAX_SAMPLES = 20_000_000  # of a grid that hardly anything stands on: beyond it the times are wrong
@@ -53,12 +53,14 @@ def resample(
     Raises `LogError` where a channel is missing or has fewer than two samples, or where the
     channels have no time in common.
     """
-    return joined(
-        on_clock(log.chunks(), set_clock(log, compute_log_stats(log), dt_secs, channels, optional))
+    return concatenate_signals(
+        resample_chunks(
+            log.chunks(), choose_clock(log, compute_log_stats(log), dt_secs, channels, optional)
+        )
     )
 
 
-def set_clock(
+def choose_clock(
     log: Log,
     found: LogStats,
     dt_secs: float | None = None,
@@ -87,7 +89,7 @@ def set_clock(
     return Clock(start_ns, dt, int(steps) + 1, used | also)
 
 
-def on_clock(chunks: Iterable[tuple[Channel, ...]], clock: Clock) -> Iterator[Signals]:
+def resample_chunks(chunks: Iterable[tuple[Channel, ...]], clock: Clock) -> Iterator[Signals]:
     """A log that comes in chunks on the clock, in consecutive chunks from first instant to last.
 
     The chunks that come must follow one another in the order of reception.
@@ -168,7 +170,7 @@ class _Placing:
         channel = self._channel.of(chunk)
         if channel is not None:
             times, values = known_samples(channel, self._clock.start_ns)
-            if not ascending(times):
+            if not is_sorted(times):
                 order = np.argsort(times, kind="stable")
                 times, values = times[order], values[order]
             self._seen += len(times)

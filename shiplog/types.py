@@ -17,7 +17,7 @@ FloatArray = NDArray[np.floating[Any]]
 TimeArray = NDArray[np.int64]
 
 
-def frozen(array: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
+def read_only(array: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
     """A read-only view; the caller's own array stays as writeable as it was."""
     view = np.asarray(array, dtype=dtype).view()
     view.flags.writeable = False
@@ -42,9 +42,9 @@ class Channel:
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "measured_ns", frozen(self.measured_ns, np.int64))
-        object.__setattr__(self, "received_ns", frozen(self.received_ns, np.int64))
-        object.__setattr__(self, "values", frozen(self.values, np.float64))
+        object.__setattr__(self, "measured_ns", read_only(self.measured_ns, np.int64))
+        object.__setattr__(self, "received_ns", read_only(self.received_ns, np.int64))
+        object.__setattr__(self, "values", read_only(self.values, np.float64))
         object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
         shape = (len(self.measured_ns), len(self.fields)) if self.fields else self.measured_ns.shape
         if self.values.shape != shape or self.received_ns.shape != self.measured_ns.shape:
@@ -166,7 +166,7 @@ class Log(Protocol):
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """The samples in chunks, those of each topic in the order in which they were received."""
 
-    def preferring(self, sources: Mapping[str, str]) -> Self:
+    def select_sources(self, sources: Mapping[str, str]) -> Self:
         """The same log with one source only for each name given, the one given."""
 
 
@@ -187,7 +187,7 @@ class TrialLog(ChannelsByName[Channel]):
         if len(set(topics)) < len(topics):
             raise ValueError(f"{self.name}: two channels of one topic; merge them: {topics}")
 
-    def preferring(self, sources: Mapping[str, str]) -> "TrialLog":
+    def select_sources(self, sources: Mapping[str, str]) -> "TrialLog":
         """The same log with one source only for each name given, the one given.
 
         Raises `LogError` where there is no such channel.
@@ -200,7 +200,7 @@ class TrialLog(ChannelsByName[Channel]):
         """The samples in chunks of some hours, each channel cut at the same times of reception."""
         leader = max(self.channels, key=len, default=None)
         times = [] if leader is None else leader.received_ns[CHUNK_SAMPLES::CHUNK_SAMPLES].tolist()
-        if not all(ascending(c.received_ns) and ascending(c.measured_ns) for c in self.channels):
+        if not all(is_sorted(c.received_ns) and is_sorted(c.measured_ns) for c in self.channels):
             times = []  # in no order: one chunk
         cuts = [[0, *np.searchsorted(c.received_ns, times), len(c)] for c in self.channels]
         for number in range(len(times) + 1):
@@ -224,12 +224,12 @@ class TrialLog(ChannelsByName[Channel]):
         return (end - start) * 1e-9
 
 
-def ascending(times: TimeArray | FloatArray) -> bool:
+def is_sorted(times: TimeArray | FloatArray) -> bool:
     """Whether none is less than the one before it."""
     return bool(np.all(times[1:] >= times[:-1]))
 
 
-def one_channel(parts: Sequence[Channel]) -> Channel:
+def concatenate_channels(parts: Sequence[Channel]) -> Channel:
     """Parts of a channel, one at least, one after the other."""
     if len(parts) == 1:
         return parts[0]
@@ -254,7 +254,7 @@ class Signals:
     first: int = 0  # the number of the chunk's first sample
 
     def __post_init__(self) -> None:
-        views = {name: frozen(values, np.float64) for name, values in self.values.items()}
+        views = {name: read_only(values, np.float64) for name, values in self.values.items()}
         object.__setattr__(self, "values", MappingProxyType(views))
 
     def __getitem__(self, name: str) -> FloatArray:
@@ -275,7 +275,7 @@ class Signals:
         return np.arange(self.first, self.first + len(self)) * self.dt_secs
 
     @property
-    def stamps_ns(self) -> TimeArray:
+    def timestamps_ns(self) -> TimeArray:
         """(n,) nanoseconds since 1970-01-01 UTC."""
         return self.start_ns + np.round(self.time_secs * 1e9).astype(np.int64)
 
@@ -285,7 +285,7 @@ class Signals:
         return replace(self, values=values, first=self.first + start)
 
 
-def joined(chunks: Iterable[Signals]) -> Signals:
+def concatenate_signals(chunks: Iterable[Signals]) -> Signals:
     """Consecutive chunks, one at least, as one."""
     parts = list(chunks)
     values = {name: np.concatenate([part[name] for part in parts]) for name in parts[0].values}

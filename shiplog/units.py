@@ -37,6 +37,8 @@ UNITS: dict[str, tuple[str, float]] = {
     "rev/s": ("rpm", 60.0),
 }
 
+GEOGRAPHIC = ("latitude", "longitude", "altitude")  # deg, deg, m: components of a `position`
+
 
 @dataclass(frozen=True)
 class ChannelKind:
@@ -91,7 +93,7 @@ def kind_of(channel: str) -> ChannelKind:
         ) from None
 
 
-def factor(unit: str, to: str) -> float:
+def conversion_factor(unit: str, to: str) -> float:
     """The number to multiply a value in `unit` by to have it in `to`.
 
     Raises `UsageError` for a unit nobody knows, or for two that do not measure the same thing.

@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from analysis.view.rerun_io import WHOLE_RUN
 from shiplog import ShiplogError
-from shiplog.files import replacing
+from shiplog.files import atomic_write
 from shiplog.types import FloatArray, TimeArray
 
 from .compare import Comparison
@@ -21,7 +21,7 @@ def write_overlay(comparison: Comparison, path: str | os.PathLike[str]) -> None:
 
     Raises `ShiplogError` where `path` cannot be written to.
     """
-    with replacing(path) as part:
+    with atomic_write(path) as part:
         recording = rr.RecordingStream("shiplog check", recording_id=comparison.name)
         try:
             recording.save(part, default_blueprint=_blueprint(comparison))

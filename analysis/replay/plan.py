@@ -25,7 +25,7 @@ from shiplog.checks.data_quality import faults
 from shiplog.checks.gyro_bias import GyroBiasCheck
 from shiplog.checks.rudder_sign import RudderSignCheck
 from shiplog.progress import ProgressCallback
-from shiplog.resampling import Clock, on_clock, set_clock
+from shiplog.resampling import Clock, choose_clock, resample_chunks
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
 from shiplog.types import FloatArray, Log
 from shiplog.vessel.settings import SHORTEST_WINDOW_SECS, DisturbanceSettings, FilterSettings
@@ -103,7 +103,7 @@ class Planner:
             )
         also = tuple(name for name in ("heading", "position") if name in found)
         self._warnings += [*self._log.warnings, *faults(found, (*NEEDED, *also))]
-        return found, set_clock(self._log, found, channels=NEEDED, optional=("heading",))
+        return found, choose_clock(self._log, found, channels=NEEDED, optional=("heading",))
 
     def _signal_stats_and_equations(
         self, found: LogStats, clock: Clock, vessel: Vessel
@@ -207,7 +207,7 @@ def signals_of(
             yield chunk
 
     tell(step, 0.0)
-    for signals in on_clock(watched(), clock):
+    for signals in resample_chunks(watched(), clock):
         yield signals
         tell(step, (signals.first + len(signals)) / clock.count)
 

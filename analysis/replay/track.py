@@ -7,9 +7,9 @@ import numpy as np
 from analysis.signals.concat import concatenate
 from shiplog import Channel
 from shiplog.checks.channel_stats import ChannelStats
-from shiplog.mcap.schema import GEOGRAPHIC
 from shiplog.resampling import Clock
 from shiplog.types import FloatArray, Signals
+from shiplog.units import GEOGRAPHIC
 
 EARTH_RADIUS = 6_371_008.8  # m, mean
 BRIDGED = 1 << 20  # instants of a compass's silence; beyond, the gyro goes on from its last word

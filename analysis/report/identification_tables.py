@@ -11,7 +11,7 @@ from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
 from analysis.identification.validation import Validation
 from analysis.manoeuvres.indices import Figure
 from shiplog.ships.motion import MODEL_OUTPUTS
-from shiplog.units import CATALOGUE, factor
+from shiplog.units import CATALOGUE, conversion_factor
 
 from .replay_tables import Section
 
@@ -215,4 +215,4 @@ def _unit(unit: str) -> str:
 
 def _shown(value: float, unit: str, digits: int = 3) -> str:
     """A number in the unit people use."""
-    return f"{value * factor(unit, _unit(unit)):.{digits}g}" if isfinite(value) else ""
+    return f"{value * conversion_factor(unit, _unit(unit)):.{digits}g}" if isfinite(value) else ""

@@ -11,7 +11,7 @@ from analysis.replay.plan import FITTED
 from analysis.replay.replay import Findings
 from analysis.replay.residuals import OutputResiduals
 from analysis.view.series import GUIDE
-from shiplog.units import CATALOGUE, factor
+from shiplog.units import CATALOGUE, conversion_factor
 
 DISTURBANCES = {
     "rudder": "yaw, as rudder",
@@ -88,7 +88,7 @@ def _filter_section(findings: Findings) -> Section:
     rows, remarks = [], [f"Model: {model}.", _chosen(findings)]
     for residuals in findings.residuals:
         unit = CATALOGUE[residuals.name].display_unit
-        rms = residuals.rms * factor(residuals.unit, unit)
+        rms = residuals.rms * conversion_factor(residuals.unit, unit)
         rows.append(
             (
                 f"{residuals.name} [{unit}]",

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from shiplog.types import Signals, joined
+from shiplog.types import Signals, concatenate_signals
 
 T = TypeVar("T")
 
@@ -19,7 +19,7 @@ def concatenate(chunks: Sequence[T]) -> T:
     """
     first = chunks[0]
     if isinstance(first, Signals):
-        return joined(chunks)  # type: ignore[arg-type,return-value]
+        return concatenate_signals(chunks)  # type: ignore[arg-type,return-value]
     parts: dict[str, Any] = {}
     for field in fields(first):  # type: ignore[arg-type]
         values = [getattr(chunk, field.name) for chunk in chunks]

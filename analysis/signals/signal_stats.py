@@ -8,7 +8,7 @@ from shiplog import Signals
 from shiplog.checks.channel_stats import longest_step_secs
 from shiplog.checks.quantiles import Quantiles
 from shiplog.ships.paper import PAPER_OUTPUTS, Coefficients, rudder_effects
-from shiplog.types import FloatArray, joined
+from shiplog.types import FloatArray, concatenate_signals
 
 from .moments import Moments
 
@@ -90,7 +90,7 @@ class SignalStatsCollector:
             fastest=self.fastest,
             rpm=self._rpm.median(),
             steering=self._steering,
-            head=joined(self._heads),
+            head=concatenate_signals(self._heads),
         )
 
 

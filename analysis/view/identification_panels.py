@@ -15,7 +15,7 @@ from analysis.identification.validation import Validation
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.ships.paper import PAPER_INPUTS
 from shiplog.types import FloatArray
-from shiplog.units import CATALOGUE, factor
+from shiplog.units import CATALOGUE, conversion_factor
 
 from .panels import Panel, limits, rounded, thousands
 from .series import (
@@ -122,7 +122,7 @@ def _samples(segment: Segment, values: FloatArray) -> tuple[FloatArray, FloatArr
 
 def _peoples(name: str) -> tuple[str, float]:
     entry = CATALOGUE[name]
-    return entry.display_unit, factor(entry.unit, entry.display_unit)
+    return entry.display_unit, conversion_factor(entry.unit, entry.display_unit)
 
 
 def _input(origin: str, segment: Segment, name: str) -> Panel:

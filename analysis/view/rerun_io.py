@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from shiplog.errors import ShiplogError
-from shiplog.files import replacing
+from shiplog.files import atomic_write
 from shiplog.types import FloatArray
 
 from .panels import Panel
@@ -30,7 +30,7 @@ def saving(recording: rr.RecordingStream, path: str | os.PathLike[str]) -> Itera
 
     Raises `ShiplogError` where `path` cannot be written to, or not to the end.
     """
-    with replacing(path) as part:
+    with atomic_write(path) as part:
         try:
             recording.save(part)
             yield

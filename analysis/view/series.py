@@ -17,7 +17,7 @@ from shiplog.compiled import compiled
 from shiplog.resampling import Clock
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
 from shiplog.types import FloatArray
-from shiplog.units import CATALOGUE, factor
+from shiplog.units import CATALOGUE, conversion_factor
 
 POINTS = 20_000  # a series: more than a screen has, and quickly drawn
 GUIDE = 2.0  # standard deviations, of every band drawn
@@ -86,7 +86,7 @@ class Sketch:
         for i, (name, state, colour) in enumerate(
             zip(PAPER_OUTPUTS, OUTPUT_STATES, (BLUE, ORANGE), strict=True)
         ):
-            scale = factor(CATALOGUE[name].unit, CATALOGUE[name].display_unit)
+            scale = conversion_factor(CATALOGUE[name].unit, CATALOGUE[name].display_unit)
             residual = estimates.innovations[:, i] / estimates.innovation_stds[:, i]
             rows, columns = self._samples[name].step(
                 chunk.signals.first, np.column_stack((chunk.signals[name] * scale, residual))
@@ -107,7 +107,7 @@ class Sketch:
     def _inputs(self, chunk: ReplayChunk) -> dict[str, Series]:
         drawn = {}
         for name in PAPER_INPUTS:
-            scale = factor(CATALOGUE[name].unit, CATALOGUE[name].display_unit)
+            scale = conversion_factor(CATALOGUE[name].unit, CATALOGUE[name].display_unit)
             line = Line(name, chunk.signals[name] * scale, GREEN, 1.5)
             series = Series("measured", chunk.signals.time_secs, (line,), spiky=True)
             drawn[f"{name}/measured"] = series

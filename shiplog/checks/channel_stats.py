@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shiplog.mcap.schema import GEOGRAPHIC
 from shiplog.types import Channel, ChannelsByName, FloatArray, Log, TimeArray
-from shiplog.units import CATALOGUE
+from shiplog.units import CATALOGUE, GEOGRAPHIC
 
 from .quantiles import Quantiles
 from .stuck import Stuck, StuckCheck

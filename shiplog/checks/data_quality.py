@@ -3,9 +3,8 @@
 from collections.abc import Iterator
 
 from shiplog.errors import LogError
-from shiplog.mcap.schema import GEOGRAPHIC
 from shiplog.types import TrialLog
-from shiplog.units import CATALOGUE, factor
+from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 
 from .channel_stats import ChannelStats, LogStats, compute_log_stats
 
@@ -108,7 +107,7 @@ def _shown(channel: ChannelStats, value: float) -> str:
     kind = CATALOGUE.get(channel.name)
     if kind is None or channel.fields == GEOGRAPHIC:
         return f"{value:.4g} {channel.unit}"
-    return f"{value * factor(kind.unit, kind.display_unit):.4g} {kind.display_unit}"
+    return f"{value * conversion_factor(kind.unit, kind.display_unit):.4g} {kind.display_unit}"
 
 
 def _count(number: int, thing: str) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from shiplog.types import Channel, FloatArray, Log
-from shiplog.units import factor
+from shiplog.units import conversion_factor
 
 from .channel_stats import ChannelStats, LogStats, compute_log_stats
 from .interpolate import Interpolator, known_samples
@@ -70,7 +70,7 @@ class GyroBiasCheck:
         error = float(np.std(biases, ddof=1)) / np.sqrt(len(biases))
         if abs(bias) < SIGNIFICANT * error or abs(bias) * self._duration_secs < LEAST_DRIFT:
             return None
-        per_second, its_error = (x * factor("rad/s", "deg/s") for x in (bias, error))
+        per_second, its_error = (x * conversion_factor("rad/s", "deg/s") for x in (bias, error))
         return (
             f"{self._turned.channel.topic}: off by {per_second:+.4f} ± {2 * its_error:.4f} deg/s "
             "against the heading; a bias passes for a yaw moment and spoils b1, b2, b3 and e"

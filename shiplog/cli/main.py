@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shiplog.errors import ShiplogError, UsageError
-from shiplog.files import is_device, replacing
+from shiplog.files import atomic_write, is_device
 
 from .arguments import gust, known, parser, random_forcing, replay_settings, settings, sources, wave
 
@@ -96,12 +96,12 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
 
 
 def _run_info(arguments: argparse.Namespace) -> int:
-    from shiplog.mcap.info import info
+    from shiplog.mcap.info import read_log_info
 
     _require_distinct([arguments.json], [arguments.log])
-    found = info(arguments.log)
+    found = read_log_info(arguments.log)
     if arguments.json:
-        _write_json(found.as_json(), arguments.json)
+        _write_json(found.to_dict(), arguments.json)
         return DATA_LOST if found.data_lost else FINE
     print(f"{found.name}: {(found.end_ns - found.start_ns) * 1e-9:.1f} s")
     rows = [("topic", "samples", "unit", "positive")]
@@ -134,7 +134,7 @@ def _run_replay(arguments: argparse.Namespace) -> int:
     chosen, preferred = replay_settings(arguments), sources(arguments.source)
     with _progress("analysis") as tell:
         tell("read")
-        log = open_log(arguments.log).preferring(preferred)
+        log = open_log(arguments.log).select_sources(preferred)
         try:
             replay = Replay(log, vessel, settings=chosen, on_progress=tell)
         except ShiplogError:
@@ -200,7 +200,7 @@ def _run_identify(arguments: argparse.Namespace) -> int:
         )
         text = vessel_toml(found, tell) if arguments.output else ""
     if arguments.output:
-        with replacing(arguments.output) as part:
+        with atomic_write(arguments.output) as part:
             part.write_text(text, encoding="utf-8")
     if arguments.json:
         _write_json(identification_json(found), arguments.json)
@@ -356,7 +356,7 @@ def _write_json(value: object, where: str) -> None:
     if where == "-":
         sys.stdout.write(text)
         return
-    with replacing(where) as part:
+    with atomic_write(where) as part:
         part.write_text(text, encoding="utf-8")
 
 

@@ -13,10 +13,10 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from shiplog.types import Channel, TimeArray, ascending
+from shiplog.types import Channel, TimeArray, is_sorted
 
 from .records import INDEX_ENTRY, MESSAGE_HEAD, RECORD_HEAD
-from .schema import encode, fill_rows, schema_for
+from .schema import encode_messages, fill_rows, schema_for
 
 Bytes = NDArray[np.uint8]
 
@@ -58,7 +58,7 @@ def _portions(parts: Sequence[Part]) -> Iterator[list[Part]]:
     leader = max(parts, key=lambda part: len(part.chunk)).chunk.received_ns
     step = max(1, LAID_OUT_AT_ONCE * len(leader) // max(total, 1))
     times = leader[step::step]
-    if not all(ascending(part.chunk.received_ns) for part in parts):
+    if not all(is_sorted(part.chunk.received_ns) for part in parts):
         times = times[:0]
     cuts = [[0, *np.searchsorted(p.chunk.received_ns, times).tolist(), len(p.chunk)] for p in parts]
     for number in range(len(times) + 1):
@@ -126,7 +126,7 @@ def _messages(part: Part) -> _Messages:
     rows["sequence"] = np.arange(part.first_sequence, part.first_sequence + n)
     rows["received"], rows["measured"] = chunk.received_ns, chunk.measured_ns
     if fixed is None:
-        return _ragged(rows, encode(chunk))
+        return _ragged(rows, encode_messages(chunk))
     rows["length"] = rows.dtype.itemsize - RECORD_HEAD.size
     fill_rows(rows, chunk)
     return _Messages(rows.view(np.uint8), np.full(n, rows.dtype.itemsize))

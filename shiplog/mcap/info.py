@@ -36,12 +36,12 @@ class LogInfo:
     warnings: tuple[str, ...] = ()
     data_lost: bool = False
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The same as plain values."""
         return asdict(self) | {"duration_secs": (self.end_ns - self.start_ns) * 1e-9}
 
 
-def info(path: str | os.PathLike[str]) -> LogInfo:
+def read_log_info(path: str | os.PathLike[str]) -> LogInfo:
     """What is in a log; only its summary is read, if it has one that its checksum vouches for.
 
     Raises `LogError` where the file is missing or is not MCAP.

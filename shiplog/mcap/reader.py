@@ -12,13 +12,13 @@ from google.protobuf.message import DecodeError
 from mcap import records
 
 from shiplog.errors import LogError, UsageError
-from shiplog.types import Channel, TimeArray, TrialLog, ascending, one_channel
-from shiplog.units import CATALOGUE, factor
+from shiplog.types import Channel, TimeArray, TrialLog, concatenate_channels, is_sorted
+from shiplog.units import CATALOGUE, conversion_factor
 
 from .decode import Contents, Piece, schema_of
 from .records import MAGIC
 from .scan import scan
-from .schema import FORMAT_VERSION, Schema, decode
+from .schema import FORMAT_VERSION, Schema, decode_messages
 from .summary import Summary, read_summary
 
 
@@ -156,9 +156,9 @@ def merged(channels: Iterable[Channel]) -> tuple[Channel, ...]:
     parts: dict[tuple[str, tuple[str, ...]], list[Channel]] = {}
     for channel in channels:
         parts.setdefault(channel.key, []).append(channel)
-    whole = map(one_channel, parts.values())
+    whole = map(concatenate_channels, parts.values())
     return tuple(
-        c if ascending(c.received_ns) else c.take(np.argsort(c.received_ns, kind="stable"))
+        c if is_sorted(c.received_ns) else c.take(np.argsort(c.received_ns, kind="stable"))
         for c in whole
     )
 
@@ -183,7 +183,7 @@ def _channel(path: Path, record: records.Channel, schema: Schema, pieces: list[P
         raise LogError(
             f"channel {name!r} holds messages that are no {schema.name}: {path}"
         ) from error
-    if not ascending(received):
+    if not is_sorted(received):
         order = np.argsort(received, kind="stable")
         received, measured, values = received[order], measured[order], values[order]
     unit = record.metadata.get("unit", "1")
@@ -210,7 +210,7 @@ def _columns(
     """A channel's received times, measured times and values (n, k), in the order of the file."""
     if not pieces:
         return np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, len(schema.fields)))
-    values = [p.values if isinstance(p.values, np.ndarray) else decode(schema, p.values)
+    values = [p.values if isinstance(p.values, np.ndarray) else decode_messages(schema, p.values)
               for p in pieces]  # fmt: skip
     return (
         np.concatenate([piece.received for piece in pieces]),
@@ -224,7 +224,7 @@ def _to_si(path: Path, name: str, unit: str) -> tuple[float, str]:
     if kind is None:
         return 1.0, unit
     try:
-        return factor(unit, kind.unit), kind.unit
+        return conversion_factor(unit, kind.unit), kind.unit
     except UsageError as error:
         raise LogError(f"channel {name!r} should be in {kind.unit}: {error}: {path}") from error
 

@@ -14,13 +14,13 @@ from google.protobuf.message import Message
 from numpy.typing import NDArray
 
 from shiplog.types import Channel, FloatArray
+from shiplog.units import GEOGRAPHIC
 
 FORMAT_VERSION = "1"
 METADATA_NAME = "shiplog"  # of the file's metadata record
 VESSEL_ATTACHMENT = "vessel.toml"
 ENCODING = "protobuf"
 
-GEOGRAPHIC = ("latitude", "longitude", "altitude")  # deg, deg, m: foxglove.LocationFix
 LOCATION_FIX = "foxglove.LocationFix"
 
 _DOUBLE = descriptor_pb2.FieldDescriptorProto.TYPE_DOUBLE
@@ -70,7 +70,7 @@ def schema_named(name: str) -> Schema | None:
     return _fixed_width(name) if name in _FIXED_WIDTH else None
 
 
-def encode(channel: Channel) -> list[bytes]:
+def encode_messages(channel: Channel) -> list[bytes]:
     """The samples of a channel as messages."""
     if schema_for(channel.fields).dtype is None:
         return _encode_fixes(channel)
@@ -89,7 +89,7 @@ def fill_rows(rows: NDArray[np.void], channel: Channel) -> None:
         rows[name] = column
 
 
-def decode(schema: Schema, messages: list[bytes]) -> FloatArray:
+def decode_messages(schema: Schema, messages: list[bytes]) -> FloatArray:
     """Messages, of whatever length, as values (n, k); a field left out is NaN."""
     message_type = _message_type(schema)
     values = np.full((len(messages), len(schema.fields)), np.nan)

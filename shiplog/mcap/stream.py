@@ -60,12 +60,12 @@ class LogFile:
         """Whether a part of the file could not be read, as far as it was."""
         return self.known.data_lost
 
-    def preferring(self, sources: Mapping[str, str]) -> "LogFile":
+    def select_sources(self, sources: Mapping[str, str]) -> "LogFile":
         """The same log with one source only for each name given, the one given.
 
         Raises `LogError` where there is no such channel.
         """
-        return replace(self, known=self.known.preferring(sources))
+        return replace(self, known=self.known.select_sources(sources))
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """The samples in the order of the file, about `CHUNK_SAMPLES` at a time.

@@ -15,9 +15,9 @@ from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
-from shiplog.files import cannot_write, replacing
-from shiplog.types import Channel, TrialLog, one_channel
-from shiplog.units import CATALOGUE, factor
+from shiplog.files import atomic_write, write_error
+from shiplog.types import Channel, TrialLog, concatenate_channels
+from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 from shiplog.version import __version__
 
 from .encode import McapChunk, Part, mcap_chunks
@@ -25,7 +25,6 @@ from .records import CHUNK_HEAD, MAGIC, RECORD_HEAD
 from .schema import (
     ENCODING,
     FORMAT_VERSION,
-    GEOGRAPHIC,
     METADATA_NAME,
     VESSEL_ATTACHMENT,
     schema_for,
@@ -52,7 +51,7 @@ class LogWriter:
         try:
             self._stream = Path(path).open("wb")  # noqa: SIM115 - closed by `close`
         except OSError as error:
-            raise cannot_write(Path(path), error) from error
+            raise write_error(Path(path), error) from error
         self._at, self._crc = 0, 0
         self._schemas: dict[str, records.Schema] = {}
         self._channels: dict[str, records.Channel] = {}
@@ -118,7 +117,9 @@ class LogWriter:
     def _register(self, chunk: Channel) -> int:
         if chunk.topic not in self._channels:
             if chunk.name in CATALOGUE and chunk.fields != GEOGRAPHIC:
-                factor(chunk.unit, CATALOGUE[chunk.name].unit)  # refused now, not when it is read
+                conversion_factor(
+                    chunk.unit, CATALOGUE[chunk.name].unit
+                )  # refused now, not when it is read
             schema = schema_for(chunk.fields)
             if schema.name not in self._schemas:
                 number = len(self._schemas) + 1
@@ -261,7 +262,7 @@ def _one_a_channel(parts: Sequence[Part]) -> list[Part]:
 
 
 def _joined(parts: Sequence[Part]) -> Part:
-    return replace(parts[0], chunk=one_channel([part.chunk for part in parts]))
+    return replace(parts[0], chunk=concatenate_channels([part.chunk for part in parts]))
 
 
 def _bytes(record: records.McapRecord) -> bytes:
@@ -274,7 +275,7 @@ def _bytes(record: records.McapRecord) -> bytes:
 def write(log: TrialLog, path: str | os.PathLike[str]) -> None:
     """Write a whole trial to `path`; nothing half-written is left there if it fails."""
     with (
-        replacing(path) as part,
+        atomic_write(path) as part,
         LogWriter(part, metadata=log.metadata, vessel_toml=log.vessel_toml) as writer,
     ):
         writer.write(*log.channels)

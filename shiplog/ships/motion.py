@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from shiplog.compiled import case_of, compiled_within
+from shiplog.compiled import compiled_in_caller, overload_for
 from shiplog.types import FloatArray
 
 ComplexArray = NDArray[np.complex128]
@@ -56,15 +56,15 @@ def observed(c: Any, x: Any) -> tuple[complex, complex, complex, complex]:  # no
 
 def equations(kind: type) -> Callable[[F], F]:
     """Make a function the `motion` of a model whose coefficients are a `kind`."""
-    return case_of(state_rates, kind)
+    return overload_for(state_rates, kind)
 
 
 def observations(kind: type) -> Callable[[F], F]:
     """Make a function what is `observed` of a model whose coefficients are a `kind`."""
-    return case_of(observed, kind)
+    return overload_for(observed, kind)
 
 
-@compiled_within
+@compiled_in_caller
 def magnitude(x: complex) -> complex:
     """|x| of what is real but for a derivative along the imaginary axis."""
     return x if x.real >= 0 else -x
@@ -81,21 +81,21 @@ def root(x: complex) -> complex:
     return complex(size, x.imag / (2 * size))
 
 
-case_of(exponential, complex)(exponential)
-case_of(root, complex)(root)
+overload_for(exponential, complex)(exponential)
+overload_for(root, complex)(root)
 
 
-@case_of(exponential, float)
+@overload_for(exponential, float)
 def _real_exponential(x: float) -> float:
     return exp(x)
 
 
-@case_of(root, float)
+@overload_for(root, float)
 def _real_root(x: float) -> float:
     return sqrt(x)
 
 
-@compiled_within
+@compiled_in_caller
 def integrate(
     c: Any,  # noqa: ANN401
     x: ComplexArray,
@@ -142,7 +142,7 @@ def integrate(
 # numba would take the real factor of a complex number for a complex one, at twice the cost
 
 
-@compiled_within
+@compiled_in_caller
 def _add(
     after: ComplexArray,
     x: ComplexArray,
@@ -158,7 +158,7 @@ def _add(
         between[i] = x[i] + complex(reach * real, reach * imag)
 
 
-@compiled_within
+@compiled_in_caller
 def _interpolate(
     found: ComplexArray,
     x: ComplexArray,
@@ -179,7 +179,7 @@ def _interpolate(
         )
 
 
-@compiled_within
+@compiled_in_caller
 def _note(out: ComplexArray, k: int, values: tuple[complex, complex, complex, complex]) -> None:
     for i in range(4):
         out[k, i] = values[i]

@@ -27,7 +27,7 @@ which its drag and its force to the side share; g by how steady a run is on whic
 
 from typing import NamedTuple
 
-from shiplog.compiled import compiled, compiled_within
+from shiplog.compiled import compiled, compiled_in_caller
 
 from .model import Model, Parameter, StateValue
 from .motion import (
@@ -65,7 +65,7 @@ class ThreeDof(NamedTuple):
     xd: complex
 
 
-@compiled_within
+@compiled_in_caller
 def _cross_flow(sigma: complex, rho: complex) -> tuple[complex, complex]:
     """Y and N by Gauss's five points."""
     middle, inner, outer = 128 / 450, 0.4786286704993665 / 2, 0.2369268850561891 / 2

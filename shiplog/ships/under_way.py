@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shiplog.compiled import compiled, compiled_within
+from shiplog.compiled import compiled, compiled_in_caller
 from shiplog.types import FloatArray
 
 from .model import Model, Scale
@@ -148,7 +148,7 @@ def rates_si(
     return rates
 
 
-@compiled_within
+@compiled_in_caller
 def write_rates_si(
     c: CoefficientTuple,
     constants: ShipConstants,
@@ -171,7 +171,7 @@ def write_rates_si(
     rates[len(own) + 1] = constants.speed * (ahead * sin(heading) + sway * cos(heading))
 
 
-@compiled_within
+@compiled_in_caller
 def runge_kutta_step(
     c: CoefficientTuple,
     constants: ShipConstants,
@@ -206,14 +206,14 @@ def runge_kutta_step(
     return after
 
 
-@compiled_within
+@compiled_in_caller
 def observed_real(c: CoefficientTuple, x: FloatArray) -> tuple[float, float, float, float]:
     """What is observed of a state, in the units of the equations, real."""
     values: tuple[Any, Any, Any, Any] = observed(c, x)  # of a real state real
     return values
 
 
-@compiled_within
+@compiled_in_caller
 def outputs_si(
     c: CoefficientTuple,
     constants: ShipConstants,

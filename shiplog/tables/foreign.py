@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from shiplog.errors import LayoutError
-from shiplog.mcap.schema import GEOGRAPHIC
 from shiplog.types import Channel, FloatArray, TimeArray, TrialLog
-from shiplog.units import CATALOGUE, did_you_mean, factor
+from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor, did_you_mean
 
 from .layout import DELIMITERS, ROLES, VELOCITIES, Layout
 
@@ -134,7 +133,7 @@ def _numbers(table: _Table, layout: Layout, role: str) -> FloatArray:
             f"mend the cell (empty or nan: not measured) or {layout.where}: {table.path}"
         ) from None
     si = _si_unit(role)
-    scale = factor(column.unit, si) if role not in GEOGRAPHIC else 1.0
+    scale = conversion_factor(column.unit, si) if role not in GEOGRAPHIC else 1.0
     bad = ~np.isfinite(values) if role == "time" else np.isinf(values)
     if np.any(bad):
         row = int(np.argmax(bad))

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from shiplog.errors import LayoutError, UsageError
-from shiplog.mcap.schema import GEOGRAPHIC
-from shiplog.units import CATALOGUE, did_you_mean, factor
+from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor, did_you_mean
 
 DELIMITERS = {"whitespace": None, ",": ",", ";": ";", "tab": "\t"}
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -190,7 +189,7 @@ def _unknown(role: str, said: Iterable[str], known: list[str], faults: list[str]
 
 def _check_unit(label: str, unit: object, si: str, faults: list[str]) -> None:
     try:
-        factor(str(unit), si)
+        conversion_factor(str(unit), si)
     except UsageError as error:
         faults.append(f"{label}: {str(error).replace(';', ',')}")
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shiplog.errors import LogError
-from shiplog.files import replacing
+from shiplog.files import atomic_write
 from shiplog.mcap.schema import schema_for
 from shiplog.types import Channel, FloatArray, TimeArray, TrialLog
 from shiplog.units import did_you_mean
@@ -73,7 +73,7 @@ def from_frame(frame: "pd.DataFrame", name: str = "frame") -> TrialLog:
 
 def write_csv(log: TrialLog, path: str | os.PathLike[str]) -> None:
     """Write a trial as CSV; nothing half-written is left there if it fails."""
-    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as stream:
+    with atomic_write(path) as part, part.open("w", encoding="utf-8", newline="") as stream:
         stream.write(f"{CSV_MARK}\n")
         stream.writelines(f"# {line}\n" for line in _header(log).split("\n"))
         stream.write(",".join(COLUMNS) + "\n")
@@ -166,7 +166,7 @@ def write_parquet(log: TrialLog, path: str | os.PathLike[str]) -> None:
     )
     table = pa.Table.from_arrays(list(columns), names=list(COLUMNS))
     table = table.replace_schema_metadata({HEADER_KEY: _header(log)})
-    with replacing(path) as part:
+    with atomic_write(path) as part:
         parquet.write_table(table, part, compression="zstd", use_dictionary=list(COLUMNS[:2]))
 
 

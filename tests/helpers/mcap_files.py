@@ -13,7 +13,7 @@ from mcap.reader import McapReader, make_reader
 from mcap.writer import Writer
 
 from shiplog import Channel, LogWriter, TrialLog
-from shiplog.mcap.schema import encode, schema_for
+from shiplog.mcap.schema import encode_messages, schema_for
 
 START = 1_700_000_000_000_000_000
 EXTREMES = [0.0, -0.0, 1.0, -1e308, 5e-324, float("inf"), float("-inf"), float("nan")]
@@ -86,7 +86,9 @@ def written(path: Path, *channels: Channel, **options: Any) -> Path:  # noqa: AN
             channel_id = writer.register_channel(
                 c.topic, "protobuf", schema_id, {"unit": c.unit, **c.metadata}
             )
-            times = zip(c.received_ns.tolist(), c.measured_ns.tolist(), encode(c), strict=True)
+            times = zip(
+                c.received_ns.tolist(), c.measured_ns.tolist(), encode_messages(c), strict=True
+            )
             messages += [(received, channel_id, *rest) for received, *rest in times]
         for received, channel_id, measured, data in sorted(messages, key=lambda m: m[0]):
             writer.add_message(channel_id, received, data, measured)

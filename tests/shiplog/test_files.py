@@ -4,12 +4,12 @@ from pathlib import Path
 import pytest
 
 from shiplog import ShiplogError
-from shiplog.files import replacing
+from shiplog.files import atomic_write
 
 
 def test_the_final_name_appears_only_when_the_block_succeeds(tmp_path: Path) -> None:
     final = tmp_path / "out.txt"
-    with replacing(final) as part:
+    with atomic_write(final) as part:
         part.write_text("whole")
         assert not final.exists()
         assert part.parent == tmp_path
@@ -28,7 +28,7 @@ def test_after_any_error_what_stood_there_stands_there_still(
         part.write_text("half of")
         raise error
 
-    with pytest.raises(error), replacing(final) as part:
+    with pytest.raises(error), atomic_write(final) as part:
         fail(part)
     assert final.read_text() == "before"
     assert list(tmp_path.iterdir()) == [final]
@@ -40,7 +40,7 @@ def test_a_full_disk_is_an_error_that_names_the_file(tmp_path: Path) -> None:
 
     with (
         pytest.raises(ShiplogError, match=r"no space left on device.*out.txt"),
-        replacing(tmp_path / "out.txt"),
+        atomic_write(tmp_path / "out.txt"),
     ):
         fail()
     assert not list(tmp_path.iterdir())
@@ -48,21 +48,21 @@ def test_a_full_disk_is_an_error_that_names_the_file(tmp_path: Path) -> None:
 
 def test_a_folder_is_refused_before_the_work_is_done(tmp_path: Path) -> None:
     for folder in (tmp_path, f"{tmp_path}{os.sep}", "", "."):
-        with pytest.raises(ShiplogError, match="it is a folder"), replacing(folder):
+        with pytest.raises(ShiplogError, match="it is a folder"), atomic_write(folder):
             pytest.fail("the block must not run")
 
 
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:
     with (
         pytest.raises(ShiplogError, match=r"there is no folder .*nowhere"),
-        replacing(tmp_path / "nowhere" / "out.txt"),
+        atomic_write(tmp_path / "nowhere" / "out.txt"),
     ):
         pytest.fail("the block must not run")
 
 
 def test_a_file_in_the_folders_place_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(ShiplogError, match="cannot write"), replacing(tmp_path / "file" / "x"):
+    with pytest.raises(ShiplogError, match="cannot write"), atomic_write(tmp_path / "file" / "x"):
         pytest.fail("the block must not run")
 
 
@@ -72,7 +72,7 @@ def test_a_file_in_the_folders_place_is_an_error(tmp_path: Path) -> None:
 def test_a_folder_one_may_not_write_to_is_an_error(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     try:
-        with pytest.raises(ShiplogError, match="permission denied"), replacing(tmp_path / "x"):
+        with pytest.raises(ShiplogError, match="permission denied"), atomic_write(tmp_path / "x"):
             pytest.fail("the block must not run")
     finally:
         tmp_path.chmod(0o700)

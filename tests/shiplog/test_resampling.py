@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from shiplog import Channel, LogError, TrialLog, UsageError, resample
 from shiplog.checks.channel_stats import compute_log_stats
-from shiplog.resampling import on_clock, set_clock
-from shiplog.types import joined
+from shiplog.resampling import choose_clock, resample_chunks
+from shiplog.types import concatenate_signals
 
 START = 1_700_000_000_000_000_000
 SEC = 1_000_000_000
@@ -278,7 +278,7 @@ def test_a_long_silence_comes_in_chunks_as_it_goes_by(
     ]
     log = log_of(*channels)
     whole = resample(log, channels=names)
-    clock = set_clock(log, compute_log_stats(log), channels=names)
+    clock = choose_clock(log, compute_log_stats(log), channels=names)
     given, most, done = 0, 0, 0
     parts = []
     for at in range(0, 3000, 100):
@@ -294,13 +294,13 @@ def test_a_long_silence_comes_in_chunks_as_it_goes_by(
             given += 100
             yield chunk
 
-    for signals in on_clock(watched(), clock):
+    for signals in resample_chunks(watched(), clock):
         most = max(most, len(signals))
         done = signals.first + len(signals)
         if silent != "all":
             assert given - done <= 250
     assert (most, done) == (50, len(whole))
-    again = joined(on_clock(parts, clock))
+    again = concatenate_signals(resample_chunks(parts, clock))
     for name in names:
         assert np.array_equal(again[name], whole[name], equal_nan=True)
     assert np.isnan(whole["yaw_rate"]).any() == (silent in ("yaw_rate", "all"))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from shiplog import Channel, LogError, Signals, TrialLog
-from shiplog.types import frozen
+from shiplog.types import read_only
 
 
 def channel(name: str = "yaw_rate", source: str = "gyro", count: int = 3) -> Channel:
@@ -22,8 +22,8 @@ def test_a_channel_is_read_only_and_leaves_the_callers_arrays_writeable() -> Non
 
 def test_frozen_views_and_does_not_copy() -> None:
     array = np.zeros(3)
-    assert np.shares_memory(frozen(array, np.float64), array)
-    assert frozen([1, 2], np.float64).dtype == np.float64
+    assert np.shares_memory(read_only(array, np.float64), array)
+    assert read_only([1, 2], np.float64).dtype == np.float64
 
 
 def test_a_channels_metadata_is_its_own_and_read_only() -> None:
@@ -103,7 +103,7 @@ def test_signals_are_read_only_on_one_clock() -> None:
     assert "rudder" not in signals
     np.testing.assert_array_equal(signals.time_secs, [0, 0.5, 1, 1.5])
     np.testing.assert_array_equal(
-        signals.stamps_ns, [100, 500_000_100, 1_000_000_100, 1_500_000_100]
+        signals.timestamps_ns, [100, 500_000_100, 1_000_000_100, 1_500_000_100]
     )
     with pytest.raises(ValueError, match="read-only"):
         signals["speed"][0] = 1

@@ -4,7 +4,7 @@ from math import pi
 import pytest
 
 from shiplog import UsageError
-from shiplog.units import CATALOGUE, UNITS, did_you_mean, factor, kind_of
+from shiplog.units import CATALOGUE, UNITS, conversion_factor, did_you_mean, kind_of
 
 
 @pytest.mark.parametrize(
@@ -25,36 +25,38 @@ from shiplog.units import CATALOGUE, UNITS, did_you_mean, factor, kind_of
 def test_units_convert_by_their_definitions(
     value: float, unit: str, to: str, expected: float
 ) -> None:
-    assert value * factor(unit, to) == pytest.approx(expected, rel=1e-15)
+    assert value * conversion_factor(unit, to) == pytest.approx(expected, rel=1e-15)
 
 
 def test_there_and_back_is_where_one_was() -> None:
     for unit, to in product(UNITS, UNITS):
         if UNITS[unit][0] == UNITS[to][0]:
-            assert factor(unit, to) * factor(to, unit) == pytest.approx(1, rel=1e-15)
+            assert conversion_factor(unit, to) * conversion_factor(to, unit) == pytest.approx(
+                1, rel=1e-15
+            )
 
 
 def test_a_unit_is_exactly_itself() -> None:
-    assert all(factor(unit, unit) == 1.0 for unit in UNITS)
+    assert all(conversion_factor(unit, unit) == 1.0 for unit in UNITS)
 
 
 def test_what_does_not_measure_the_same_is_not_converted() -> None:
     with pytest.raises(UsageError, match=r"'deg' cannot be turned into 'm'"):
-        factor("deg", "m")
+        conversion_factor("deg", "m")
 
 
 def test_an_unknown_unit_is_named_with_the_nearest_known() -> None:
     with pytest.raises(UsageError, match=r"unknown unit 'rad/sec'; did you mean 'rad/s'\?; known"):
-        factor("rad/sec", "rad/s")
+        conversion_factor("rad/sec", "rad/s")
     with pytest.raises(UsageError, match="unknown unit 'furlong'; known are"):
-        factor("m", "furlong")
+        conversion_factor("m", "furlong")
 
 
 def test_every_channel_is_in_si_but_rpm_and_can_be_shown() -> None:
     for name, kind in CATALOGUE.items():
         assert kind.name == name
         assert kind.unit == "rpm" or UNITS[kind.unit] == (kind.unit, 1.0)
-        assert factor(kind.unit, kind.display_unit) > 0
+        assert conversion_factor(kind.unit, kind.display_unit) > 0
         assert kind.lowest < kind.highest
         assert kind.positive
 

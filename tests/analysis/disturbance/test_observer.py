@@ -28,7 +28,7 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import Gust, WaveMoment
 from shiplog import Signals, TrialLog, UsageError, Vessel, read, resample
-from shiplog.resampling import on_clock
+from shiplog.resampling import resample_chunks
 from shiplog.ships.paper import Coefficients
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
@@ -617,7 +617,7 @@ def test_every_log_is_observed_by_every_model(path: Path) -> None:
     holding = InputHold(plan.clock)
     for chunk in log.chunks():
         holding.add_raw(chunk)
-    chunks = list(held_throughout(on_clock(log.chunks(), plan.clock), holding))
+    chunks = list(held_throughout(resample_chunks(log.chunks(), plan.clock), holding))
     for models in SUBSETS:
         for spectrum in ("butterworth", "binomial"):
             observing = ForceObserver(

@@ -19,7 +19,7 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import Channel, Signals, TrialLog, Vessel, resample
 from shiplog.checks.channel_stats import compute_log_stats
-from shiplog.resampling import on_clock, set_clock
+from shiplog.resampling import choose_clock, resample_chunks
 from shiplog.ships.paper import steady_speed
 from shiplog.vessel.settings import FILTERS, FilterSettings
 
@@ -186,8 +186,11 @@ def shuffled(channel: Channel, rng: np.random.Generator) -> Channel:
 
 
 def placed(log: TrialLog | InChunks) -> Iterator[Signals]:
-    clock = set_clock(log, compute_log_stats(log), channels=NAMES)
-    return (held for _, held, _ in held_throughout(on_clock(log.chunks(), clock), InputHold(clock)))
+    clock = choose_clock(log, compute_log_stats(log), channels=NAMES)
+    return (
+        held
+        for _, held, _ in held_throughout(resample_chunks(log.chunks(), clock), InputHold(clock))
+    )
 
 
 @of_each_kind
@@ -213,10 +216,10 @@ def test_where_a_log_is_cut_changes_nothing(
     cuts = np.sort(np.random.default_rng(seed).uniform(0, 150, 12)).tolist()
     (signals,) = placed(log)
     parted = InChunks(log, cuts)
-    clock = set_clock(parted, compute_log_stats(parted), channels=NAMES)
+    clock = choose_clock(parted, compute_log_stats(parted), channels=NAMES)
     stats = signal_stats(signals, vessel.coefficients)
     filtering = made(vessel, stats, kind)
-    chunks = held_throughout(on_clock(parted.chunks(), clock), InputHold(clock))
+    chunks = held_throughout(resample_chunks(parted.chunks(), clock), InputHold(clock))
     found = [filtering.step(held, following) for _, held, following in chunks]
     assert len(found) > 5
     whole = made(vessel, stats, kind).step(signals, last_inputs(signals))

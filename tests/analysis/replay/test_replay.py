@@ -16,9 +16,9 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import START_NS, SimulatedTrial, simulate
 from shiplog import Channel, LogError, TrialLog, Vessel, VesselError
 from shiplog.errors import UsageError
-from shiplog.mcap.schema import GEOGRAPHIC
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
+from shiplog.units import GEOGRAPHIC
 
 
 def without(log: TrialLog, name: str) -> TrialLog:

@@ -171,7 +171,7 @@ def test_coefficients_stand_beside_the_model(review: Path, analysis: Analysis) -
 
 def test_both_timelines_tell_the_same_instants(review: Path, analysis: Analysis) -> None:
     at, stamps, _ = columns(review, "yaw_rate/state")
-    np.testing.assert_array_equal(stamps, analysis.signals.stamps_ns)
+    np.testing.assert_array_equal(stamps, analysis.signals.timestamps_ns)
     np.testing.assert_allclose((stamps - stamps[0]) * 1e-9, at, atol=1e-9)
 
 

@@ -11,8 +11,9 @@ from mcap.writer import Writer
 import shiplog.mcap.encode
 from shiplog import Channel, LogWriter, TrialLog, write
 from shiplog.mcap.encode import Part, mcap_chunks
-from shiplog.mcap.schema import GEOGRAPHIC, encode, schema_for
+from shiplog.mcap.schema import encode_messages, schema_for
 from shiplog.mcap.writer import CHUNK_BYTES
+from shiplog.units import GEOGRAPHIC
 
 
 def trial(rng: np.random.Generator, count: int) -> TrialLog:
@@ -48,7 +49,7 @@ def test_every_message_is_the_one_mcaps_own_writer_would_write(seed: int) -> Non
         schema = schema_for(c.fields)
         schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
         assert writer.register_channel(c.topic, "protobuf", schema_id) == number
-        rows = zip(c.received_ns.tolist(), c.measured_ns.tolist(), encode(c), strict=True)
+        rows = zip(c.received_ns.tolist(), c.measured_ns.tolist(), encode_messages(c), strict=True)
         messages += [(got, number, k, was, data) for k, (got, was, data) in enumerate(rows)]
     for got, number, k, was, data in sorted(messages, key=lambda m: m[0]):
         writer.add_message(number, got, data, was, k)

@@ -7,20 +7,20 @@ import pytest
 from recorders.record import record
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Channel, LogError, LogWriter
-from shiplog.mcap.info import info
+from shiplog.mcap.info import read_log_info
 
 
 def test_a_finished_log_is_described_from_its_summary(
     zigzag: SimulatedTrial, tmp_path: Path
 ) -> None:
     record(zigzag, tmp_path / "z.mcap")
-    found = info(tmp_path / "z.mcap")
+    found = read_log_info(tmp_path / "z.mcap")
     yaw = found.channels[0]
     assert (yaw.topic, yaw.unit, yaw.samples) == ("/yaw_rate/simulated", "rad/s", 5001)
     assert yaw.positive == "bow to starboard"
     assert found.has_vessel
     assert found.metadata["manoeuvre"] == "zigzag-20-20"
-    assert found.as_json()["duration_secs"] == pytest.approx(500, abs=0.1)
+    assert found.to_dict()["duration_secs"] == pytest.approx(500, abs=0.1)
 
 
 def test_an_unfinished_log_is_described_by_reading_it(tmp_path: Path) -> None:
@@ -28,11 +28,11 @@ def test_an_unfinished_log_is_described_by_reading_it(tmp_path: Path) -> None:
     writer = LogWriter(tmp_path / "cut.mcap", metadata={"ship": "test"})
     writer.write(Channel("speed", "log", "m/s", at, at, np.ones(100)))
     writer.flush()
-    found = info(tmp_path / "cut.mcap")
+    found = read_log_info(tmp_path / "cut.mcap")
     assert found.channels[0].samples == 100
     assert found.metadata["ship"] == "test"
     assert any("not finished" in warning for warning in found.warnings)
-    assert json.loads(json.dumps(found.as_json()))["metadata"]["ship"] == "test"
+    assert json.loads(json.dumps(found.to_dict()))["metadata"]["ship"] == "test"
     writer.close()
 
 
@@ -41,10 +41,10 @@ def test_a_damaged_summary_is_not_believed(tmp_path: Path) -> None:
     path = tmp_path / "flipped.mcap"
     with LogWriter(path, metadata={"ship": "test"}) as writer:
         writer.write(Channel("speed", "log", "m/s", at, at, np.ones(100)))
-    whole, data = info(path), path.read_bytes()
+    whole, data = read_log_info(path), path.read_bytes()
     place = data.rindex(b"/speed/log")
     path.write_bytes(data[:place] + b"/speex/log" + data[place + 10 :])
-    found = info(path)
+    found = read_log_info(path)
     assert found.channels[0].topic == "/speed/log"
     assert (found.start_ns, found.end_ns) == (whole.start_ns, whole.end_ns)
     assert found.metadata == whole.metadata
@@ -59,10 +59,10 @@ def test_of_a_long_log_only_the_summary_is_read(
     with LogWriter(tmp_path / "a.mcap") as writer:
         writer.write(Channel("speed", "log", "m/s", at, at, np.ones(100)))
     monkeypatch.delattr("zstandard.ZstdDecompressor")
-    assert info(tmp_path / "a.mcap").channels[0].samples == 100
+    assert read_log_info(tmp_path / "a.mcap").channels[0].samples == 100
 
 
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").write_bytes(b"not at all")
     with pytest.raises(LogError, match="not an MCAP file"):
-        info(tmp_path / "a.mcap")
+        read_log_info(tmp_path / "a.mcap")

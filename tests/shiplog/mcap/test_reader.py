@@ -35,7 +35,8 @@ from places import RECORDINGS
 import shiplog.mcap.decode
 import shiplog.mcap.scan
 from shiplog import Channel, LogError, LogWriter, TrialLog, UsageError, read, write
-from shiplog.mcap.schema import GEOGRAPHIC, schema_for
+from shiplog.mcap.schema import schema_for
+from shiplog.units import GEOGRAPHIC
 
 CONFORMANCE = RECORDINGS / "mcap_conformance"
 ANYWHERE = st.floats(0, 1, exclude_max=True)

@@ -6,7 +6,8 @@ import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 from shiplog import Channel
-from shiplog.mcap.schema import GEOGRAPHIC, decode, encode, schema_for, schema_named
+from shiplog.mcap.schema import decode_messages, encode_messages, schema_for, schema_named
+from shiplog.units import GEOGRAPHIC
 
 EXTREMES = [0.0, -0.0, 1.0, -1e308, 5e-324, float("inf"), float("-inf"), float("nan")]
 
@@ -34,7 +35,7 @@ def test_a_stranger_reads_what_we_write(fields: tuple[str, ...]) -> None:
     values = rng.choice(EXTREMES, (50, len(fields)) if fields else 50)
     schema = schema_for(fields)
     message_type = stranger(schema.descriptor_set, schema.name)
-    messages = [message_type.FromString(data) for data in encode(channel(values, fields))]
+    messages = [message_type.FromString(data) for data in encode_messages(channel(values, fields))]
     read = [[getattr(m, f) for f in fields or ("value",)] for m in messages]
     assert bits(read) == bits(values)
 
@@ -48,7 +49,7 @@ def test_we_read_what_a_stranger_writes(fields: tuple[str, ...]) -> None:
         message_type(**dict(zip(schema.fields, row, strict=True))).SerializeToString()
         for row in rows.tolist()
     ]
-    assert bits(decode(schema, data)) == bits(rows)
+    assert bits(decode_messages(schema, data)) == bits(rows)
 
 
 @pytest.mark.parametrize("fields", [(), ("north", "east")])
@@ -56,7 +57,7 @@ def test_a_message_has_one_length_and_one_layout_whatever_it_says(fields: tuple[
     schema = schema_for(fields)
     width = len(schema.fields)
     values = np.array(EXTREMES * width).reshape(-1, *([width] if fields else []))
-    data = encode(channel(values, fields))
+    data = encode_messages(channel(values, fields))
     assert schema.dtype is not None
     assert {len(message) for message in data} == {schema.dtype.itemsize} == {9 * width}
     tags = {message[::9] for message in data}
@@ -64,26 +65,28 @@ def test_a_message_has_one_length_and_one_layout_whatever_it_says(fields: tuple[
 
 
 def test_a_scalar_is_its_tag_and_its_double() -> None:
-    assert encode(channel([1.5])) == [b"\x09" + struct.pack("<d", 1.5)]
+    assert encode_messages(channel([1.5])) == [b"\x09" + struct.pack("<d", 1.5)]
 
 
 def test_a_field_left_out_is_nan_and_zero_is_not_left_out() -> None:
     schema = schema_for(("north", "east"))
     north_alone = b"\x09" + struct.pack("<d", 0.0)
-    assert bits(decode(schema, [north_alone, b""])) == bits([[0.0, np.nan], [np.nan, np.nan]])
+    assert bits(decode_messages(schema, [north_alone, b""])) == bits(
+        [[0.0, np.nan], [np.nan, np.nan]]
+    )
 
 
 def test_fields_may_come_in_any_order_and_unknown_ones_are_skipped() -> None:
     schema = schema_for(("north", "east"))
     north, east = b"\x09" + struct.pack("<d", 1.0), b"\x11" + struct.pack("<d", 2.0)
     unknown = b"\x19" + struct.pack("<d", 3.0)
-    np.testing.assert_array_equal(decode(schema, [unknown + east + north]), [[1.0, 2.0]])
+    np.testing.assert_array_equal(decode_messages(schema, [unknown + east + north]), [[1.0, 2.0]])
 
 
 def test_a_fix_carries_its_own_time_for_viewers() -> None:
     schema = schema_for(GEOGRAPHIC)
     fix = channel([[59.9, 30.2, 1.0]], GEOGRAPHIC)
-    message = stranger(schema.descriptor_set, schema.name).FromString(encode(fix)[0])
+    message = stranger(schema.descriptor_set, schema.name).FromString(encode_messages(fix)[0])
     assert message.timestamp.ToNanoseconds() == fix.measured_ns[0]
 
 
@@ -96,5 +99,5 @@ def test_schemas_are_found_by_their_names_and_others_are_not_ours() -> None:
 
 
 def test_no_samples_are_no_messages() -> None:
-    assert encode(channel([])) == []
-    assert decode(schema_for(()), []).shape == (0, 1)
+    assert encode_messages(channel([])) == []
+    assert decode_messages(schema_for(()), []).shape == (0, 1)

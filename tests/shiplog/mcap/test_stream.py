@@ -28,9 +28,10 @@ from mcap_files import (
 
 import shiplog.mcap.stream
 from shiplog import Channel, LogError, LogWriter, TrialLog, read, write
-from shiplog.mcap.schema import GEOGRAPHIC, schema_for
+from shiplog.mcap.schema import schema_for
 from shiplog.mcap.stream import LogFile, open_log
-from shiplog.types import one_channel
+from shiplog.types import concatenate_channels
+from shiplog.units import GEOGRAPHIC
 
 ANYWHERE = st.floats(0, 1, exclude_max=True)
 CHUNK = 300
@@ -64,7 +65,7 @@ def whole(chunks: Iterator[tuple[Channel, ...]]) -> dict[Any, Channel]:
     for chunk in chunks:
         for part in chunk:
             parts[part.key].append(part)
-    return {key: one_channel(few) for key, few in parts.items()}
+    return {key: concatenate_channels(few) for key, few in parts.items()}
 
 
 def described(c: Channel) -> tuple[object, ...]:
@@ -254,11 +255,11 @@ def test_a_chosen_source_stands_alone_and_first_in_every_chunk(path: Path) -> No
     ]
     written(path, *held, chunk_size=4000)
     chosen = {"yaw_rate": "imu"}
-    log = in_its_file(path).preferring(chosen)
+    log = in_its_file(path).select_sources(chosen)
     for chunk in log.chunks():
         topics = [c.topic for c in chunk]
         assert topics == ["/yaw_rate/imu", "/speed/test"]
-    assert_as_read(log, read(path).preferring(chosen))
+    assert_as_read(log, read(path).select_sources(chosen))
 
 
 @pytest.mark.parametrize("chosen", [{"yaw_rate": "nobody"}, {"rudder": "test"}])
@@ -267,9 +268,9 @@ def test_a_source_that_is_not_there_is_refused_as_by_a_log(
 ) -> None:
     written(path, *trial())
     with pytest.raises(LogError) as ours:
-        in_its_file(path).preferring(chosen)
+        in_its_file(path).select_sources(chosen)
     with pytest.raises(LogError) as theirs:
-        read(path).preferring(chosen)
+        read(path).select_sources(chosen)
     assert str(ours.value) == str(theirs.value)
 
 

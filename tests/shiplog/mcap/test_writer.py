@@ -14,7 +14,7 @@ from mcap.reader import NonSeekingReader, make_reader
 import shiplog.mcap.writer
 from shiplog import Channel, LogWriter, ShiplogError, TrialLog, UsageError, read, write
 from shiplog.mcap.encode import McapChunk, Part, mcap_chunks
-from shiplog.mcap.schema import GEOGRAPHIC
+from shiplog.units import GEOGRAPHIC
 
 START = 1_700_000_000_000_000_000
 HOUR = 3_600_000_000_000
