@@ -270,7 +270,7 @@ def bandwidths() -> tuple[float, float]:
     per_rudder = c.d * rudder_effect(c, sqrt(c.h * rpm / -c.g), rpm)
     trial = simulate(VESSEL, "zigzag-20-20", duration_secs=300.0, sensors=suite("white"))
     found = analyse(log_of(trial))
-    R = found.noise.measurement_std**2 * found.stats.interval_secs
+    R = found.findings.plan.noise.measurement_std**2 * found.findings.plan.stats.interval_secs
     q = np.array([(per_rudder * UNREST.rudder) ** 2, UNREST.force**2])
     yaw, surge = q / R
     return float(yaw**0.25), float(surge**0.5)
@@ -372,7 +372,7 @@ def waves() -> None:
         for w in (False, True)
     ]
     rows.append(("extended, smoothed", *cells))
-    found = analyse(log, settings={**told(), "filter.wave": True}).noise.wave
+    found = analyse(log, settings={**told(), "filter.wave": True}).findings.plan.noise.wave
     if found is None:
         raise RuntimeError("the wave was not found")
     say(
@@ -460,7 +460,7 @@ def disturbances() -> None:
 def real() -> None:
     """The model tests of the KVLCC2."""
     logs = [kvlcc2(path) for path in sorted(KVLCC2.glob("*/*.dat"))]
-    runs = [(log, analyse(log).vessel) for log in logs]
+    runs = [(log, analyse(log).findings.plan.vessel) for log in logs]
     say("## The KVLCC2, nine runs")
     say(
         "Nobody knows the truth here. Of each run ten seconds in every minute are withheld, yaw"
@@ -477,7 +477,10 @@ def real() -> None:
     grid("", ("filter", "yaw rate", "speed", "NIS of yaw rate", "of speed", "gated"), rows)
     rows = []
     for models in MODELS:
-        courses = [analyse(log, settings={"disturbance.models": models}).courses for log in logs]
+        courses = [
+            analyse(log, settings={"disturbance.models": models}).findings.disturbances
+            for log in logs
+        ]
         turned = np.median([degrees(c["rudder"].rms) for c in courses])
         doubt = np.median([degrees(c["rudder"].std) for c in courses])
         force = np.median([c["surge"].rms for c in courses]) * 1e3
@@ -520,9 +523,13 @@ def bridged(log: TrialLog, vessel: Vessel, settings: Settings) -> tuple[float, .
         kept &= at <= found.signals.time_secs[-1]
         error = estimated(found, at[kept], STATES.index(name)) - channel.values[kept]
         errors.append(rms(error) / float(np.nanstd(channel.values)))
-    squares = [residuals.normalised_squared for residuals in found.residuals]
-    gated = sum(residuals.gated for residuals in found.residuals)
-    return (*errors, *squares, gated / sum(residuals.count for residuals in found.residuals))
+    squares = [residuals.normalised_squared for residuals in found.findings.residuals]
+    gated = sum(residuals.gated for residuals in found.findings.residuals)
+    return (
+        *errors,
+        *squares,
+        gated / sum(residuals.count for residuals in found.findings.residuals),
+    )
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from rerun.chunk import RrdReader
 
 from analysis.filters.factory import filter_states
 from analysis.replay.replay import analyse
-from analysis.view.replay_review import write_review
+from analysis.view.replay_review import write_replay_review
 from benchmarks import filters, identification, identification_speed, logs, measure, replays
 from benchmarks.bench import NOISE, VESSEL, head
 from benchmarks.logs import NAMES, day_of_trial, write_repeated
@@ -129,7 +129,7 @@ def test_the_obvious_replay_finds_the_same_and_shows_the_same(
     # the paper's regression takes w'' and v' from the filter, and finds the filter's model again
     last, wanted = found.coefficients[-1], np.array([MODEL.d, MODEL.g, MODEL.h])
     np.testing.assert_allclose(last[[4, 7, 8]], wanted, rtol=0.2)
-    write_review(analysis, tmp_path / "ours.rrd", text="")
+    write_replay_review(analysis, tmp_path / "ours.rrd", text="")
     once = {"/summary", "/track/ships", "/track/ends", "/track/scale"}
     drawn = {e for e in entities(tmp_path / "ours.rrd") if not e.endswith(GUIDES)}
     drawn -= {e for e in drawn if e.startswith("/__")}

@@ -71,7 +71,7 @@ class Comparison:
         return "\n".join(lines)
 
 
-def as_json(comparison: Comparison) -> dict[str, object]:
+def comparison_json(comparison: Comparison) -> dict[str, object]:
     """The comparison as plain values; a largest difference that is no number is None."""
     return {
         "log": comparison.name,

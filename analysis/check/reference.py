@@ -60,12 +60,15 @@ def make_reference(analysis: Analysis) -> TrialLog:
         *_measured(analysis),
         *_assumed(analysis),
         *_estimated(analysis),
-        *_identified(analysis, analysis.yaw, analysis.yaw_history),
-        *_identified(analysis, analysis.surge, analysis.surge_history),
+        *_identified(analysis, analysis.findings.yaw, analysis.yaw_history),
+        *_identified(analysis, analysis.findings.surge, analysis.surge_history),
         *_tracked(analysis),
     ]
-    metadata = {"reference_of": analysis.name, "model": analysis.model_origin}
-    return TrialLog(analysis.name, tuple(channels), metadata)
+    metadata = {
+        "reference_of": analysis.findings.plan.name,
+        "model": analysis.findings.plan.model_origin,
+    }
+    return TrialLog(analysis.findings.plan.name, tuple(channels), metadata)
 
 
 def _measured(analysis: Analysis) -> Iterator[Channel]:
@@ -78,9 +81,9 @@ def _measured(analysis: Analysis) -> Iterator[Channel]:
 
 
 def _assumed(analysis: Analysis) -> Iterator[Channel]:
-    for name, value in analysis.vessel.paper._asdict().items():
+    for name, value in analysis.findings.plan.vessel.paper._asdict().items():
         yield _single(analysis, name, "model", value)
-    noise = analysis.noise
+    noise = analysis.findings.plan.noise
     for i, name in enumerate(PAPER_OUTPUTS):
         yield _single(analysis, f"{name}_noise", "assumed", float(noise.measurement_std[i]))
         yield _single(analysis, f"{name}_ratio", "assumed", float(noise.process_ratio[i]))
@@ -93,13 +96,13 @@ def _estimated(analysis: Analysis) -> Iterator[Channel]:
         yield _blocks(analysis, name, "std", estimates.stds[:, i])
     for i, name in enumerate(PAPER_OUTPUTS):
         yield _blocks(analysis, name, "innovation", estimates.innovations[:, i])
-        judged = analysis.residuals[i]
+        judged = analysis.findings.residuals[i]
         yield _single(analysis, f"{name}_rms", "verdict", judged.rms)
         yield _single(analysis, f"{name}_squared", "verdict", judged.normalised_squared)
         yield _single(analysis, f"{name}_expected", "verdict", judged.expected[1])
         yield _single(analysis, f"{name}_whiteness", "verdict", judged.whiteness_p)
         yield _single(analysis, f"{name}_gated", "count", float(judged.gated))
-    for kind, course in analysis.courses.items():
+    for kind, course in analysis.findings.disturbances.items():
         yield _blocks(analysis, f"{kind}_disturbance", "estimate", getattr(found, kind))
         yield _single(analysis, f"{kind}_disturbance", "std", course.std)
 
@@ -117,7 +120,7 @@ def _tracked(analysis: Analysis) -> Iterator[Channel]:
     track = analysis.track
     yield _blocks(analysis, "north", "track", track.north, track.time_secs)
     yield _blocks(analysis, "east", "track", track.east, track.time_secs)
-    yield _single(analysis, "warnings", "count", float(len(analysis.warnings)))
+    yield _single(analysis, "warnings", "count", float(len(analysis.findings.warnings)))
 
 
 def _blocks(

@@ -1,7 +1,6 @@
 """One equation's coefficients: over the whole trial, and window by window as they settled."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -40,46 +39,67 @@ class CoefficientFit:
     blank_windows: int  # that tell no coefficient
 
 
-class Identifier:
-    """Identifies one equation from rows in chunks, which come twice: to `add`, then to `step`.
+class WholeTrialRegression:
+    """Least squares over a whole trial's rows of one equation, which come in chunks.
 
-    With `constant`, a constant is estimated beside the coefficients of the whole trial: a steady
-    moment, or the rudder's zero. A gyro's bias it takes up in part only, for that stands in w|w|
-    and w^3 too. Within one window no constant can be told from the rest.
+    With `constant`, a constant is estimated beside the coefficients: a steady moment, or the
+    rudder's zero. A gyro's bias it takes up in part only, for that stands in w|w| and w^3 too.
+    """
+
+    def __init__(self, equation: Equation, *, constant: bool = False) -> None:
+        self._constant = constant
+        self._regression = Regression(equation.with_constant() if constant else equation)
+
+    def add(self, rows: Rows) -> None:
+        """Add the next rows to the sums."""
+        self._regression.add(with_constant(rows) if self._constant else rows)
+
+    def solution(self, names: tuple[str, ...] | None = None) -> Solution:
+        """Solve for all coefficients, or for `names` alone, over the rows added so far."""
+        if names is None:
+            return self._regression.solve()
+        return self._regression.solve((*names, "constant") if self._constant else names)
+
+
+class CoefficientStage:
+    """One equation's coefficients: errors over the whole trial, and the history over windows.
+
+    The rows come in chunks a second time; `solution` is what `WholeTrialRegression` found of them
+    the first time.
+
+    Parameters
+    ----------
+    equation
+        The equation, without the constant.
+    count
+        The number of rows in all.
+    solution
+        The whole trial's solution; it is not changed.
+    constant
+        Whether the solution has a constant beside the coefficients. Within one window no constant
+        can be told from the rest, so the windows never have one.
+    window_secs
+        The length of a window, s.
     """
 
     def __init__(
         self,
         equation: Equation,
         count: int,
+        solution: Solution,
         *,
         constant: bool = False,
         window_secs: float = WINDOW_SECS,
     ) -> None:
-        """Of `count` rows in all."""
         self._names, self._constant = equation.names, constant
-        self._regression = Regression(equation.with_constant() if constant else equation)
+        self._errors = Errors(solution)
         self._windows = Windows(equation, count, window_secs)
         self._ends: list[FloatArray] = []
         self._conditions: list[FloatArray] = []
         self._blank = 0
 
-    def add(self, rows: Rows) -> None:
-        """The next rows, the first time."""
-        self._regression.add(with_constant(rows) if self._constant else rows)
-
-    def solution(self, names: tuple[str, ...] | None = None) -> Solution:
-        """The values over the whole trial, of these names alone if some are given."""
-        if names is None:
-            return self._regression.solve()
-        return self._regression.solve((*names, "constant") if self._constant else names)
-
-    @cached_property
-    def _errors(self) -> Errors:
-        return Errors(self.solution())
-
     def step(self, rows: Rows) -> History:
-        """The next rows, the second time; the windows that end in them."""
+        """Take the next rows; return the windows that end in them."""
         self._errors.add(with_constant(rows) if self._constant else rows)
         history = self._windows.step(rows)
         self._ends.append(history.time_secs)
@@ -88,7 +108,7 @@ class Identifier:
         return history
 
     def result(self) -> CoefficientFit:
-        """What all rows come to, when they have come twice."""
+        """Return the whole trial's coefficients with their errors, once all rows have come."""
         whole = self._errors.result()
         coefficients = {  # a constant after them is left out
             name: Coefficient(float(value), float(std), COEFFICIENT_UNITS[name])
@@ -108,11 +128,14 @@ def identify(
 ) -> tuple[CoefficientFit, History]:
     """The coefficients over the whole trial and over each window, of rows that are all there.
 
-    As `Identifier`. A trial shorter than the window is one window.
+    A trial shorter than the window is one window.
     """
     count = len(rows.target)
-    identifier = Identifier(rows.equation, count, constant=constant, window_secs=window_secs)
-    identifier.add(rows)
+    regression = WholeTrialRegression(rows.equation, constant=constant)
+    regression.add(rows)
+    stage = CoefficientStage(
+        rows.equation, count, regression.solution(), constant=constant, window_secs=window_secs
+    )
     chunks = [rows.part(start, start + ROWS) for start in range(0, max(count, 1), ROWS)]
-    history = concatenate([identifier.step(chunk) for chunk in chunks])
-    return identifier.result(), history
+    history = concatenate([stage.step(chunk) for chunk in chunks])
+    return stage.result(), history

@@ -5,7 +5,7 @@ from shiplog.errors import LogError
 from shiplog.ships.paper import SURGE_COEFFICIENTS, Coefficients
 from shiplog.vessel.vessel import Vessel
 
-from .coefficients import Identifier
+from .coefficients import WholeTrialRegression
 
 # The rudder works in proportion to the speed: without a model nothing is known of the
 # slipstream, and d and e take the factor up.
@@ -18,7 +18,9 @@ YAW_FORMS = (("a", "b1", "b2", "d", "e"), ("a", "b1", "d", "e"), ("a", "d", "e")
 SURGE_FORMS = (SURGE_COEFFICIENTS, ("f", "h"))
 
 
-def fit_first_model(yaw: Identifier, surge: Identifier, stats: SignalStats, name: str) -> Vessel:
+def fit_first_model(
+    yaw: WholeTrialRegression, surge: WholeTrialRegression, stats: SignalStats, name: str
+) -> Vessel:
     """A vessel whose coefficients are those of the whole log, by least squares in weak form.
 
     b3 is left out, for on a real ship it cannot be told from b2; and b2 and b1 where the log
@@ -36,7 +38,7 @@ def fit_first_model(yaw: Identifier, surge: Identifier, stats: SignalStats, name
     return Vessel(f"fitted to {name}", BARE._replace(**found), approach_rpm=stats.rpm)
 
 
-def _richest(rows: Identifier, forms: tuple[tuple[str, ...], ...]) -> dict[str, float]:
+def _richest(rows: WholeTrialRegression, forms: tuple[tuple[str, ...], ...]) -> dict[str, float]:
     """The coefficients of the first of the forms that the rows can tell; none if they cannot."""
     for names in forms:
         solution = rows.solution(names)

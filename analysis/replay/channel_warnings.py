@@ -10,7 +10,7 @@ from shiplog.resampling import Clock
 ASTERN_SHARE = 0.01  # of the samples: a single one may be noise about rest
 
 
-def doubtful(found: LogStats, needed: tuple[str, ...]) -> Iterator[str]:
+def channel_warnings(found: LogStats, needed: tuple[str, ...]) -> Iterator[str]:
     """Sources to choose from, and sensors that seem dead or to go astern."""
     for name in needed:
         sources = [channel.source for channel in found if channel.name == name]
@@ -36,7 +36,7 @@ def _dead(found: LogStats) -> Iterator[str]:
         yield f"{found['rpm'].topic}: 0 throughout, though the ship goes; the model needs it"
 
 
-def silent_ends(found: LogStats, clock: Clock, needed: tuple[str, ...]) -> Iterator[str]:
+def end_warnings(found: LogStats, clock: Clock, needed: tuple[str, ...]) -> Iterator[str]:
     """Parts of the log that are not replayed, or only predicted, for want of a channel."""
     first, last = clock.start_ns, clock.end_ns
     begun = {name: found[name].known_span_ns[0] for name in needed}

@@ -1,11 +1,11 @@
-"""From a log to what it says: the order of the steps.
+"""The replay: a log run through filter, disturbance observer and regression, chunk by chunk.
 
-A log may be longer than memory: it is gone through in chunks, twice to plan the replay (`plan`) and
-at last to replay it; where its states are to be smoothed, once between, to learn what the end says
-of the beginning. Every stage takes chunks, gives chunks and carries its state; where the chunks are
-cut changes nothing.
+A log may be longer than memory: it is read in chunks, twice to plan the replay (`plan`), once to
+replay it, and once in between where the states are smoothed. Every stage takes a chunk, returns a
+chunk and carries its state; where the chunks are cut changes no result.
 """
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -16,28 +16,44 @@ from analysis.filters.base import OUTPUT_STATES, Estimates, Filter
 from analysis.filters.factory import make_filter
 from analysis.filters.smoother import Adjoint, SmoothingPass, smoothed
 from analysis.regression.changes import Change, ShipChangeTest
-from analysis.regression.coefficients import CoefficientFit
+from analysis.regression.coefficients import CoefficientFit, CoefficientStage
 from analysis.regression.sliding import History
 from analysis.signals.concat import concatenate
 from analysis.signals.hold import InputHold, held_throughout
-from shiplog import LogError, Signals, Vessel
+from shiplog import LogError, Signals, Vessel, open_log
 from shiplog.errors import UsageError
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Log
 
-from .plan import FITTED, Plan, Planner, signals_of, weak_form_of
+from .passes import resampled_chunks, weak_form_on_clock
+from .plan import Plan, plan_replay
 from .residuals import OutputResiduals, ResidualTest
 from .track import Track, Tracker
 
-STEPS = ("check", "one clock", "model", "look ahead", "replay")  # the fourth where it smooths
+# the steps reported as progress; the fourth only where states are smoothed
+PROGRESS_STEPS = ("check the log", "resample", "choose the model", "smooth", "replay")
 
 
 @dataclass(frozen=True, eq=False)
 class ReplayChunk:
-    """What a replay says of a stretch of the trial; each part as far as it is known by then."""
+    """The results of a replay for a stretch of the trial, as far as they are known by its end.
 
-    signals: Signals  # as measured, NaN where not
+    Attributes
+    ----------
+    signals
+        The resampled signals, as measured; NaN where nothing was measured.
+    estimates
+        The filter's states, on the clock of the signals.
+    disturbance
+        The disturbances estimated, on the same clock.
+    yaw_history, surge_history
+        The coefficients of the windows that end in this stretch.
+    track
+        The positions that have become known in this stretch.
+    """
+
+    signals: Signals
     estimates: Estimates
     disturbance: Disturbance
     yaw_history: History
@@ -46,171 +62,318 @@ class ReplayChunk:
 
 
 @dataclass(frozen=True, eq=False)
-class Findings(Plan):
-    """What a replay comes to."""
+class Findings:
+    """The results of a replay for the whole trial, without its time series.
 
-    metadata: dict[str, str]  # of the log
-    residuals: tuple[OutputResiduals, ...]  # of yaw rate and speed
-    courses: dict[str, DisturbanceSummary]  # of the disturbances
+    Attributes
+    ----------
+    plan
+        The plan of the replay: vessel, clock, statistics, noise.
+    metadata
+        The metadata of the log.
+    residuals
+        The tests of the innovations of yaw rate and speed.
+    disturbances
+        The summary of each disturbance: ``"yaw"``, ``"rudder"`` (yaw, as the rudder that would do
+        the same), ``"surge"``, and ``"yaw_wave"`` and ``"surge_wave"`` where they are estimated.
+    yaw, surge
+        The coefficients over the whole trial, with standard deviations.
+    changes
+        The coefficients that changed within the trial.
+    track_origin
+        How the track is known, in words.
+    warnings
+        Those of the plan and those of the replay.
+    """
+
+    plan: Plan
+    metadata: dict[str, str]
+    residuals: tuple[OutputResiduals, ...]
+    disturbances: dict[str, DisturbanceSummary]
     yaw: CoefficientFit
     surge: CoefficientFit
-    changes: tuple[Change, ...]  # of coefficients, within the trial
-    track_origin: str  # how the track is known, in words
+    changes: tuple[Change, ...]
+    track_origin: str
+    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Analysis(Findings, ReplayChunk):
-    """All that a replay found: what it comes to, and the whole trial in one chunk."""
+class Analysis:
+    """All results of a replay: the findings, and the time series of the whole trial.
+
+    Attributes
+    ----------
+    findings
+        What holds for the whole trial: plan, residual tests, coefficients, warnings.
+    signals, estimates, disturbance, yaw_history, surge_history, track
+        The time series; see `ReplayChunk`.
+    """
+
+    findings: Findings
+    signals: Signals
+    estimates: Estimates
+    disturbance: Disturbance
+    yaw_history: History
+    surge_history: History
+    track: Track
+
+    def as_chunk(self) -> ReplayChunk:
+        """Return the time series as one chunk."""
+        return ReplayChunk(
+            self.signals,
+            self.estimates,
+            self.disturbance,
+            self.yaw_history,
+            self.surge_history,
+            self.track,
+        )
 
 
 def analyse(
-    log: Log,
+    log: Log | str | os.PathLike[str],
     vessel: Vessel | None = None,
     *,
     settings: Mapping[str, object] | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> Analysis:
-    """Replay a log: check it, filter it, observe what disturbed it, identify the ship.
+    """Replay a log: filter it, estimate disturbances and coefficients, test the residuals.
 
-    The model is `vessel`'s, or the one the log carries, or else a first one fitted to the log.
-    `settings`, such as {"filter.kind": "extended"}, stand above those of its `[filter]` and
-    `[disturbance]`. `on_progress` is told each of `STEPS`, and the share of it that is done. For a
-    log longer than memory use `Replay`.
+    All results are held in memory; for a log longer than that use `plan_replay` and `Replay`.
 
-    Raises `LogError` where the log lacks a needed channel or cannot be used as it is, `UsageError`
-    for settings that do not do.
+    Parameters
+    ----------
+    log
+        A log, or the path of one.
+    vessel
+        The vessel; by default the one that the log carries, or else a first model is fitted to the
+        log.
+    settings
+        Settings that take precedence over the vessel's, such as ``{"filter.kind": "extended"}``.
+    on_progress
+        Called with each of `PROGRESS_STEPS` and its share done.
+
+    Raises
+    ------
+    LogError
+        Where the log lacks a required channel, cannot be used as it is, or does not fit the model.
+    UsageError
+        Where a setting is invalid.
+
+    Examples
+    --------
+    >>> analysis = analyse("sample_data/zigzag_20_20.mcap")
+    >>> analysis.estimates.states.shape
+    (6000, 5)
+    >>> round(analysis.findings.yaw.coefficients["d"].value, 7)
+    1.95e-05
     """
-    replay = Replay(log, vessel, settings=settings, on_progress=on_progress)
+    if isinstance(log, str | os.PathLike):
+        log = open_log(log)
+    plan = plan_replay(log, vessel, settings=settings, on_progress=on_progress)
+    replay = Replay(log, plan, on_progress=on_progress)
     whole = concatenate(list(replay.chunks()))
-    return Analysis(**vars(whole), **vars(replay.findings))
+    return Analysis(
+        replay.findings,
+        whole.signals,
+        whole.estimates,
+        whole.disturbance,
+        whole.yaw_history,
+        whole.surge_history,
+        whole.track,
+    )
 
 
 class Replay:
-    """A replay in chunks: go through `chunks`, then ask for the `findings`.
+    """A replay in chunks: iterate over `chunks`, then read `findings`.
 
-    As `analyse`, except that no more than a chunk is held. Its `plan` is made at once, from two
-    passes over the log; the chunks are the last.
+    No more than a chunk is held in memory.
+
+    Parameters
+    ----------
+    log
+        The log.
+    plan
+        Its plan, from `plan_replay`. It is not changed; another replay may use it, too.
+    on_progress
+        Called with each step and its share done.
+
+    Examples
+    --------
+    >>> from shiplog import open_log
+    >>> log = open_log("sample_data/zigzag_20_20.mcap")
+    >>> replay = Replay(log, plan_replay(log))
+    >>> sum(len(chunk.signals) for chunk in replay.chunks())
+    6000
     """
 
     def __init__(
-        self,
-        log: Log,
-        vessel: Vessel | None = None,
-        *,
-        settings: Mapping[str, object] | None = None,
-        on_progress: ProgressCallback = no_progress,
+        self, log: Log, plan: Plan, *, on_progress: ProgressCallback = no_progress
     ) -> None:
-        self._log, self._tell = log, on_progress
-        planned = Planner(log, vessel, settings or {}, on_progress)
-        self.plan, self._yaw, self._surge = planned.plan, planned.yaw, planned.surge
-        self._begun = False
+        self._log, self.plan, self._on_progress = log, plan, on_progress
+        self._started = False
         self._findings: Findings | None = None
 
     def chunks(self) -> Iterator[ReplayChunk]:
         """Replay the trial, once.
 
-        Raises `LogError` where the model does not fit it at all.
+        Raises
+        ------
+        LogError
+            Where the filter or the observer diverges.
         """
-        if self._begun:
+        if self._started:
             raise ValueError("the chunks of a replay come once; make another")
-        self._begun = True
-        plan, clock, fastest = self.plan, self.plan.clock, self.plan.stats.fastest
-        ends = self._looked_ahead() if plan.vessel.filter.smooth else None
-        holding, (filtering, observing) = InputHold(clock), self._designed()
-        tests = [self._residual_test(output) for output in range(len(PAPER_OUTPUTS))]
-        weak_form = weak_form_of(plan.vessel.paper, clock, plan.stats.intervals)
-        watching = ShipChangeTest(weak_form, guessed=plan.model_origin == FITTED)
-        tracking = Tracker(clock, plan.log_stats.get("position"))
-        watches = holding.add_raw, tracking.add_raw
-        on_clock = signals_of(self._log, clock, self._tell, "replay", *watches)
-        for signals, held, following in held_throughout(on_clock, holding):
-            estimates = _estimated(filtering, held, following, ends)
-            if not np.all(np.isfinite(estimates.states)):
-                raise self._runs_away()
-            for i, test in enumerate(tests):
-                e, stds, gated = estimates.innovations, estimates.innovation_stds, estimates.gated
-                test.add(e[:, i], stds[:, i], gated[:, i])
-            disturbance = observing.step(_without_gated(held, estimates), following)
-            yaw_rows, surge_rows = weak_form.step(signals, fastest)
-            watching.add(yaw_rows, surge_rows)
-            yaw, surge = self._yaw.step(yaw_rows), self._surge.step(surge_rows)
-            track = tracking.step(signals, *(estimates.states[:, i] for i in OUTPUT_STATES))
-            yield ReplayChunk(signals, estimates, disturbance, yaw, surge, track)
-        residuals = tuple(test.result() for test in tests)
-        changes = watching.result()
-        said = [residual.caution for residual in residuals if residual.caution]
-        said += map(str, changes)
-        self._findings = Findings(
-            **vars(plan) | {"warnings": (*plan.warnings, *said)},
-            metadata=dict(self._log.metadata),
-            residuals=residuals,
-            courses=observing.result(),
-            yaw=self._yaw.result(),
-            surge=self._surge.result(),
-            changes=changes,
-            track_origin=tracking.origin,
-        )
+        self._started = True
+        clock = self.plan.clock
+        adjoints = self._backward_pass() if self.plan.vessel.filter.smooth else None
+        hold, stages = InputHold(clock), _Stages(self.plan, self._log.name)
+        listeners = hold.add_raw, stages.tracker.add_raw
+        resampled = resampled_chunks(self._log, clock, self._on_progress, "replay", *listeners)
+        for signals, held, following in held_throughout(resampled, hold):
+            adjoint = next(adjoints) if adjoints is not None else None
+            yield stages.step(signals, held, following, adjoint)
+        self._findings = stages.findings(dict(self._log.metadata))
 
     @property
     def findings(self) -> Findings:
-        """What the replay came to. Raises `ValueError` before its chunks were gone through."""
+        """The findings; raises `ValueError` before the chunks were iterated over."""
         if self._findings is None:
             raise ValueError("go through the chunks first")
         return self._findings
 
-    def _looked_ahead(self) -> Iterator[Adjoint]:
-        """Of each chunk, in their order, what the measurements after it say: one more pass."""
-        holding, (filtering, _) = InputHold(self.plan.clock), self._designed()
-        ahead = SmoothingPass(filtering.outputs)
-        on_clock = signals_of(self._log, self.plan.clock, self._tell, "look ahead", holding.add_raw)
-        for _, held, following in held_throughout(on_clock, holding):
-            ahead.add(filtering.trace(held, following)[1])
-        return iter(ahead.result())
-
-    def _designed(self) -> tuple[Filter, ForceObserver]:
-        """The filter and the observer; of a model that runs away neither may be had."""
-        model, noise, stats = self.plan.vessel.paper, self.plan.noise, self.plan.stats
-        try:
-            with np.errstate(over="ignore", invalid="ignore"):
-                filtering = make_filter(model, noise, stats, self.plan.vessel.filter)
-                observed = self.plan.observed
-                observing = ForceObserver(model, noise, stats, observed, observed.wave_frequency)
-                return filtering, observing
-        except (UsageError, np.linalg.LinAlgError) as error:
-            raise self._runs_away(f" ({error})") from error
-
-    def _residual_test(self, output: int) -> ResidualTest:
-        name, plan = PAPER_OUTPUTS[output], self.plan
-        interval = float(plan.stats.intervals[output])
-        unit, noise_measured = plan.log_stats[name].unit, plan.noise.measured[output]
-        return ResidualTest(name, unit, interval, noise_measured=noise_measured)
-
-    def _runs_away(self, why: str = "") -> LogError:
-        return LogError(
-            f"the filter or the observer runs away{why}: the model ({self.plan.model_origin}) or "
-            f"the settings do not fit this log; give the ship's own with --vessel: {self._log.name}"
+    def _backward_pass(self) -> Iterator[Adjoint]:
+        """Return for each chunk, in order, what the measurements after it add: one more pass."""
+        plan = self.plan
+        hold, (filter_, _) = InputHold(plan.clock), _estimators(plan, self._log.name)
+        backward = SmoothingPass(filter_.outputs)
+        resampled = resampled_chunks(
+            self._log, plan.clock, self._on_progress, "smooth", hold.add_raw
         )
+        for _, held, following in held_throughout(resampled, hold):
+            backward.add(filter_.trace(held, following)[1])
+        return iter(backward.result())
+
+
+class _Stages:
+    """The stages of a replay; each takes a chunk, returns a chunk and carries its state."""
+
+    def __init__(self, plan: Plan, log_name: str) -> None:
+        self._plan, self._log_name = plan, log_name
+        self._filter, self._observer = _estimators(plan, log_name)
+        self._residual_tests = [_residual_test(plan, i) for i in range(len(PAPER_OUTPUTS))]
+        weak_form = weak_form_on_clock(plan.vessel.paper, plan.clock, plan.stats.intervals)
+        count, window_secs = weak_form.row_count, plan.vessel.identifier.window_secs
+        self._yaw = CoefficientStage(
+            weak_form.yaw, count, plan.yaw_solution, constant=True, window_secs=window_secs
+        )
+        self._surge = CoefficientStage(
+            weak_form.surge, count, plan.surge_solution, window_secs=window_secs
+        )
+        self._weak_form = weak_form
+        self._change_test = ShipChangeTest(weak_form, guessed=plan.model_is_fitted)
+        self.tracker = Tracker(plan.clock, plan.log_stats.get("position"))
+
+    def step(
+        self,
+        signals: Signals,
+        held: Signals,
+        following: Mapping[str, float],
+        adjoint: Adjoint | None,
+    ) -> ReplayChunk:
+        """Replay the next chunk.
+
+        Parameters
+        ----------
+        signals
+            The chunk as measured.
+        held
+            The same with the inputs held where they were not measured.
+        following
+            The inputs at the instant after the chunk.
+        adjoint
+            What the measurements after the chunk add; None where the states are not smoothed.
+        """
+        estimates = self._estimates(held, following, adjoint)
+        for i, test in enumerate(self._residual_tests):
+            test.add(
+                estimates.innovations[:, i], estimates.innovation_stds[:, i], estimates.gated[:, i]
+            )
+        disturbance = self._observer.step(_without_gated(held, estimates), following)
+        yaw_rows, surge_rows = self._weak_form.step(signals, self._plan.stats.fastest)
+        self._change_test.add(yaw_rows, surge_rows)
+        return ReplayChunk(
+            signals,
+            estimates,
+            disturbance,
+            self._yaw.step(yaw_rows),
+            self._surge.step(surge_rows),
+            self.tracker.step(signals, *(estimates.states[:, i] for i in OUTPUT_STATES)),
+        )
+
+    def findings(self, metadata: dict[str, str]) -> Findings:
+        """Return the findings, once all chunks were replayed."""
+        residuals = tuple(test.result() for test in self._residual_tests)
+        changes = self._change_test.result()
+        warnings = [residual.caution for residual in residuals if residual.caution]
+        return Findings(
+            plan=self._plan,
+            metadata=metadata,
+            residuals=residuals,
+            disturbances=self._observer.result(),
+            yaw=self._yaw.result(),
+            surge=self._surge.result(),
+            changes=changes,
+            track_origin=self.tracker.origin,
+            warnings=(*self._plan.warnings, *warnings, *map(str, changes)),
+        )
+
+    def _estimates(
+        self, held: Signals, following: Mapping[str, float], adjoint: Adjoint | None
+    ) -> Estimates:
+        """Filter the next chunk, and smooth it where `adjoint` is given."""
+        if adjoint is None:
+            estimates = self._filter.step(held, following)
+        else:
+            filtered, trace = self._filter.trace(held, following)
+            estimates = smoothed(self._filter, held, following, filtered, trace, adjoint)
+        if not np.all(np.isfinite(estimates.states)):
+            raise _diverged(self._plan, self._log_name)
+        return estimates
+
+
+def _estimators(plan: Plan, log_name: str) -> tuple[Filter, ForceObserver]:
+    """Design the filter and the observer; for a model that diverges neither may exist."""
+    model, noise, stats = plan.vessel.paper, plan.noise, plan.stats
+    settings = plan.disturbance_settings
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            filter_ = make_filter(model, noise, stats, plan.vessel.filter)
+            observer = ForceObserver(model, noise, stats, settings, settings.wave_frequency)
+            return filter_, observer
+    except (UsageError, np.linalg.LinAlgError) as error:
+        raise _diverged(plan, log_name, f" ({error})") from error
+
+
+def _diverged(plan: Plan, log_name: str, reason: str = "") -> LogError:
+    return LogError(
+        f"the filter or the observer runs away{reason}: the model ({plan.model_origin}) or "
+        f"the settings do not fit this log; give the ship's own with --vessel: {log_name}"
+    )
+
+
+def _residual_test(plan: Plan, output: int) -> ResidualTest:
+    """Set up the test of the innovations of yaw rate, 0, or speed, 1."""
+    name, interval = PAPER_OUTPUTS[output], float(plan.stats.intervals[output])
+    unit, noise_measured = plan.log_stats[name].unit, plan.noise.measured[output]
+    return ResidualTest(name, unit, interval, noise_measured=noise_measured)
 
 
 def _without_gated(held: Signals, estimates: Estimates) -> Signals:
-    """The signals without what the filter did not believe."""
+    """Return the signals with the samples that the filter rejected set to NaN."""
     if not estimates.gated.any():
         return held
-    believed = {
+    accepted = {
         name: np.where(estimates.gated[:, i], np.nan, held[name])
         for i, name in enumerate(PAPER_OUTPUTS)
     }
-    return replace(held, values=dict(held.values) | believed)
-
-
-def _estimated(
-    filtering: Filter,
-    held: Signals,
-    following: Mapping[str, float],
-    ends: Iterator[Adjoint] | None,
-) -> Estimates:
-    """The next chunk's estimates, smoothed where it is known what comes after."""
-    if ends is None:
-        return filtering.step(held, following)
-    estimates, trace = filtering.trace(held, following)
-    return smoothed(filtering, held, following, estimates, trace, next(ends))
+    return replace(held, values=dict(held.values) | accepted)

@@ -13,7 +13,7 @@ from analysis.manoeuvres.indices import Figure
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.units import CATALOGUE, conversion_factor
 
-from .replay_tables import Section
+from .section import Section
 
 FITTED = "output error"
 PEOPLES = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}

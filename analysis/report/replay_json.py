@@ -20,14 +20,14 @@ from shiplog.vessel.settings import as_table
 Summary = dict[str, Any]
 
 
-def summarise(findings: Findings) -> Summary:
+def replay_json(findings: Findings) -> Summary:
     """The summary as plain numbers in SI, ready for JSON; what is not a number is None."""
-    log_stats, clock = findings.log_stats, findings.clock
+    log_stats, clock = findings.plan.log_stats, findings.plan.clock
     start_ns, _ = log_stats.span_ns
     summary = {
         "shiplog": __version__,
         "log": {
-            "name": findings.name,
+            "name": findings.plan.name,
             "start": datetime.fromtimestamp(start_ns * 1e-9, UTC).isoformat(),
             "duration_secs": log_stats.duration_secs,
             "dt_secs": clock.dt_secs,
@@ -36,11 +36,11 @@ def summarise(findings: Findings) -> Summary:
             "channels": {channel.topic: _channel(channel) for channel in log_stats},
         },
         "model": {
-            "name": findings.vessel.name,
-            "origin": findings.model_origin,
+            "name": findings.plan.vessel.name,
+            "origin": findings.plan.model_origin,
             "coefficients": {
                 name: {"value": value, "unit": COEFFICIENT_UNITS[name]}
-                for name, value in findings.vessel.paper._asdict().items()
+                for name, value in findings.plan.vessel.paper._asdict().items()
             },
         },
         "filter": {
@@ -48,7 +48,7 @@ def summarise(findings: Findings) -> Summary:
             for i, residuals in enumerate(findings.residuals)
         },
         "settings": _settings(findings),
-        "wave": _wave(findings.noise.wave),
+        "wave": _wave(findings.plan.noise.wave),
         "disturbance": _disturbance(findings),
         "coefficients": _coefficients(findings.yaw) | _coefficients(findings.surge),
         "changes": [_change(change) for change in findings.changes],
@@ -70,7 +70,7 @@ def _channel(channel: ChannelStats) -> Summary:
 
 
 def _residuals(findings: Findings, output: int) -> Summary:
-    residuals, noise = findings.residuals[output], findings.noise
+    residuals, noise = findings.residuals[output], findings.plan.noise
     return {
         "unit": residuals.unit,
         "innovations": residuals.count,
@@ -90,11 +90,11 @@ def _residuals(findings: Findings, output: int) -> Summary:
 
 
 def _settings(findings: Findings) -> Summary:
-    filtering = as_table(findings.vessel.filter) | {"kind": findings.vessel.filter.chosen}
+    filtering = as_table(findings.plan.vessel.filter) | {"kind": findings.plan.vessel.filter.chosen}
     return {
         "filter": filtering,
-        "disturbance": as_table(findings.observed),
-        "identifier": as_table(findings.vessel.identifier),
+        "disturbance": as_table(findings.plan.disturbance_settings),
+        "identifier": as_table(findings.plan.vessel.identifier),
     }
 
 
@@ -114,7 +114,7 @@ def _wave(wave: Wave | None) -> Summary | None:
 
 def _disturbance(findings: Findings) -> Summary:
     keys = {"rudder": "yaw_as_rudder"}
-    return {keys.get(name, name): _course(course) for name, course in findings.courses.items()}
+    return {keys.get(name, name): _course(course) for name, course in findings.disturbances.items()}
 
 
 def _course(course: DisturbanceSummary) -> Summary:

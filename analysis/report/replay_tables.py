@@ -1,17 +1,17 @@
 """What a replay found as tables and words: for the terminal, and for Rerun's page."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
 from math import degrees, isfinite, pi
 
 import numpy as np
 
 from analysis.disturbance.observer import DISTURBANCE_UNITS
-from analysis.replay.plan import FITTED
+from analysis.replay.plan import FITTED_MODEL
 from analysis.replay.replay import Findings
 from analysis.replay.residuals import OutputResiduals
-from analysis.view.series import GUIDE
+from analysis.view.series import BAND_STDS
 from shiplog.units import CATALOGUE, conversion_factor
+
+from .section import Section, markdown_page
 
 DISTURBANCES = {
     "rudder": "yaw, as rudder",
@@ -22,17 +22,7 @@ DISTURBANCES = {
 }
 
 
-@dataclass(frozen=True)
-class Section:
-    """A table for people."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    remarks: tuple[str, ...] = ()
-
-
-def sections(findings: Findings) -> tuple[Section, ...]:
+def replay_tables(findings: Findings) -> tuple[Section, ...]:
     """The summary as tables, in the units people use, and its verdicts in words."""
     return (
         _log_section(findings),
@@ -43,33 +33,15 @@ def sections(findings: Findings) -> tuple[Section, ...]:
     )
 
 
-def markdown(findings: Findings) -> str:
+def replay_markdown(findings: Findings) -> str:
     """The summary as a page of text."""
-    log, *found = sections(findings)
+    log, *found = replay_tables(findings)
     # what was found first: a page is read from its top
-    return page(findings.name, (*found, log), findings.warnings)
-
-
-def page(title: str, tables: Iterable[Section], warnings: Iterable[str]) -> str:
-    """Tables, their remarks and warnings in Markdown."""
-    blocks = [f"# {title}"]
-    for section in tables:
-        columns = (column.replace("\n", " ") for column in section.columns)
-        blocks += [f"## {section.title}", _markdown_table(columns, section.rows)]
-        blocks += [f"*{remark}*" for remark in section.remarks]
-    said = "\n".join(f"- {warning}" for warning in warnings)
-    blocks += ["## Warnings", said] if said else []
-    return "\n\n".join(blocks) + "\n"
-
-
-def _markdown_table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    columns = [column or " " for column in columns]
-    lines = [columns, ["---"] * len(columns), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    return markdown_page(findings.plan.name, (*found, log), findings.warnings)
 
 
 def _log_section(findings: Findings) -> Section:
-    log_stats, rows = findings.log_stats, []
+    log_stats, rows = findings.plan.log_stats, []
     for channel in log_stats:
         rate = f"{1 / channel.usual_secs:.3g} Hz" if channel.usual_secs else ""
         gaps = "none"
@@ -83,8 +55,10 @@ def _log_section(findings: Findings) -> Section:
 
 
 def _filter_section(findings: Findings) -> Section:
-    fitted = findings.model_origin == FITTED
-    model = FITTED if fitted else f"{findings.vessel.name} ({findings.model_origin})"
+    fitted = findings.plan.model_is_fitted
+    model = (
+        FITTED_MODEL if fitted else f"{findings.plan.vessel.name} ({findings.plan.model_origin})"
+    )
     rows, remarks = [], [f"Model: {model}.", _chosen(findings)]
     for residuals in findings.residuals:
         unit = CATALOGUE[residuals.name].display_unit
@@ -105,7 +79,7 @@ def _filter_section(findings: Findings) -> Section:
 
 def _chosen(findings: Findings) -> str:
     """Which filter it was, in words."""
-    settings, wave = findings.vessel.filter, findings.noise.wave
+    settings, wave = findings.plan.vessel.filter, findings.plan.noise.wave
     smoothed = ", smoothed from the end back" if settings.smooth else ""
     said = f"Filter: {settings.chosen}{smoothed}; gated: off by over {settings.gate:g} σ."
     if wave is None:
@@ -133,11 +107,11 @@ def _verdict(residuals: OutputResiduals) -> str:
 
 def _disturbance_section(findings: Findings) -> Section:
     rows = []
-    slow = {"constant", "ramp"} & set(findings.observed.models)
+    slow = {"constant", "ramp"} & set(findings.plan.disturbance_settings.models)
     for name, label in DISTURBANCES.items():
-        if name not in findings.courses or not (slow or name.endswith("wave")):
+        if name not in findings.disturbances or not (slow or name.endswith("wave")):
             continue
-        course, (_, unit, scale) = findings.courses[name], DISTURBANCE_UNITS[name]
+        course, (_, unit, scale) = findings.disturbances[name], DISTURBANCE_UNITS[name]
         values = (course.mean, course.rms, course.last, course.std)
         rows.append(
             (f"{label} [{unit}]", *(f"{v * scale:.3g}" if isfinite(v) else "" for v in values))
@@ -148,14 +122,14 @@ def _disturbance_section(findings: Findings) -> Section:
         "The std is by sensor noise alone; an error of the model counts as a disturbance."
     )
     remarks = [f"Models: {_observed(findings)}.", caution]
-    if findings.model_origin == FITTED:
+    if findings.plan.model_is_fitted:
         remarks.append("The model was fitted to this log: this is what it leaves unexplained.")
     return Section("Disturbance observed", columns, tuple(rows), tuple(remarks))
 
 
 def _observed(findings: Findings) -> str:
     """Which disturbances were looked for, in words."""
-    settings = findings.observed
+    settings = findings.plan.disturbance_settings
     said = [model for model in dict.fromkeys(settings.models) if model != "wave"]
     if "wave" in settings.models and settings.wave_frequency is not None:
         said.append(f"a wave of {settings.wave_frequency:.3g} rad/s")
@@ -163,14 +137,14 @@ def _observed(findings: Findings) -> str:
 
 
 def _coefficient_section(findings: Findings) -> Section:
-    model, rows = findings.vessel.paper._asdict(), []
+    model, rows = findings.plan.vessel.paper._asdict(), []
     for found in (findings.yaw, findings.surge):
         for name, coefficient in found.coefficients.items():
             value, std = f"{coefficient.value:.4g}", f"{coefficient.std:.2g}"
             if not coefficient.determined:
                 value, std = "not determined", f"{coefficient.std:.2g}" if std != "nan" else ""
             rows.append((name, value, std, coefficient.unit, f"{model[name]:.4g}"))
-    if findings.model_origin == FITTED:  # beside itself it would only seem confirmed
+    if findings.plan.model_is_fitted:  # beside itself it would only seem confirmed
         rows = [(*row[:-1], "") for row in rows]
     remark = (
         f"Condition of the scaled regressors: yaw {findings.yaw.condition:.0f}, "
@@ -182,7 +156,7 @@ def _coefficient_section(findings: Findings) -> Section:
     remarks = [remark]
     if any(residuals.gated for residuals in findings.residuals):
         remarks.append("Gated samples are in this fit all the same: spikes spoil b1, b2, b3 and e.")
-    if findings.model_origin == FITTED:
+    if findings.plan.model_is_fitted:
         remarks.append(
             "With no model the rudder is taken to work in proportion to the speed (α = 1, 0, 0): "
             "d and e are not to be laid beside those of a vessel whose slipstream is known."
@@ -197,8 +171,8 @@ def _change_sections(findings: Findings) -> tuple[Section, ...]:
         (
             f"{change.name} [{change.unit}]",
             f"{change.at_secs:.0f} s",
-            f"{change.before:.3g} ± {GUIDE * change.before_std:.2g}",
-            f"{change.after:.3g} ± {GUIDE * change.after_std:.2g}",
+            f"{change.before:.3g} ± {BAND_STDS * change.before_std:.2g}",
+            f"{change.after:.3g} ± {BAND_STDS * change.after_std:.2g}",
             change.by.removeprefix("by ").replace(" %", "", 1) if isfinite(change.share) else "",
         )
         for change in findings.changes

@@ -10,7 +10,6 @@ import rerun.blueprint as rrb
 from analysis.identification.comparison.history import run_secs
 from analysis.identification.identify import IdentifiedShip
 from analysis.report.identification_tables import identification_tables
-from analysis.report.replay_tables import page
 
 from .identification_panels import RunSheet, parameter_panels, run_sheets
 from .panels import Panel
@@ -45,7 +44,7 @@ def write_review(found: IdentifiedShip, path: str | os.PathLike[str]) -> None:
     sheets, coefficients = list(run_sheets(found)), parameter_panels(found)
     with saving(recording, path):
         rr.send_blueprint(_blueprint(found, sheets, coefficients), recording=recording)
-        text = page(
+        text = markdown_page(
             f"{found.model.title}, identified", identification_tables(found), found.warnings
         )
         send_text(recording, "summary", KEY + text)

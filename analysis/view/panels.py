@@ -15,9 +15,9 @@ from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
 
 from .series import (
+    BAND_STDS,
     BLUE,
     GREY,
-    GUIDE,
     ORANGE,
     RED,
     Colour,
@@ -55,9 +55,9 @@ def equation_panels(findings: Findings, drawn: Drawn) -> tuple[list[Panel], list
     return yaw, surge
 
 
-def coefficient_panels(findings: Findings, drawn: Drawn) -> list[Panel]:
+def history_panels(findings: Findings, drawn: Drawn) -> list[Panel]:
     """The history of each coefficient that any window could tell, beside the model's value."""
-    model = findings.vessel.paper._asdict()
+    model = findings.plan.vessel.paper._asdict()
     panels = [
         _coefficient(findings, drawn, name, coefficient, model[name], colour)
         for found, colour in ((findings.yaw, BLUE), (findings.surge, ORANGE))
@@ -86,12 +86,12 @@ def _input(drawn: Drawn, name: str) -> Panel:
 
 
 def _disturbance(findings: Findings, drawn: Drawn, name: str) -> Panel:
-    observed, course = drawn[f"disturbance_{name}/observed"], findings.courses[name]
+    observed, course = drawn[f"disturbance_{name}/observed"], findings.disturbances[name]
     _, unit, scale = DISTURBANCE_UNITS[name]
     values = observed.lines[0].values
     settled = observed.time_secs >= course.settling_secs
     kept = values[settled] if settled.mean() > 0.5 else values
-    noise, waves = GUIDE * course.std * scale, _if_drawn(drawn, f"disturbance_{name}/harmonic")
+    noise, waves = BAND_STDS * course.std * scale, _if_drawn(drawn, f"disturbance_{name}/harmonic")
     return Panel(
         f"disturbance_{name}",
         f"{name} disturbance [{unit}]",
@@ -105,8 +105,8 @@ def _residual(findings: Findings, drawn: Drawn, name: str) -> Panel:
     return Panel(
         f"residual_{name}",
         f"{_words(name)} residual [expected std]",
-        (normalised, _guides(findings, "±2", GUIDE, "over")),
-        limits(normalised.lines[0].values, np.array([-2.0, 2.0]) * GUIDE),
+        (normalised, _guides(findings, "±2", BAND_STDS, "over")),
+        limits(normalised.lines[0].values, np.array([-2.0, 2.0]) * BAND_STDS),
     )
 
 
@@ -120,8 +120,8 @@ def _coefficient(
         return None
     size = max(abs(model), float(np.median(np.abs(value[known]))))
     prefix, scale = thousands(size)
-    value, spread = value * scale, GUIDE * std * scale
-    result, doubt = whole.value * scale, GUIDE * whole.std * scale
+    value, spread = value * scale, BAND_STDS * std * scale
+    result, doubt = whole.value * scale, BAND_STDS * whole.std * scale
     changes = [change for change in findings.changes if change.name == name]
     steps = [_levels(changes, scale)] if changes else []
     axis = _coefficient_limits(value[known], spread[known], result, doubt, model * scale)
@@ -175,7 +175,7 @@ def _guides(findings: Findings, name: str, bound: float, series: str = "bounds")
 
 
 def _ends(findings: Findings) -> FloatArray:
-    clock = findings.clock
+    clock = findings.plan.clock
     return np.array([0.0, (clock.count - 1) * clock.dt_secs])
 
 

@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from analysis.replay.plan import Plan
 from analysis.replay.replay import Analysis, Findings, ReplayChunk
 
-from .panels import Panel, coefficient_panels, equation_panels
+from .panels import Panel, equation_panels, history_panels
 from .rerun_io import (
     chart_view,
     laid_out,
@@ -38,8 +38,8 @@ A gap: not measured, or a window that cannot tell.*
 """
 
 
-class Review:
-    """A review that is drawn as the chunks of a replay come; made by `reviewing`."""
+class ReplayReview:
+    """A review that is drawn as the chunks of a replay come; made by `open_replay_review`."""
 
     def __init__(self, plan: Plan, recording: rr.RecordingStream, *, full: bool) -> None:
         self._recording, self._full = recording, full
@@ -58,7 +58,10 @@ class Review:
         recording, start_ns = self._recording, self._start_ns
         drawn = self._sketch.result()
         yaw, surge = equation_panels(findings, drawn)
-        coefficients, chart = coefficient_panels(findings, drawn), draw_track(findings, drawn)
+        coefficients, chart = (
+            history_panels(findings, drawn),
+            draw_track(findings, drawn),
+        )
         rr.send_blueprint(_blueprint(yaw, surge, coefficients, chart), recording=recording)
         _send_properties(recording, findings)
         send_text(recording, "summary", KEY + text)
@@ -74,7 +77,9 @@ class Review:
 
 
 @contextmanager
-def reviewing(plan: Plan, path: str | os.PathLike[str], *, full: bool = False) -> Iterator[Review]:
+def open_replay_review(
+    plan: Plan, path: str | os.PathLike[str], *, full: bool = False
+) -> Iterator[ReplayReview]:
     """A review that becomes the .rrd file `path` when it was finished.
 
     Of a long trial the series are thinned to what a screen can show, with every extreme kept;
@@ -83,16 +88,16 @@ def reviewing(plan: Plan, path: str | os.PathLike[str], *, full: bool = False) -
     """
     recording = _recording(plan)
     with saving(recording, path):
-        yield Review(plan, recording, full=full)
+        yield ReplayReview(plan, recording, full=full)
 
 
-def write_review(
+def write_replay_review(
     analysis: Analysis, path: str | os.PathLike[str], *, text: str, full: bool = False
 ) -> None:
-    """Write the review of a whole analysis to an .rrd file; as `reviewing`."""
-    with reviewing(analysis, path, full=full) as review:
-        review.add(analysis)
-        review.finish(analysis, text)
+    """Write the review of a whole analysis to an .rrd file; as `open_replay_review`."""
+    with open_replay_review(analysis.findings.plan, path, full=full) as review:
+        review.add(analysis.as_chunk())
+        review.finish(analysis.findings, text)
 
 
 def _recording(plan: Plan) -> rr.RecordingStream:
@@ -114,14 +119,14 @@ def _recording(plan: Plan) -> rr.RecordingStream:
 
 
 def _send_properties(recording: rr.RecordingStream, findings: Findings) -> None:
-    recording.send_recording_name(findings.name)
-    rr.send_recording_start_time_nanos(findings.clock.start_ns, recording=recording)
+    recording.send_recording_name(findings.plan.name)
+    rr.send_recording_start_time_nanos(findings.plan.clock.start_ns, recording=recording)
     trial = rr.AnyValues(
-        vessel=findings.vessel.name,
-        model=findings.model_origin,
-        duration_secs=findings.log_stats.duration_secs,
-        dt_secs=findings.clock.dt_secs,
-        samples=findings.clock.count,
+        vessel=findings.plan.vessel.name,
+        model=findings.plan.model_origin,
+        duration_secs=findings.plan.log_stats.duration_secs,
+        dt_secs=findings.plan.clock.dt_secs,
+        samples=findings.plan.clock.count,
         warnings=list(findings.warnings) or ["none"],
     )
     recording.send_property("trial", trial)

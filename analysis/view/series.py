@@ -20,7 +20,7 @@ from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, conversion_factor
 
 POINTS = 20_000  # a series: more than a screen has, and quickly drawn
-GUIDE = 2.0  # standard deviations, of every band drawn
+BAND_STDS = 2.0  # standard deviations, of every band drawn
 
 Colour = tuple[int, int, int, int]
 GREY: Colour = (140, 140, 140, 255)
@@ -95,7 +95,7 @@ class Sketch:
             line = Line("measured", measured, GREY, 2.5)
             drawn[f"{name}/measured"] = Series("measured", times, (line,), spiky=True)
             value = estimates.states[:, state] * scale
-            band = banded("estimate", value, GUIDE * estimates.stds[:, state] * scale, colour)
+            band = banded("estimate", value, BAND_STDS * estimates.stds[:, state] * scale, colour)
             drawn[f"{name}/state"] = Series("state", at, band, spiky=self._spiky)
             if state == 0 and estimates.wave is not None:
                 line = Line("wave", estimates.wave * scale, CYAN)

@@ -44,7 +44,7 @@ def draw_track(findings: Findings, drawn: Mapping[str, Series]) -> Chart | None:
         heading = np.interp(track.time_secs, compass.time_secs, compass.lines[0].values)
     title = f"track, north up: {findings.track_origin}"
     positions = np.column_stack((north, east))
-    return chart(title, positions, track.time_secs, heading, findings.vessel.length)
+    return chart(title, positions, track.time_secs, heading, findings.plan.vessel.length)
 
 
 def chart(

@@ -22,7 +22,7 @@ from .arguments import gust, known, parser, random_forcing, replay_settings, set
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from analysis.report.replay_tables import Section
+    from analysis.report.section import Section
 FINE, FAILURE, USAGE, DATA_LOST = 0, 1, 2, 3
 
 
@@ -119,9 +119,10 @@ def _run_info(arguments: argparse.Namespace) -> int:
 
 def _run_replay(arguments: argparse.Namespace) -> int:
     _require_ours("analysis")
+    from analysis.replay.plan import plan_replay
     from analysis.replay.replay import Replay
-    from analysis.report.replay_json import summarise
-    from analysis.report.replay_tables import markdown, sections
+    from analysis.report.replay_json import replay_json
+    from analysis.report.replay_tables import replay_markdown, replay_tables
     from shiplog.mcap.stream import open_log
     from shiplog.vessel.vessel import load_vessel
 
@@ -136,21 +137,22 @@ def _run_replay(arguments: argparse.Namespace) -> int:
         tell("read")
         log = open_log(arguments.log).select_sources(preferred)
         try:
-            replay = Replay(log, vessel, settings=chosen, on_progress=tell)
+            plan = plan_replay(log, vessel, settings=chosen, on_progress=tell)
         except ShiplogError:
             _warn(log.warnings)  # they may explain it
             raise
-        from analysis.view.replay_review import reviewing
+        from analysis.view.replay_review import open_replay_review
 
-        with reviewing(replay.plan, output, full=arguments.full) as review:
+        replay = Replay(log, plan, on_progress=tell)
+        with open_replay_review(plan, output, full=arguments.full) as review:
             for chunk in replay.chunks():
                 review.add(chunk)
             findings = replay.findings
             tell("review")
-            review.finish(findings, markdown(findings))
+            review.finish(findings, replay_markdown(findings))
     if arguments.json:
-        _write_json(summarise(findings), arguments.json)
-    _print_tables(sections(findings), to_stderr=arguments.json == "-")
+        _write_json(replay_json(findings), arguments.json)
+    _print_tables(replay_tables(findings), to_stderr=arguments.json == "-")
     _warn(findings.warnings)
     _show_review(output, view=arguments.view)
     return DATA_LOST if log.data_lost else FINE
@@ -225,7 +227,7 @@ def _run_identify(arguments: argparse.Namespace) -> int:
 
 def _run_check(arguments: argparse.Namespace) -> int:
     _require_ours("analysis")
-    from analysis.check.compare import as_json, compare, logs_in, reference_path, update
+    from analysis.check.compare import compare, comparison_json, logs_in, reference_path, update
 
     if arguments.update and os.environ.get("CI"):
         raise UsageError("references are not updated in CI; run it where somebody looks")
@@ -239,7 +241,7 @@ def _run_check(arguments: argparse.Namespace) -> int:
     for comparison in comparisons:
         print(comparison, file=sys.stderr if arguments.json == "-" else sys.stdout)
     if arguments.json:
-        _write_json([as_json(comparison) for comparison in comparisons], arguments.json)
+        _write_json([comparison_json(comparison) for comparison in comparisons], arguments.json)
     if arguments.update:
         unusable = [c.name for c in comparisons if c.replay is None]
         if unusable:

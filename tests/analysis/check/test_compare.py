@@ -8,8 +8,8 @@ from faults import FAULTS
 
 from analysis.check.compare import (
     Comparison,
-    as_json,
     compare,
+    comparison_json,
     logs_in,
     reference_path,
     update,
@@ -71,15 +71,19 @@ def test_a_millionth_of_one_coefficient_turns_it_red(
 def test_a_millionth_of_one_identified_coefficient_turns_it_red(
     zigzag_analysis: Analysis, reference: TrialLog, name: str
 ) -> None:
-    equation = "yaw" if name in zigzag_analysis.yaw.coefficients else "surge"
-    found = getattr(zigzag_analysis, equation)
+    equation = "yaw" if name in zigzag_analysis.findings.yaw.coefficients else "surge"
+    found = getattr(zigzag_analysis.findings, equation)
     was = found.coefficients[name]
     coefficients = found.coefficients | {name: replace(was, value=was.value * (1 + 1e-6))}
     moved = make_reference(
-        replace(zigzag_analysis, **{equation: replace(found, coefficients=coefficients)})
+        with_findings(zigzag_analysis, **{equation: replace(found, coefficients=coefficients)})
     )
     changed = [c.topic for c in moved if not _same(c.values, reference, c.topic)]
     assert changed == [f"/{name}/whole"]
+
+
+def with_findings(analysis: Analysis, **changed: object) -> Analysis:
+    return replace(analysis, findings=replace(analysis.findings, **changed))
 
 
 def _same(values: np.ndarray, reference: TrialLog, topic: str) -> bool:
@@ -114,29 +118,36 @@ def test_every_number_of_the_summary_is_watched(
     zigzag_analysis: Analysis, reference: TrialLog
 ) -> None:
     """Change one result after another, as a careless edit of an estimator would."""
-    a = zigzag_analysis
-    found, judged, b1 = a.disturbance, a.residuals[1], a.yaw.coefficients["b1"]
+    a, findings = zigzag_analysis, zigzag_analysis.findings
+    found, judged, yaw = a.disturbance, findings.residuals[1], findings.yaw
+    b1, noise, yaw_summary = (
+        yaw.coefficients["b1"],
+        findings.plan.noise,
+        findings.disturbances["yaw"],
+    )
     careless = {
-        "/yaw_rate_noise/assumed": replace(
-            a, noise=replace(a.noise, measurement_std=a.noise.measurement_std * [1.01, 1])
+        "/yaw_rate_noise/assumed": with_findings(
+            a,
+            plan=replace(
+                findings.plan,
+                noise=replace(noise, measurement_std=noise.measurement_std * [1.01, 1]),
+            ),
         ),
-        "/speed_rms/verdict": replace(
-            a, residuals=(a.residuals[0], replace(judged, rms=judged.rms * 1.0001))
+        "/speed_rms/verdict": with_findings(
+            a, residuals=(findings.residuals[0], replace(judged, rms=judged.rms * 1.0001))
         ),
-        "/speed_whiteness/verdict": replace(
-            a, residuals=(a.residuals[0], replace(judged, whiteness_p=0.5))
+        "/speed_whiteness/verdict": with_findings(
+            a, residuals=(findings.residuals[0], replace(judged, whiteness_p=0.5))
         ),
         "/rudder_disturbance/estimate": replace(
             a, disturbance=replace(found, rudder=found.rudder * 2)
         ),
-        "/yaw_disturbance/std": replace(
-            a, courses=a.courses | {"yaw": replace(a.courses["yaw"], std=0.0)}
+        "/yaw_disturbance/std": with_findings(
+            a, disturbances=findings.disturbances | {"yaw": replace(yaw_summary, std=0.0)}
         ),
-        "/b1/whole_std": replace(
+        "/b1/whole_std": with_findings(
             a,
-            yaw=replace(
-                a.yaw, coefficients=a.yaw.coefficients | {"b1": replace(b1, std=1.1 * b1.std)}
-            ),
+            yaw=replace(yaw, coefficients=yaw.coefficients | {"b1": replace(b1, std=1.1 * b1.std)}),
         ),
         "/a/history_std": replace(
             a, yaw_history=replace(a.yaw_history, stds=a.yaw_history.stds * 1.01)
@@ -263,10 +274,12 @@ def test_the_comparison_as_json_names_the_channel(
     zigzag_log: TrialLog, reference: TrialLog
 ) -> None:
     change, topic = FAULTS["dropout of the gyro"]
-    said = json.loads(json.dumps(as_json(compare(change(zigzag_log), reference)), allow_nan=False))
+    said = json.loads(
+        json.dumps(comparison_json(compare(change(zigzag_log), reference)), allow_nan=False)
+    )
     assert said["ok"] is False
     assert next(c["topic"] for c in said["channels"] if not c["ok"]) == topic
-    assert as_json(Comparison("x", (), "lost"))["problem"] == "lost"
+    assert comparison_json(Comparison("x", (), "lost"))["problem"] == "lost"
 
 
 def test_analyses_of_the_same_log_are_the_same_to_the_last_bit(

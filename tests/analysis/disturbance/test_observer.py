@@ -21,7 +21,8 @@ from analysis.disturbance.observer import (
 )
 from analysis.filters.noise_model import NoiseModel
 from analysis.filters.tuning import noise_of
-from analysis.replay.replay import Replay, analyse
+from analysis.replay.plan import plan_replay
+from analysis.replay.replay import analyse
 from analysis.signals.hold import InputHold, held_throughout
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from recorders.simulated.sensors import suite
@@ -613,7 +614,7 @@ def test_every_log_is_observed_by_every_model(path: Path) -> None:
         log = read_table(path, layout)
     else:
         log = read(path)
-    plan = Replay(log).plan
+    plan = plan_replay(log)
     holding = InputHold(plan.clock)
     for chunk in log.chunks():
         holding.add_raw(chunk)
@@ -644,5 +645,5 @@ def test_a_wave_too_quick_for_one_sensor_is_left_out_of_that_alone(vessel: Vesse
     found = analyse(log, settings={"disturbance.models": ["constant", "wave"]})
     assert found.disturbance.yaw_wave is not None
     assert found.disturbance.surge_wave is None
-    assert "surge_wave" not in found.courses
-    assert any("no wave is observed in surge" in said for said in found.warnings)
+    assert "surge_wave" not in found.findings.disturbances
+    assert any("no wave is observed in surge" in said for said in found.findings.warnings)

@@ -14,7 +14,7 @@ from analysis.identification.model_selection import Candidate
 from analysis.identification.output_error import fit
 from analysis.identification.uncertainty import uncertainty
 from analysis.identification.vessel_file import vessel_toml
-from analysis.replay.plan import FITTED
+from analysis.replay.plan import FITTED_MODEL
 from analysis.replay.replay import analyse
 from recorders.simulated.manoeuvres import manoeuvre
 from recorders.simulated.sensors import suite
@@ -122,7 +122,7 @@ def test_a_papers_model_whose_rudder_acts_to_the_other_side_is_left_out() -> Non
 def test_every_ships_log_is_replayed_by_the_file_that_was_written(name: str) -> None:
     log = replace(logs_of(name)[0], vessel_toml=found_of(name)[1])
     replayed = analyse(log)
-    assert replayed.vessel.model is not None
+    assert replayed.findings.plan.vessel.model is not None
     yaw, speed = (replayed.signals[n] for n in ("yaw_rate", "speed"))
     for measured, estimated in ((yaw, 0), (speed, 3)):
         off = measured - replayed.estimates.states[:, estimated]
@@ -161,12 +161,14 @@ def test_where_the_papers_model_runs_away_her_own_stands_alone_and_is_replayed(
     filtered = text + '[filter]\nkind = "extended"\n'
     log = replace(logs_of("norrbin")[0], vessel_toml=filtered)
     replayed = analyse(log)
-    assert replayed.model_origin == FITTED
-    assert replayed.vessel.filter.kind == "extended"
-    assert replayed.vessel.name == vessel.name
-    assert any("has norrbin alone, and filters are built on" in w for w in replayed.warnings)
+    assert replayed.findings.plan.model_origin == FITTED_MODEL
+    assert replayed.findings.plan.vessel.filter.kind == "extended"
+    assert replayed.findings.plan.vessel.name == vessel.name
+    assert any(
+        "has norrbin alone, and filters are built on" in w for w in replayed.findings.warnings
+    )
     without = analyse(replace(log, vessel_toml=None), settings={"filter.kind": "extended"})
-    assert replayed.vessel.coefficients == without.vessel.coefficients
+    assert replayed.findings.plan.vessel.coefficients == without.findings.plan.vessel.coefficients
 
 
 def test_a_log_that_carries_such_a_file_gives_length_gear_and_alphas() -> None:

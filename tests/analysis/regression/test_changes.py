@@ -15,9 +15,9 @@ from analysis.regression.weak_form import (
     with_constant,
 )
 from analysis.replay.replay import Analysis, analyse
-from analysis.report.replay_json import summarise
-from analysis.report.replay_tables import markdown, sections
-from analysis.view.panels import coefficient_panels
+from analysis.report.replay_json import replay_json
+from analysis.report.replay_tables import replay_markdown, replay_tables
+from analysis.view.panels import history_panels
 from analysis.view.series import Sketch
 from benchmarks.changed_ship import changed_trial
 from benchmarks.changes import Case, halfway, told, unchanged
@@ -166,24 +166,26 @@ def changed() -> Analysis:
 
 
 def test_a_replay_tells_of_it_in_words_in_a_table_and_in_numbers(changed: Analysis) -> None:
-    (change,) = changed.changes
-    (said,) = [warning for warning in changed.warnings if "differs" in warning]
+    (change,) = changed.findings.changes
+    (said,) = [warning for warning in changed.findings.warnings if "differs" in warning]
     assert said.startswith("d differs before and after 600 s by -")
     assert "a model that does not hold for both" in said
-    (section,) = [s for s in sections(changed) if s.title == "Changes within the trial"]
+    (section,) = [
+        s for s in replay_tables(changed.findings) if s.title == "Changes within the trial"
+    ]
     assert section.rows[0][0] == "d [1/s²]"
-    assert section.title in markdown(changed)
-    (summary,) = summarise(changed)["changes"]
+    assert section.title in replay_markdown(changed.findings)
+    (summary,) = replay_json(changed.findings)["changes"]
     assert summary["at_secs"] == change.at_secs
     assert summary["share"] == pytest.approx(-0.2, abs=0.01)
 
 
 def test_its_levels_are_drawn_and_meet_at_the_change(changed: Analysis) -> None:
-    sketch = Sketch(changed.clock, changed.usual)
-    sketch.add(changed)
-    panels = {panel.name: panel for panel in coefficient_panels(changed, sketch.result())}
+    sketch = Sketch(changed.findings.plan.clock, changed.findings.plan.stats)
+    sketch.add(changed.as_chunk())
+    panels = {panel.name: panel for panel in history_panels(changed.findings, sketch.result())}
     step = panels["coefficient_d"].series[-1]
-    (change,) = changed.changes
+    (change,) = changed.findings.changes
     assert step.time_secs.tolist() == [change.from_secs, change.at_secs, change.until_secs]
     before, after = (line.values for line in step.lines)
     np.testing.assert_array_equal(np.isnan(before), [False, False, True])
@@ -196,9 +198,9 @@ def test_its_levels_are_drawn_and_meet_at_the_change(changed: Analysis) -> None:
 
 
 def test_of_a_trial_without_a_change_nothing_is_said(zigzag_analysis: Analysis) -> None:
-    assert zigzag_analysis.changes == ()
-    assert summarise(zigzag_analysis)["changes"] == []
-    assert len(sections(zigzag_analysis)) == 4
+    assert zigzag_analysis.findings.changes == ()
+    assert replay_json(zigzag_analysis.findings)["changes"] == []
+    assert len(replay_tables(zigzag_analysis.findings)) == 4
 
 
 def test_the_ship_is_watched_as_its_two_equations_are(vessel: Vessel) -> None:

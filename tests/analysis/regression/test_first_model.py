@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.regression.coefficients import Identifier
+from analysis.regression.coefficients import WholeTrialRegression
 from analysis.regression.first_model import BARE, fit_first_model
 from analysis.regression.weak_form import weak_form
 from analysis.signals.signal_stats import signal_stats
@@ -21,8 +21,8 @@ def sailed(vessel: Vessel, manoeuvre: str, duration: float, **settings: float) -
 def fitted(signals: Signals, name: str) -> Vessel:
     yaw_rows, surge_rows = weak_form(signals, BARE)
     yaw, surge = (
-        Identifier(yaw_rows.equation, len(yaw_rows.target), constant=True),
-        Identifier(surge_rows.equation, len(surge_rows.target)),
+        WholeTrialRegression(yaw_rows.equation, constant=True),
+        WholeTrialRegression(surge_rows.equation),
     )
     yaw.add(yaw_rows)
     surge.add(surge_rows)

@@ -1,4 +1,6 @@
-from collections.abc import Mapping
+import pickle
+from collections.abc import Callable, Iterator, Mapping
+from copy import deepcopy
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
@@ -9,12 +11,14 @@ from places import KVLCC2, LAYOUTS
 from trial_logs import InChunks, as_log
 
 from analysis.regression.weak_form import weak_form
-from analysis.replay.plan import FITTED, NEEDED
-from analysis.replay.replay import STEPS, Analysis, Replay, analyse
-from analysis.report.replay_tables import markdown
+from analysis.replay.passes import REQUIRED_CHANNELS
+from analysis.replay.plan import FITTED_MODEL, Plan, plan_replay
+from analysis.replay.replay import PROGRESS_STEPS, Analysis, Replay, analyse
+from analysis.report.replay_tables import replay_markdown
+from analysis.signals.concat import concatenate
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import START_NS, SimulatedTrial, simulate
-from shiplog import Channel, LogError, TrialLog, Vessel, VesselError
+from shiplog import Channel, LogError, TrialLog, Vessel, VesselError, read, write
 from shiplog.errors import UsageError
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
@@ -28,8 +32,8 @@ def without(log: TrialLog, name: str) -> TrialLog:
 def test_the_steps_are_told_in_their_order(zigzag_log: TrialLog) -> None:
     told: list[tuple[str, float]] = []
     analyse(zigzag_log, on_progress=lambda step, share: told.append((step, share)))
-    smoothing = "look ahead"  # which is asked for elsewhere
-    assert list(dict.fromkeys(step for step, _ in told)) == [s for s in STEPS if s != smoothing]
+    steps = [step for step in PROGRESS_STEPS if step != "smooth"]  # only where it is asked for
+    assert list(dict.fromkeys(step for step, _ in told)) == steps
     shares = [share for step, share in told if step == "replay"]
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
@@ -38,30 +42,33 @@ def test_the_steps_are_told_in_their_order(zigzag_log: TrialLog) -> None:
 def test_a_log_replays_alone_with_the_model_it_carries(
     zigzag_analysis: Analysis, vessel: Vessel
 ) -> None:
-    assert zigzag_analysis.model_origin == "carried by the log"
-    assert zigzag_analysis.vessel.coefficients == vessel.coefficients
+    assert zigzag_analysis.findings.plan.model_origin == "carried by the log"
+    assert zigzag_analysis.findings.plan.vessel.coefficients == vessel.coefficients
 
 
 def test_a_vessel_given_goes_before_the_one_carried(zigzag_log: TrialLog, vessel: Vessel) -> None:
     other = replace(vessel, name="another")
-    assert analyse(zigzag_log, other).vessel is other
+    assert analyse(zigzag_log, other).findings.plan.vessel is other
 
 
 def test_without_a_model_a_first_one_is_fitted_and_said(zigzag_log: TrialLog) -> None:
     found = analyse(replace(zigzag_log, vessel_toml=None))
-    assert "fitted to this log" in found.model_origin
-    assert found.noise.tuned
+    assert "fitted to this log" in found.findings.plan.model_origin
+    assert found.findings.plan.noise.tuned
     yaw = found.estimates.states[:, 0]
-    assert np.nanstd(found.signals["yaw_rate"] - yaw) < 1.3 * found.noise.measurement_std[0]
+    assert (
+        np.nanstd(found.signals["yaw_rate"] - yaw)
+        < 1.3 * found.findings.plan.noise.measurement_std[0]
+    )
 
 
-@pytest.mark.parametrize("name", NEEDED)
+@pytest.mark.parametrize("name", REQUIRED_CHANNELS)
 def test_a_missing_channel_is_named_with_those_there_are(zigzag_log: TrialLog, name: str) -> None:
     with pytest.raises(LogError, match=rf"no channel '{name}' in zigzag\.mcap; it has"):
         analyse(without(zigzag_log, name))
 
 
-@pytest.mark.parametrize("name", NEEDED)
+@pytest.mark.parametrize("name", REQUIRED_CHANNELS)
 def test_a_channel_of_one_sample_is_named(zigzag_log: TrialLog, name: str) -> None:
     cut = tuple(
         replace(
@@ -96,7 +103,7 @@ def test_nan_is_not_measured_and_said(zigzag_log: TrialLog) -> None:
     found = analyse(spike("yaw_rate", 100.0, np.nan)(zigzag_log))
     assert np.isnan(found.estimates.innovations[1000, 0])
     assert np.isfinite(found.estimates.states).all()
-    assert any("yaw_rate" in w and "not measured" in w for w in found.warnings)
+    assert any("yaw_rate" in w and "not measured" in w for w in found.findings.warnings)
 
 
 def test_a_channel_of_nothing_but_nan_is_refused(zigzag_log: TrialLog) -> None:
@@ -112,18 +119,18 @@ def test_a_dropout_is_predicted_through_and_said(
     truth = zigzag.trajectory.at(found.signals.time_secs)["yaw_rate"]
     away = np.abs(found.estimates.states[:, 0] - truth)
     assert np.all(away[2000:2300] < 4 * found.estimates.stds[2000:2300, 0])
-    assert any("yaw_rate" in w and "gap" in w for w in found.warnings)
+    assert any("yaw_rate" in w and "gap" in w for w in found.findings.warnings)
 
 
 def test_a_silent_rudder_is_held_and_said(zigzag_log: TrialLog) -> None:
     found = analyse(dropout("rudder", 200.0, 30.0)(zigzag_log))
     assert np.isfinite(found.estimates.states).all()
-    assert any(w.startswith("rudder: not measured for") for w in found.warnings)
+    assert any(w.startswith("rudder: not measured for") for w in found.findings.warnings)
 
 
 def test_a_frozen_gyro_is_said(zigzag_log: TrialLog) -> None:
     found = analyse(freeze("yaw_rate", 100.0, 60.0)(zigzag_log))
-    assert any("stuck" in w for w in found.warnings)
+    assert any("stuck" in w for w in found.findings.warnings)
 
 
 def test_a_contrary_rudder_is_said(zigzag_log: TrialLog) -> None:
@@ -131,7 +138,7 @@ def test_a_contrary_rudder_is_said(zigzag_log: TrialLog) -> None:
         replace(c, values=-c.values) if c.name == "rudder" else c for c in zigzag_log.channels
     )
     found = analyse(replace(zigzag_log, channels=contrary))
-    assert any("rudder" in w and "contrary" in w for w in found.warnings)
+    assert any("rudder" in w and "contrary" in w for w in found.findings.warnings)
 
 
 def test_a_vessel_with_faults_in_the_log_is_refused_with_all_of_them(zigzag_log: TrialLog) -> None:
@@ -182,25 +189,25 @@ def test_a_gyro_out_of_step_with_the_rudder_is_not_moved_on_its_clock(
     assert np.sqrt(np.mean(z**2)) < 1.5
 
 
-@pytest.mark.parametrize("name", NEEDED)
+@pytest.mark.parametrize("name", REQUIRED_CHANNELS)
 def test_a_channel_that_sets_in_late_begins_the_replay_and_is_said(
     zigzag: SimulatedTrial, zigzag_log: TrialLog, name: str
 ) -> None:
     found = analyse(dropout(name, 0.0, 120.0)(zigzag_log))
     assert (found.signals.start_ns - START_NS) * 1e-9 == pytest.approx(120.0, abs=0.2)
-    assert any(w.startswith(f"{name}: sets in 120") for w in found.warnings)
+    assert any(w.startswith(f"{name}: sets in 120") for w in found.findings.warnings)
     truth = zigzag.trajectory.at(found.signals.time_secs + 120.0)
     for output, state in (("yaw_rate", 0), ("speed", 3)):
         away = np.abs(found.estimates.states[:, state] - truth[output])
         assert np.all(away < 6 * found.estimates.stds[:, state])
 
 
-@pytest.mark.parametrize("name", NEEDED)
+@pytest.mark.parametrize("name", REQUIRED_CHANNELS)
 def test_a_channel_that_falls_silent_is_said(zigzag_log: TrialLog, name: str) -> None:
     found = analyse(dropout(name, 400.0, 200.0)(zigzag_log))
     ended = name in ("rudder", "rpm")
     said = f"{name}: ends 100" if ended else f"{name}: silent for the last 100"
-    assert any(w.startswith(said) for w in found.warnings)
+    assert any(w.startswith(said) for w in found.findings.warnings)
     assert found.signals.time_secs[-1] == pytest.approx(400.0 if ended else 500.0, abs=0.2)
 
 
@@ -223,7 +230,7 @@ def test_a_dead_command_is_said(zigzag_log: TrialLog, name: str) -> None:
     dead = tuple(replace(c, values=0 * c.values) if c.name == name else c for c in zigzag_log)
     found = analyse(replace(zigzag_log, channels=dead))
     said = "never changes" if name == "rudder" else "0 throughout"
-    assert any(w.startswith(f"/{name}/") and said in w for w in found.warnings)
+    assert any(w.startswith(f"/{name}/") and said in w for w in found.findings.warnings)
 
 
 def test_a_compass_that_is_off_is_as_no_compass(zigzag_log: TrialLog) -> None:
@@ -243,14 +250,14 @@ def test_a_clock_that_begins_within_a_gap_of_the_rudder_holds_what_it_was(
 def test_what_no_ship_does_is_left_out_and_said(zigzag_log: TrialLog) -> None:
     found = analyse(spike("speed", 100.0, 1e300)(zigzag_log))
     assert np.isnan(found.signals["speed"][1000])
-    assert any("speed" in w and "impossible" in w for w in found.warnings)
+    assert any("speed" in w and "impossible" in w for w in found.findings.warnings)
 
 
 def test_a_ship_whose_rudder_does_nothing_replays(zigzag_log: TrialLog, vessel: Vessel) -> None:
     adrift = replace(vessel, coefficients=vessel.coefficients._replace(d=0.0, e=0.0))
     found = analyse(zigzag_log, adrift)
     assert np.isnan(found.disturbance.rudder).all()
-    page = markdown(found)
+    page = replay_markdown(found.findings)
     assert "yaw, as rudder [deg] |  |" in page
 
 
@@ -259,7 +266,7 @@ def test_noise_stated_for_one_sample_holds_for_the_mean_of_several(vessel: Vesse
     trial = simulate(vessel, "zigzag-20-20", duration_secs=300.0, sensors=sensors)
     stated = replace(vessel.filter, speed_std=0.1, yaw_rate_std=np.radians(0.005))
     found = analyse(as_log(trial), replace(vessel, filter=stated))
-    assert found.residuals[1].normalised_squared == pytest.approx(1, abs=0.1)
+    assert found.findings.residuals[1].normalised_squared == pytest.approx(1, abs=0.1)
 
 
 def test_the_order_of_the_channels_does_not_matter(
@@ -298,12 +305,17 @@ def test_the_chunks_of_a_log_change_nothing_to_the_last_bit(
     edges = {0: [6.9, 150.0, 150.1, 169.9, 410.0], 1: np.arange(1.0, 500.0, 1.3).tolist()}
     cuts = edges.get(seed, np.sort(rng.uniform(0, 500, 9)).tolist())
     whole, parted = flat(analyse(log)), flat(analyse(InChunks(log, cuts)))
-    assert whole.keys() == parted.keys()
-    for place, numbers in whole.items():
+    assert_same(whole, parted)
+
+
+def assert_same(one: Mapping[str, object], other: Mapping[str, object]) -> None:
+    """To the last bit."""
+    assert one.keys() == other.keys()
+    for place, numbers in one.items():
         if isinstance(numbers, np.ndarray):
-            assert np.array_equal(numbers, parted[place], equal_nan=True), place
+            assert np.array_equal(numbers, other[place], equal_nan=True), place
         else:
-            assert numbers == parted[place], place
+            assert numbers == other[place], place
 
 
 def with_channel(log: TrialLog, changed: Channel) -> TrialLog:
@@ -325,9 +337,9 @@ def test_a_sensor_that_speaks_in_bursts_is_identified_with(zigzag_log: TrialLog)
     )
     log = with_channel(zigzag_log, bursts)
     found = analyse(log)
-    assert all(np.isfinite(c.value) for c in found.yaw.coefficients.values())
-    assert all(np.isfinite(c.value) for c in found.surge.coefficients.values())
-    assert analyse(replace(log, vessel_toml=None)).model_origin == FITTED
+    assert all(np.isfinite(c.value) for c in found.findings.yaw.coefficients.values())
+    assert all(np.isfinite(c.value) for c in found.findings.surge.coefficients.values())
+    assert analyse(replace(log, vessel_toml=None)).findings.plan.model_origin == FITTED_MODEL
 
 
 def test_impossible_positions_are_counted_whatever_the_chunks(zigzag_log: TrialLog) -> None:
@@ -339,7 +351,7 @@ def test_impossible_positions_are_counted_whatever_the_chunks(zigzag_log: TrialL
         log = with_channel(zigzag_log, fixes)
         for cut in (log, InChunks(log, [150.0])):
             said = f"{300 - nans} impossible positions"
-            assert any(said in warning for warning in analyse(cut).warnings)
+            assert any(said in warning for warning in analyse(cut).findings.warnings)
 
 
 def test_a_trial_before_1970_begins_with_what_its_inputs_were(zigzag_log: TrialLog) -> None:
@@ -362,11 +374,11 @@ def test_a_model_for_which_there_is_no_observer_is_refused_as_one_that_runs_away
 
 
 def test_the_chunks_of_a_replay_come_once(zigzag_log: TrialLog) -> None:
-    replay = Replay(zigzag_log)
+    replay = Replay(zigzag_log, plan_replay(zigzag_log))
     with pytest.raises(ValueError, match="go through the chunks first"):
         _ = replay.findings
     assert sum(len(chunk.signals) for chunk in replay.chunks()) == replay.plan.clock.count
-    assert replay.findings.clock is replay.plan.clock
+    assert replay.findings.plan is replay.plan
     with pytest.raises(ValueError, match="come once"):
         next(replay.chunks())
 
@@ -390,7 +402,7 @@ def test_smoothing_leaves_the_innovations_and_makes_the_states_surer(
     zigzag_log: TrialLog, zigzag_analysis: Analysis
 ) -> None:
     found = analyse(zigzag_log, settings={"filter.smooth": True})
-    assert found.residuals == zigzag_analysis.residuals
+    assert found.findings.residuals == zigzag_analysis.findings.residuals
     assert np.all(found.estimates.stds <= zigzag_analysis.estimates.stds * (1 + 1e-9))
     assert found.estimates.states[-1] == pytest.approx(zigzag_analysis.estimates.states[-1])
 
@@ -400,14 +412,19 @@ def test_a_spike_is_gated_counted_and_does_no_harm(
 ) -> None:
     spiked = spike("yaw_rate", 150.0, np.radians(1.0))(zigzag_log)
     found = analyse(spiked)
-    assert found.residuals[0].gated == 1
+    assert found.findings.residuals[0].gated == 1
     away = np.abs(found.estimates.states - zigzag_analysis.estimates.states)
     assert np.all(away < 0.3 * zigzag_analysis.estimates.stds)
     moment = np.abs(found.disturbance.yaw - zigzag_analysis.disturbance.yaw)
-    assert moment.max() < zigzag_analysis.courses["yaw"].std  # nor does the observer believe it
+    assert (
+        moment.max() < zigzag_analysis.findings.disturbances["yaw"].std
+    )  # nor does the observer believe it
     believing = analyse(spiked, settings={"filter.gate": 1e6})
-    assert believing.residuals[0].gated == 0
-    assert believing.residuals[0].normalised_squared > found.residuals[0].normalised_squared
+    assert believing.findings.residuals[0].gated == 0
+    assert (
+        believing.findings.residuals[0].normalised_squared
+        > found.findings.residuals[0].normalised_squared
+    )
 
 
 def test_poles_slower_than_the_best_ones_are_taken_all_the_same(zigzag_log: TrialLog) -> None:
@@ -420,14 +437,18 @@ def test_poles_slower_than_the_best_ones_are_taken_all_the_same(zigzag_log: Tria
 
 def test_more_gated_than_spikes_explain_is_warned_of(zigzag_log: TrialLog) -> None:
     found = analyse(zigzag_log, settings={"filter.gate": 1.0})
-    assert any("samples were gated, too many for spikes" in said for said in found.warnings)
+    assert any(
+        "samples were gated, too many for spikes" in said for said in found.findings.warnings
+    )
 
 
 def test_settings_that_do_not_do_are_refused_before_any_work(zigzag_log: TrialLog) -> None:
     told: list[str] = []
     for log in (zigzag_log, replace(zigzag_log, vessel_toml=None)):
         with pytest.raises(UsageError, match=r"filter\.kind must be one of"):
-            Replay(log, settings={"filter.kind": "kalman"}, on_progress=lambda s, _: told.append(s))
+            plan_replay(
+                log, settings={"filter.kind": "kalman"}, on_progress=lambda s, _: told.append(s)
+            )
     assert not told
 
 
@@ -439,22 +460,25 @@ RUNS = sorted(KVLCC2.glob("*/*.dat"))
 def test_every_real_run_of_the_kvlcc2_replays(run: Path) -> None:
     layout = load_layout(LAYOUTS / f"simman_{run.parent.name}.toml")
     found = analyse(read_table(run, layout))
-    assert "fitted to this log" in found.model_origin
+    assert "fitted to this log" in found.findings.plan.model_origin
     # the fitted model explains the motion: of the weak form's left sides most is explained
-    rows_of_both = weak_form(found.signals, found.vessel.coefficients)
+    coefficients = found.findings.plan.vessel.coefficients
+    rows_of_both = weak_form(found.signals, coefficients)
     for rows, share in zip(rows_of_both, (0.25, 0.5), strict=True):
         left_side = rows.target - np.nanmean(rows.target)
-        model = [getattr(found.vessel.coefficients, name) for name in rows.equation.names]
+        model = [
+            getattr(found.findings.plan.vessel.coefficients, name) for name in rows.equation.names
+        ]
         left_over = rows.target - rows.regressors @ model
         assert np.nanvar(left_over) < share * np.nanvar(left_side)
-    assert found.yaw.coefficients["a"].value < 0
-    assert found.yaw.coefficients["e"].value > 0
-    assert found.surge.coefficients["f"].determined
-    assert not any("contrary" in w for w in found.warnings)
+    assert found.findings.yaw.coefficients["a"].value < 0
+    assert found.findings.yaw.coefficients["e"].value > 0
+    assert found.findings.surge.coefficients["f"].determined
+    assert not any("contrary" in w for w in found.findings.warnings)
 
 
 def of_windows(found: Analysis) -> list[str]:
-    return [said for said in found.warnings if "identifier.window_secs" in said]
+    return [said for said in found.findings.warnings if "identifier.window_secs" in said]
 
 
 def test_windows_are_as_long_as_the_settings_say(zigzag_log: TrialLog) -> None:
@@ -496,7 +520,7 @@ def test_windows_too_short_for_so_many_coefficients_are_blank_and_said(
 def test_ten_seconds_tell_no_coefficient(vessel: Vessel, manoeuvre: str) -> None:
     trial = simulate(vessel, manoeuvre, duration_secs=10.0, sensors=suite("paper"))
     found = analyse(as_log(trial), vessel)
-    every = found.yaw.coefficients | found.surge.coefficients
+    every = found.findings.yaw.coefficients | found.findings.surge.coefficients
     assert not any(coefficient.determined for coefficient in every.values())
     assert "give a longer log" in of_windows(found)[0]
     assert "shorter windows" not in of_windows(found)[0]
@@ -519,12 +543,58 @@ def test_a_rudder_at_rest_tells_nothing_of_yaw(vessel: Vessel) -> None:
                 usual[c.name] + noise.get(c.name, 0.0) * rng.standard_normal(len(times)),
             )
             for c in trial.channels
-            if c.name in NEEDED
+            if c.name in REQUIRED_CHANNELS
         ),
     )  # fmt: skip
     found = analyse(log, vessel)
-    every = found.yaw.coefficients | found.surge.coefficients
+    every = found.findings.yaw.coefficients | found.findings.surge.coefficients
     assert not any(coefficient.determined for coefficient in every.values())
-    assert found.changes == ()
+    assert found.findings.changes == ()
     with pytest.raises(LogError, match="too little moves in it to fit one of yaw and surge"):
         analyse(log)
+
+
+def test_two_replays_of_one_plan_are_equal(zigzag_log: TrialLog) -> None:
+    plan = plan_replay(zigzag_log)
+    before = flat(deepcopy(plan))
+    results = []
+    for _ in range(2):
+        replay = Replay(zigzag_log, plan)
+        chunks = list(replay.chunks())
+        results.append(flat(concatenate(chunks), "chunk") | flat(replay.findings, "findings"))
+    assert_same(*results)
+    assert_same(before, flat(plan))
+
+
+def test_a_replay_makes_no_pass_over_the_log_before_its_chunks(zigzag_log: TrialLog) -> None:
+    plan = plan_replay(zigzag_log)
+    Replay(NoPasses(zigzag_log), plan)
+    with pytest.raises(AssertionError, match="a pass over the log"):
+        next(Replay(NoPasses(zigzag_log), plan).chunks())
+
+
+class NoPasses(InChunks):
+    def __init__(self, log: TrialLog) -> None:
+        super().__init__(log, [])
+
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
+        raise AssertionError("a pass over the log")
+
+
+def test_a_path_is_analysed_as_the_log_it_names(zigzag_log: TrialLog, tmp_path: Path) -> None:
+    write(zigzag_log, tmp_path / "zigzag.mcap")
+    for path in (tmp_path / "zigzag.mcap", str(tmp_path / "zigzag.mcap")):
+        assert_same(flat(analyse(path)), flat(analyse(read(path))))
+
+
+@pytest.mark.parametrize("copied", [deepcopy, lambda it: pickle.loads(pickle.dumps(it))])  # noqa: S301
+def test_plan_findings_chunk_and_analysis_can_be_pickled_and_copied(
+    zigzag_log: TrialLog, zigzag_analysis: Analysis, copied: Callable[[object], object]
+) -> None:
+    findings, chunk = zigzag_analysis.findings, zigzag_analysis.as_chunk()
+    for result in (findings.plan, findings, chunk, zigzag_analysis):
+        assert_same(flat(result), flat(copied(result)))
+    plan = copied(findings.plan)
+    assert isinstance(plan, Plan)
+    replay = Replay(zigzag_log, plan)
+    assert_same(flat(concatenate(list(replay.chunks()))), flat(chunk))

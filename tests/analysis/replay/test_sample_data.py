@@ -50,7 +50,7 @@ def test_every_filter_replays_every_sample(log: Path, kind: str, smooth: bool) -
     estimates = found.estimates
     assert np.isfinite(estimates.states).all()
     assert np.isfinite(estimates.stds).all()
-    believed = sum(residuals.count for residuals in found.residuals)
+    believed = sum(residuals.count for residuals in found.findings.residuals)
     assert believed > 0.7 * np.isfinite(estimates.innovations).sum()
 
 

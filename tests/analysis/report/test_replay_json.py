@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from analysis.replay.replay import Analysis, analyse
-from analysis.report.replay_json import summarise
+from analysis.report.replay_json import replay_json
 from shiplog import TrialLog
 
 
 def test_the_json_has_what_is_promised(zigzag_analysis: Analysis) -> None:
-    found = json.loads(json.dumps(summarise(zigzag_analysis), allow_nan=False))
+    found = json.loads(json.dumps(replay_json(zigzag_analysis.findings), allow_nan=False))
     assert {"log", "model", "filter", "disturbance", "coefficients", "warnings"} <= set(found)
     for output in ("yaw_rate", "speed"):
         said = found["filter"][output]
@@ -23,7 +23,7 @@ def test_the_json_has_what_is_promised(zigzag_analysis: Analysis) -> None:
 
 
 def test_the_numbers_are_the_analysis(zigzag_analysis: Analysis) -> None:
-    found = summarise(zigzag_analysis)
+    found = replay_json(zigzag_analysis.findings)
     innovations = zigzag_analysis.estimates.innovations[:, 1]
     assert found["filter"]["speed"]["innovation_rms"] == pytest.approx(
         np.sqrt(np.nanmean(innovations**2))
@@ -33,7 +33,7 @@ def test_the_numbers_are_the_analysis(zigzag_analysis: Analysis) -> None:
 
 
 def test_a_fitted_model_is_said_to_be_one(zigzag_log: TrialLog) -> None:
-    found = summarise(analyse(replace(zigzag_log, vessel_toml=None)))
+    found = replay_json(analyse(replace(zigzag_log, vessel_toml=None)).findings)
     assert found["model"]["origin"] == "a first model, fitted to this log"
 
 
@@ -45,10 +45,10 @@ def test_the_settings_and_the_wave_are_told(zigzag_log: TrialLog) -> None:
         "disturbance.models": ["constant", "wave"],
         "disturbance.wave_frequency": 0.5,
     }
-    found = summarise(analyse(zigzag_log, settings=settings))
+    found = replay_json(analyse(zigzag_log, settings=settings).findings)
     assert found["settings"]["filter"]["kind"] == "extended"
     assert found["settings"]["disturbance"]["models"] == ("constant", "wave")
     assert found["settings"]["identifier"] == {"window_secs": 200.0}
     assert found["wave"]["frequency_rad_per_s"] == 0.6
     assert {"yaw", "yaw_as_rudder", "surge", "yaw_wave", "surge_wave"} == set(found["disturbance"])
-    assert summarise(analyse(zigzag_log))["wave"] is None
+    assert replay_json(analyse(zigzag_log).findings)["wave"] is None

@@ -17,8 +17,8 @@ from analysis.filters.base import Estimates
 from analysis.regression.sliding import History
 from analysis.replay.replay import Analysis, ReplayChunk, analyse
 from analysis.replay.track import NOWHERE
-from analysis.view.panels import Drawn, coefficient_panels, equation_panels, limits
-from analysis.view.replay_review import write_review
+from analysis.view.panels import Drawn, equation_panels, history_panels, limits
+from analysis.view.replay_review import write_replay_review
 from analysis.view.series import Line, Series, Sketch, Thinning, _Samples
 from analysis.view.track_chart import draw_track
 from analysis.view.viewer import view_review
@@ -68,8 +68,8 @@ def part_of(analysis: Analysis, start: int, stop: int) -> ReplayChunk:
 
 
 def drawn_of(analysis: Analysis) -> Drawn:
-    sketch = Sketch(analysis.clock, analysis.stats)
-    sketch.add(analysis)
+    sketch = Sketch(analysis.findings.plan.clock, analysis.findings.plan.stats)
+    sketch.add(analysis.as_chunk())
     return sketch.result()
 
 
@@ -86,7 +86,7 @@ def gappy() -> Analysis:
 @pytest.fixture(scope="module")
 def review(analysis: Analysis, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("review") / "trial.rrd"
-    write_review(analysis, path, text="# What was found")
+    write_replay_review(analysis, path, text="# What was found")
     return path
 
 
@@ -147,7 +147,7 @@ def test_inputs_disturbances_and_residuals(review: Path, analysis: Analysis) -> 
     np.testing.assert_allclose(surge[:, 0], found.surge * 1000, rtol=1e-12)
     _, _, band = columns(review, "disturbance_surge/bounds")
     np.testing.assert_allclose(
-        band[0], np.array([2, -2]) * analysis.courses["surge"].std * 1000, rtol=1e-12
+        band[0], np.array([2, -2]) * analysis.findings.disturbances["surge"].std * 1000, rtol=1e-12
     )
     _, _, residual = columns(review, "residual_speed/normalised")
     expected = analysis.estimates.innovations[:, 1] / analysis.estimates.innovation_stds[:, 1]
@@ -165,7 +165,7 @@ def test_coefficients_stand_beside_the_model(review: Path, analysis: Analysis) -
     np.testing.assert_allclose(drawn[shown, 2], value * 1e6, rtol=1e-9)
     np.testing.assert_allclose(drawn[shown, 0] - drawn[shown, 2], 2 * std * 1e6, rtol=1e-6)
     ends, _, model = columns(review, "coefficient_d/model")
-    np.testing.assert_allclose(model[:, 0], analysis.vessel.coefficients.d * 1e6)
+    np.testing.assert_allclose(model[:, 0], analysis.findings.plan.vessel.coefficients.d * 1e6)
     np.testing.assert_allclose(ends, [0, analysis.signals.time_secs[-1]])
 
 
@@ -207,14 +207,14 @@ def test_name_and_properties(review: Path, analysis: Analysis) -> None:
     assert static(review, "__properties", "RecordingInfo:name") == ["zigzag_20_20.mcap"]
     start = static(review, "__properties", "RecordingInfo:start_time")
     assert start == [analysis.signals.start_ns]
-    assert static(review, "__properties/trial", "vessel") == [analysis.vessel.name]
+    assert static(review, "__properties/trial", "vessel") == [analysis.findings.plan.vessel.name]
 
 
 def test_the_same_analysis_has_the_same_names(
     review: Path, analysis: Analysis, gappy: Analysis, tmp_path: Path
 ) -> None:
-    write_review(analysis, tmp_path / "again.rrd", text="")
-    write_review(gappy, tmp_path / "other.rrd", text="")
+    write_replay_review(analysis, tmp_path / "again.rrd", text="")
+    write_replay_review(gappy, tmp_path / "other.rrd", text="")
     (first,), (again,), (other,) = (
         RrdReader(path).recordings()
         for path in (review, tmp_path / "again.rrd", tmp_path / "other.rrd")
@@ -233,7 +233,7 @@ def test_rerun_finds_no_fault_with_the_file(review: Path) -> None:
 
 def test_a_gap_is_not_drawn(gappy: Analysis, tmp_path: Path) -> None:
     path = tmp_path / "gappy.rrd"
-    write_review(gappy, path, text="")
+    write_replay_review(gappy, path, text="")
     known = np.isfinite(gappy.signals["yaw_rate"])
     for entity in ("yaw_rate/measured", "residual_yaw_rate/normalised"):
         at, _, values = columns(path, entity)
@@ -315,7 +315,7 @@ def test_a_long_trial_is_thinned_and_in_full_it_is_not(
     monkeypatch.setattr("analysis.view.series.POINTS", 500)
     for full in (False, True):
         path = tmp_path / f"{full}.rrd"
-        write_review(analysis, path, text="", full=full)
+        write_replay_review(analysis, path, text="", full=full)
         at, _, drawn = columns(path, "yaw_rate/state")
         value = np.degrees(analysis.estimates.states[:, 0])
         assert (len(at) == len(value)) == full
@@ -326,7 +326,7 @@ def test_a_long_trial_is_thinned_and_in_full_it_is_not(
 
 def test_a_review_drawn_in_chunks_is_the_same(analysis: Analysis) -> None:
     whole = drawn_of(analysis)
-    sketch = Sketch(analysis.clock, analysis.stats)
+    sketch = Sketch(analysis.findings.plan.clock, analysis.findings.plan.stats)
     count = len(analysis.signals)
     for start in range(0, count, 777):
         sketch.add(part_of(analysis, start, min(start + 777, count)))
@@ -355,7 +355,7 @@ def test_wild_windows_do_not_squeeze_a_coefficient(analysis: Analysis) -> None:
     values[:40] *= -1e4
     stds[:40] *= 1e4
     wild = replace(analysis, yaw_history=replace(history, values=values, stds=stds))
-    usual, drawn = (coefficient_panels(a, drawn_of(a))[0] for a in (analysis, wild))
+    usual, drawn = (history_panels(a.findings, drawn_of(a))[0] for a in (analysis, wild))
     assert np.diff(drawn.limits) < 3 * np.diff(usual.limits)
 
 
@@ -369,7 +369,7 @@ def test_a_single_window_is_a_line_all_the_same(analysis: Analysis) -> None:
         history.conditions[:1],
     )
     single = replace(analysis, yaw_history=only)
-    for panel in coefficient_panels(single, drawn_of(single))[:6]:
+    for panel in history_panels(single.findings, drawn_of(single))[:6]:
         _, window = panel.series
         assert window.time_secs.tolist() == [0.0, analysis.signals.time_secs[-1]]
         assert all(len(line.values) == 2 for line in window.lines)
@@ -381,11 +381,11 @@ def test_what_no_window_can_tell_is_left_out(analysis: Analysis, tmp_path: Path)
     values[:, 1] = np.nan
     empty = History(("f", "g", "h"), *(np.empty(s) for s in (0, (0, 3), (0, 3), 0)))
     some = replace(analysis, yaw_history=replace(history, values=values), surge_history=empty)
-    names = [panel.name for panel in coefficient_panels(some, drawn_of(some))]
+    names = [panel.name for panel in history_panels(some.findings, drawn_of(some))]
     assert names == [f"coefficient_{name}" for name in ("a", "b2", "b3", "d", "e")]
-    write_review(some, tmp_path / "some.rrd", text="")
+    write_replay_review(some, tmp_path / "some.rrd", text="")
     none = replace(some, yaw_history=replace(history, values=np.full_like(values, np.nan)))
-    write_review(none, tmp_path / "none.rrd", text="")
+    write_replay_review(none, tmp_path / "none.rrd", text="")
     assert len(layout(tmp_path / "none.rrd", "ViewBlueprint:display_name")) == 10
 
 
@@ -394,18 +394,18 @@ def test_the_chart_has_east_right_and_north_up(review: Path, analysis: Analysis)
     expected = np.column_stack((analysis.track.east, -analysis.track.north))
     np.testing.assert_allclose(line, expected, rtol=1e-5, atol=1e-3)
     assert static(review, "track/ends", "Points2D:labels") == ["start", "end"]
-    drawn = draw_track(analysis, drawn_of(analysis))
+    drawn = draw_track(analysis.findings, drawn_of(analysis))
     assert drawn is not None
     bow, stern = drawn.ships[0][0], drawn.ships[0][2:4].mean(axis=0)
     assert bow[1] < stern[1]  # headed north at first, and y points down
     length, unit = drawn.scale_label.split()
     assert drawn.scale[1, 0] - drawn.scale[0, 0] == float(length) * {"m": 1, "km": 1000}[unit]
     nowhere = replace(analysis, track=NOWHERE)
-    assert draw_track(nowhere, drawn_of(nowhere)) is None
+    assert draw_track(nowhere.findings, drawn_of(nowhere)) is None
 
 
 def test_left_and_right_panels_belong_together(analysis: Analysis) -> None:
-    yaw, surge = equation_panels(analysis, drawn_of(analysis))
+    yaw, surge = equation_panels(analysis.findings, drawn_of(analysis))
     assert len(yaw) == len(surge)
 
 
@@ -413,7 +413,7 @@ def test_left_and_right_panels_belong_together(analysis: Analysis) -> None:
 def test_an_unwritable_path_leaves_nothing(name: str, analysis: Analysis, tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir()
     with pytest.raises(ShiplogError, match="cannot write"):
-        write_review(analysis, tmp_path / name, text="")
+        write_replay_review(analysis, tmp_path / name, text="")
     assert [path.name for path in tmp_path.rglob("*")] == ["folder"]
 
 

@@ -1,0 +1,251 @@
+"""The two passes over a log before its replay, and the log resampled in chunks.
+
+The first pass collects statistics of the raw channels and defines the clock; the second resamples
+the log, collects statistics of the signals and fits the regression of the whole trial.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.regression.coefficients import WholeTrialRegression
+from analysis.regression.first_model import BARE
+from analysis.regression.sliding import least_window_secs
+from analysis.regression.weak_form import WeakForm
+from analysis.signals.hold import InputHold
+from analysis.signals.signal_stats import SignalStats, SignalStatsCollector
+from shiplog import Channel, LogError, Signals, Vessel
+from shiplog.checks.channel_stats import LogStats, compute_log_stats
+from shiplog.checks.data_quality import faults
+from shiplog.checks.gyro_bias import GyroBiasCheck
+from shiplog.checks.rudder_sign import RudderSignCheck
+from shiplog.progress import ProgressCallback
+from shiplog.resampling import Clock, choose_clock, resample_chunks
+from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
+from shiplog.types import FloatArray, Log
+from shiplog.vessel.settings import SHORTEST_WINDOW_SECS
+
+from .channel_warnings import channel_warnings, end_warnings
+
+REQUIRED_CHANNELS = (*PAPER_OUTPUTS, *PAPER_INPUTS)
+OPTIONAL_CHANNELS = ("heading", "position")
+MIN_OUTPUT_SAMPLES = 4  # the noise level is estimated from third differences
+
+
+@dataclass(frozen=True, eq=False)
+class FirstPass:
+    """Results of the first pass over a log.
+
+    Attributes
+    ----------
+    log_stats
+        Statistics of each raw channel.
+    clock
+        The uniform clock on which the log is replayed.
+    warnings
+        Problems of the data, each in a sentence.
+    """
+
+    log_stats: LogStats
+    clock: Clock
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SecondPass:
+    """Results of the second pass over a log.
+
+    Attributes
+    ----------
+    stats
+        Statistics of the resampled signals.
+    yaw, surge
+        The least-squares sums of each equation over the whole trial.
+    warnings
+        Problems of the data, each in a sentence.
+    """
+
+    stats: SignalStats
+    yaw: WholeTrialRegression
+    surge: WholeTrialRegression
+    warnings: tuple[str, ...]
+
+
+def first_pass(log: Log, on_progress: ProgressCallback) -> FirstPass:
+    """Collect the statistics of a log's channels and define the clock of its replay.
+
+    Raises
+    ------
+    LogError
+        Where a required channel is missing or a channel cannot be used.
+    """
+    on_progress("check the log", 0.0)
+    log_stats = compute_log_stats(log, strict=True)
+    missing = [name for name in REQUIRED_CHANNELS if name not in log_stats]
+    if missing:
+        present = ", ".join(sorted({channel.name for channel in log_stats}))
+        raise LogError(
+            f"no channel {missing[0]!r} in {log_stats.name}; it has {present or 'none'}; "
+            f"a replay needs {', '.join(REQUIRED_CHANNELS)}"
+        )
+    optional = tuple(name for name in OPTIONAL_CHANNELS if name in log_stats)
+    warnings = (*log.warnings, *faults(log_stats, (*REQUIRED_CHANNELS, *optional)))
+    clock = choose_clock(log, log_stats, channels=REQUIRED_CHANNELS, optional=("heading",))
+    return FirstPass(log_stats, clock, warnings)
+
+
+def second_pass(
+    log: Log, first: FirstPass, vessel: Vessel, on_progress: ProgressCallback
+) -> SecondPass:
+    """Collect the statistics of the signals and fit both equations to the whole trial.
+
+    The equations need the sampling intervals on the clock, which are known only after the pass.
+    They nearly always equal those expected from the first pass; where they do not, the equations
+    are set up again in a further pass.
+
+    Parameters
+    ----------
+    log
+        The log.
+    first
+        Results of its first pass.
+    vessel
+        The vessel; without coefficients, the rudder is taken to act in proportion to the speed.
+    on_progress
+        Called with the step and its share done.
+
+    Raises
+    ------
+    LogError
+        Where an output has too few samples.
+    """
+    log_stats, clock = first.log_stats, first.clock
+    alphas, window_secs = vessel.coefficients or BARE, vessel.identifier.window_secs
+    checks = RudderSignCheck(log_stats), GyroBiasCheck(log_stats)
+    hold, collector = InputHold(clock), SignalStatsCollector(alphas)
+    expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in PAPER_OUTPUTS]
+    intervals = np.maximum(np.round(expected), 1.0)
+    equations = _Equations(alphas, clock, intervals, window_secs)
+    listeners = hold.add_raw, *(check.add for check in checks)
+    for signals in resampled_chunks(log, clock, on_progress, "resample", *listeners):
+        collector.add(hold.step(signals))
+        equations.add(signals, collector.fastest)
+    stats = collector.result()
+    if not np.array_equal(stats.intervals, equations.intervals):
+        equations = _Equations(alphas, clock, stats.intervals, window_secs)
+        for signals in resampled_chunks(log, clock, on_progress, "resample"):
+            equations.add(signals, stats.fastest)
+    _require_outputs(log, stats)
+    warnings = [
+        *channel_warnings(log_stats, REQUIRED_CHANNELS),
+        *(text for check in checks if (text := check.result())),
+        *end_warnings(log_stats, clock, REQUIRED_CHANNELS),
+        *hold.said(),
+        *equations.window_warnings(),
+    ]
+    return SecondPass(stats, equations.yaw, equations.surge, tuple(warnings))
+
+
+def resampled_chunks(
+    log: Log,
+    clock: Clock,
+    on_progress: ProgressCallback,
+    step: str,
+    *listeners: Callable[[tuple[Channel, ...]], None],
+) -> Iterator[Signals]:
+    """Resample a log to its clock, chunk by chunk.
+
+    Parameters
+    ----------
+    log
+        The log.
+    clock
+        Its clock.
+    on_progress
+        Called with `step` and the share of the clock's instants done.
+    step
+        The name of this pass.
+    *listeners
+        Called with each chunk of raw channels before it is resampled.
+
+    Yields
+    ------
+    Signals
+        Consecutive chunks of the signals.
+    """
+
+    def raw_chunks() -> Iterator[tuple[Channel, ...]]:
+        for chunk in log.chunks():
+            for listener in listeners:
+                listener(chunk)
+            yield chunk
+
+    on_progress(step, 0.0)
+    for signals in resample_chunks(raw_chunks(), clock):
+        yield signals
+        on_progress(step, (signals.first + len(signals)) / clock.count)
+
+
+def weak_form_on_clock(model: Coefficients, clock: Clock, intervals: FloatArray) -> WeakForm:
+    """Set up the equations in integral form for signals on a clock.
+
+    Parameters
+    ----------
+    model
+        Only its alphas are used.
+    clock
+        The clock of the signals.
+    intervals
+        (2,) the median number of instants between samples of yaw rate and speed; the inputs are
+        known at every instant outside their gaps.
+    """
+    return WeakForm(model, clock.count, clock.dt_secs, (*intervals.tolist(), 1.0, 1.0))
+
+
+class _Equations:
+    """The regressions of yaw and surge over the whole trial, from signals in chunks."""
+
+    def __init__(
+        self, alphas: Coefficients, clock: Clock, intervals: FloatArray, window_secs: float
+    ) -> None:
+        self.intervals, self._window_secs = intervals, window_secs
+        self._log_secs = clock.count * clock.dt_secs
+        self._weak_form = weak_form_on_clock(alphas, clock, intervals)
+        self.yaw = WholeTrialRegression(self._weak_form.yaw, constant=True)
+        self.surge = WholeTrialRegression(self._weak_form.surge)
+
+    def add(self, signals: Signals, fastest: float) -> None:
+        """Add the next signals; `fastest` is the greatest speed so far, m/s."""
+        yaw_rows, surge_rows = self._weak_form.step(signals, fastest)
+        self.yaw.add(yaw_rows)
+        self.surge.add(surge_rows)
+
+    def window_warnings(self) -> list[str]:
+        """Warn of windows longer than the log, or too short for the number of coefficients."""
+        window = f"identifier.window_secs = {self._window_secs:g}"
+        least = {
+            "yaw": least_window_secs(self._weak_form.yaw),
+            "surge": least_window_secs(self._weak_form.surge),
+        }
+        if self._window_secs > self._log_secs:
+            text = f"{window} is longer than the log ({self._log_secs:.0f} s): the whole of it is "
+            room = self._log_secs > max(*least.values(), SHORTEST_WINDOW_SECS)
+            shorter = "ask for shorter windows, or " if room else ""
+            return [text + f"the one window; {shorter}give a longer log"]
+        blank = [name for name, secs in least.items() if self._window_secs <= secs]
+        if not blank:
+            return []
+        needed = max(least[name] for name in blank)
+        text = f"{window} is too short to tell so many coefficients of {' and '.join(blank)}: its "
+        return [text + f"windows are blank; ask for more than {needed:.0f} s"]
+
+
+def _require_outputs(log: Log, stats: SignalStats) -> None:
+    for name, count in zip(PAPER_OUTPUTS, stats.measured, strict=True):
+        if count < MIN_OUTPUT_SAMPLES:
+            raise LogError(
+                f"channel {name!r} has {count} samples while the others are there too, "
+                f"and {MIN_OUTPUT_SAMPLES} are needed; check the recorder or choose another log: "
+                f"{log.name}"
+            )
