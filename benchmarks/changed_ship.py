@@ -13,7 +13,7 @@ from shiplog.ships.paper import Coefficients
 from shiplog.ships.under_way import Excitation, ShipConstants, runge_kutta_step
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
-from shiplog.vessel.ship import ship_of
+from shiplog.vessel.ship import ship_from_vessel
 
 RATE_HZ = 10.0  # of the grid, and the fastest a sensor may be
 START_NS = 1_767_225_600 * 10**9
@@ -36,7 +36,7 @@ def changed_trial(
     """
     rng = np.random.default_rng(seed)
     ordered = manoeuvre(manoeuvre_name, duration_secs, vessel.approach_rpm, rng)
-    before, ship = vessel.paper, ship_of(vessel)
+    before, ship = vessel.paper_coefficients, ship_from_vessel(vessel)
     rpm = ordered.orders[0].rpm
     speed = ship.steady_speed(rpm)
     constants = ship.constants(speed, rpm)

@@ -85,7 +85,7 @@ class Case:
 def told(log: TrialLog, case: Case) -> tuple[Change, ...]:
     """The changes that a replay tells of a log."""
     signals = resample(log, channels=CHANNELS)
-    model = BARE if case.guessed else load_vessel(case.vessel)[0].paper
+    model = BARE if case.guessed else load_vessel(case.vessel)[0].paper_coefficients
     equations = WeakForm(model, len(signals), signals.dt_secs, (1, 1, 1, 1))
     watch = ShipChangeTest(equations, guessed=case.guessed)
     watch.add(*equations.step(signals, float(np.max(np.abs(signals["speed"])))))

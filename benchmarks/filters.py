@@ -31,15 +31,15 @@ def require_filterpy() -> None:
 
 def require_same(bench: Bench, peer: Callable[..., Filtered]) -> None:
     """Refuse a peer that is another filter."""
-    ours = filter_states(bench.peer_signals, VESSEL.paper, NOISE)
-    theirs = peer(bench.peer_signals, VESSEL.paper, NOISE)
+    ours = filter_states(bench.peer_signals, VESSEL.paper_coefficients, NOISE)
+    theirs = peer(bench.peer_signals, VESSEL.paper_coefficients, NOISE)
     for one, other in ((ours.states, theirs.states), (ours.stds, theirs.stds)):
         size = np.max(np.abs(one), axis=0)
         np.testing.assert_allclose(other / size, one / size, rtol=0, atol=CLOSE)
 
 
 def _line(bench: Bench, against: str, peer: Callable[..., Filtered], at_least: float) -> Line:
-    model = VESSEL.paper
+    model = VESSEL.paper_coefficients
     return Line(
         "Kalman filter, five states",
         against,

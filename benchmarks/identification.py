@@ -86,7 +86,7 @@ class Study:
 
 def truth() -> dict[str, float]:
     """The coefficients of the paper's ship, and T3 = e / d."""
-    c = load_vessel("table1")[0].paper
+    c = load_vessel("table1")[0].paper_coefficients
     return {**c._asdict(), "T3": c.e / c.d}
 
 
@@ -243,7 +243,7 @@ def main() -> None:
     methods(
         known_trial,
         lambda manoeuvre: true_bound(manoeuvre, FIRST_SEED, free, {}, "paper"),
-        load_vessel("table1")[0].paper,
+        load_vessel("table1")[0].paper_coefficients,
     )
     if KVLCC2.is_dir():
         tanker(arguments.figures)

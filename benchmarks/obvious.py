@@ -294,7 +294,7 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--minutes", type=float, help="of the log (default: all of it)")
     arguments = parser.parse_args()
-    found = replay(arguments.log, arguments.out, VESSEL.paper, arguments.minutes)
+    found = replay(arguments.log, arguments.out, VESSEL.paper_coefficients, arguments.minutes)
     for name, stage in found.stages.items():
         share = f"{stage.done} of {stage.whole}"
         print(f"{name}: {stage.secs:.3g} s for {share}, {stage.scaled_secs:.4g} s for all")

@@ -69,7 +69,7 @@ class _Obvious:
         if bench.peer_secs < FEWEST_SECS:
             raise SkippedError(f"the peer needs {FEWEST_SECS / 60:g} min of the log at the least")
         minutes = None if bench.share > 0.999 else bench.peer_secs / 60
-        found = replay(bench.path, bench.folder / "theirs.rrd", VESSEL.paper, minutes)
+        found = replay(bench.path, bench.folder / "theirs.rrd", VESSEL.paper_coefficients, minutes)
         self._stages.update({name: stage.scaled_secs for name, stage in found.stages.items()})
         self._rounds.append(found.scaled_secs)
         return found.scaled_secs

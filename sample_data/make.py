@@ -7,7 +7,7 @@ from recorders.record import record
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import load_vessel, write
-from shiplog.vessel.vessel import PRESETS
+from shiplog.vessel.presets import PRESETS
 
 HERE = Path(__file__).parent
 TRUTH_HZ = 2.0

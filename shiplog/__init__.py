@@ -9,7 +9,8 @@
 from shiplog.mcap.reader import read
 from shiplog.mcap.stream import LogFile, open_log
 from shiplog.mcap.writer import LogWriter, write
-from shiplog.vessel.vessel import Vessel, load_vessel
+from shiplog.vessel.vessel import Vessel
+from shiplog.vessel.vessel_parser import load_vessel
 
 from .errors import LayoutError, LogError, ShiplogError, UsageError, VesselError
 from .resampling import resample

@@ -12,7 +12,7 @@ from math import floor, inf
 import numpy as np
 
 from shiplog.checks.channel_stats import ChannelStats, LogStats, compute_log_stats
-from shiplog.checks.interpolate import known_samples
+from shiplog.checks.interpolate import valid_samples
 
 from .errors import LogError, UsageError
 from .types import Channel, FloatArray, Log, Signals, concatenate_signals, is_sorted
@@ -75,17 +75,17 @@ def choose_clock(
     for name, channel in used.items():
         _require_samples(log, name, channel)
     leader = used[names[0]]
-    dt = leader.usual_secs if dt_secs is None else dt_secs
+    dt = leader.interval_secs if dt_secs is None else dt_secs
     if not 0 < dt < inf:
         raise UsageError(f"the time step must be positive, got {dt} s")
     start_ns, end_ns = _common_span(log, list(used.values()))
     steps = (end_ns - start_ns) * 1e-9 / dt + 1e-6
-    if steps > MAX_SAMPLES and steps > SPARSEST * leader.known:
+    if steps > MAX_SAMPLES and steps > SPARSEST * leader.valid:
         raise LogError(
             f"its times span {(end_ns - start_ns) / 8.64e13:.4g} days, too many steps of {dt:g} s; "
             f"correct the clock of one of {', '.join(names)}: {log.name}"
         )
-    also = {name: found[name] for name in optional if name in found and found[name].known > 1}
+    also = {name: found[name] for name in optional if name in found and found[name].valid > 1}
     return Clock(start_ns, dt, int(steps) + 1, used | also)
 
 
@@ -114,9 +114,9 @@ def _require_samples(log: Log, name: str, channel: ChannelStats) -> None:
             f"channel {name!r} has components ({', '.join(channel.fields)}), "
             f"and a clock takes one value a sample; name others: {log.name}"
         )
-    if channel.known < 2 or channel.usual_secs == 0:
+    if channel.valid < 2 or channel.interval_secs == 0:
         has = {0: "no measured value", 1: "one sample"}.get(
-            channel.known, "all its samples at one instant"
+            channel.valid, "all its samples at one instant"
         )
         raise LogError(
             f"channel {name!r} has {has}, and a replay needs it over time; "
@@ -126,12 +126,12 @@ def _require_samples(log: Log, name: str, channel: ChannelStats) -> None:
 
 def _common_span(log: Log, channels: list[ChannelStats]) -> tuple[int, int]:
     """From where all are known, on a sample of the first, to where the inputs cease."""
-    begun = max(channel.known_span_ns[0] for channel in channels)
+    begun = max(channel.valid_span_ns[0] for channel in channels)
     inputs: list[int] = []
     others: list[int] = []
     for channel in channels:
         commanded = channel.name in CATALOGUE and CATALOGUE[channel.name].commanded
-        (inputs if commanded else others).append(channel.known_span_ns[1])
+        (inputs if commanded else others).append(channel.valid_span_ns[1])
     end = min([max(others or inputs), *inputs])
     start = _first_sample(log, channels[0], begun)
     if end <= start:
@@ -143,7 +143,7 @@ def _common_span(log: Log, channels: list[ChannelStats]) -> tuple[int, int]:
 def _first_sample(log: Log, leader: ChannelStats, begun: int) -> int:
     """The first instant from `begun` on at which something was measured; `begun` if never."""
     for chunk in log.chunks():
-        channel = leader.of(chunk)
+        channel = leader.select(chunk)
         if channel is not None:
             known = channel.measured_ns[np.isfinite(channel.values)]
             if np.any(known >= begun):
@@ -167,9 +167,9 @@ class _Placing:
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
         """Take the next samples."""
-        channel = self._channel.of(chunk)
+        channel = self._channel.select(chunk)
         if channel is not None:
-            times, values = known_samples(channel, self._clock.start_ns)
+            times, values = valid_samples(channel, self._clock.start_ns)
             if not is_sorted(times):
                 order = np.argsort(times, kind="stable")
                 times, values = times[order], values[order]
@@ -185,11 +185,11 @@ class _Placing:
 
         All that was received before `received_ns` was added.
         """
-        if self._seen == self._channel.known:
+        if self._seen == self._channel.valid:
             return self._clock.count
         last = float(self._times[-1]) if len(self._times) else -inf
         # of a channel that is silent: what is yet to come was measured after this
-        silent = (received_ns - self._channel.delay_ns - self._clock.start_ns) * 1e-9
+        silent = (received_ns - self._channel.max_delay_ns - self._clock.start_ns) * 1e-9
         until = silent if silent - last > self._channel.gap_threshold_secs else last
         return min(max(floor(until / self._clock.dt_secs), 0), self._clock.count)
 

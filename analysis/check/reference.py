@@ -81,7 +81,7 @@ def _measured(analysis: Analysis) -> Iterator[Channel]:
 
 
 def _assumed(analysis: Analysis) -> Iterator[Channel]:
-    for name, value in analysis.findings.plan.vessel.paper._asdict().items():
+    for name, value in analysis.findings.plan.vessel.paper_coefficients._asdict().items():
         yield _single(analysis, name, "model", value)
     noise = analysis.findings.plan.noise
     for i, name in enumerate(PAPER_OUTPUTS):

@@ -22,9 +22,9 @@ from shiplog.ships.paper import PAPER_INPUTS, Coefficients, rudder_effects, yaw_
 from shiplog.types import FloatArray, Signals
 from shiplog.vessel.settings import (
     DisturbanceSettings,
-    as_table,
     disturbance_settings,
-    number_fault,
+    number_error,
+    settings_dict,
 )
 
 from .loop import observe, ship_observer, starting, surge_plant, yaw_plant
@@ -214,7 +214,7 @@ def wanted_forces(
     Raises `UsageError` for settings that are none, and for what those samples do not tell.
     """
     faults: list[str] = []
-    disturbance_settings(as_table(settings), faults)
+    disturbance_settings(settings_dict(settings), faults)
     if faults:
         raise UsageError("; ".join(faults))
     degree = 1 if "ramp" in settings.models else 0 if "constant" in settings.models else None
@@ -255,7 +255,7 @@ def _wave(frequency: float | None) -> float:
             "disturbance.models has a wave whose frequency nobody knows; give"
             " disturbance.wave_frequency, rad/s, or leave 'wave' out"
         )
-    fault = number_fault("disturbance.wave_frequency", frequency, -inf, inf, positive=True)
+    fault = number_error("disturbance.wave_frequency", frequency, -inf, inf, positive=True)
     if fault:
         raise UsageError(fault)
     return float(frequency)

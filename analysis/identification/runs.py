@@ -7,13 +7,14 @@ from itertools import count
 import numpy as np
 
 from shiplog.checks.channel_stats import LogStats, compute_log_stats
-from shiplog.checks.data_quality import faults
+from shiplog.checks.data_quality import data_warnings
 from shiplog.checks.rudder_sign import rudder_sign_warning
 from shiplog.errors import LogError, UsageError
 from shiplog.resampling import resample
 from shiplog.types import FloatArray, Log
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, IdentifierSettings
-from shiplog.vessel.vessel import Vessel, parse_vessel
+from shiplog.vessel.vessel import Vessel
+from shiplog.vessel.vessel_parser import parse_vessel
 
 from .segment import Segment, segments_of, usual
 
@@ -98,7 +99,7 @@ def _renamed(run: Run, name: str) -> Run:
 
 def _doubts(log: Log, found: LogStats) -> Iterator[str]:
     also = tuple(name for name in ("heading", "position") if name in found)
-    yield from faults(found, (*NEEDED, *also))
+    yield from data_warnings(found, (*NEEDED, *also))
     contrary = rudder_sign_warning(log)
     if contrary:
         yield contrary

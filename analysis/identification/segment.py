@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.checks.channel_stats import longest_step_secs
+from shiplog.checks.channel_stats import gap_threshold_secs
 from shiplog.errors import LogError
 from shiplog.ships.motion import MODEL_OUTPUTS, InputPath
 from shiplog.ships.paper import PAPER_INPUTS
@@ -78,7 +78,7 @@ def _bridged(values: FloatArray, dt: float) -> FloatArray:
     if len(at) < 2:
         return values
     filled = np.interp(np.arange(len(values)), at, values[at], left=np.nan, right=np.nan)
-    longest = longest_step_secs(float(np.median(np.diff(at))) * dt) / dt
+    longest = gap_threshold_secs(float(np.median(np.diff(at))) * dt) / dt
     for i in np.flatnonzero(np.diff(at) > longest):
         filled[at[i] + 1 : at[i + 1]] = np.nan
     return filled

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shiplog.checks.channel_stats import longest_step_secs
+from shiplog.checks.channel_stats import gap_threshold_secs
 from shiplog.compiled import compiled
 from shiplog.ships.paper import (
     PAPER_INPUTS,
@@ -105,7 +105,7 @@ class WeakForm:
         self, model: Coefficients, count: int, dt: float, intervals: Sequence[float]
     ) -> None:
         self._model, self._count, self._dt = model, count, dt
-        longest = [longest_step_secs(interval * dt) / dt for interval in intervals]
+        longest = [gap_threshold_secs(interval * dt) / dt for interval in intervals]
         self._longest = dict(zip(CHANNELS, longest, strict=True))
         self._reach = int(max(self._longest.values())) + 2  # over which a sample has influence
         self._half = max(2, round(min(BUMP_SECS, count * dt / 5) / dt / 2))

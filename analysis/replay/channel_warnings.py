@@ -27,20 +27,20 @@ def channel_warnings(found: LogStats, needed: tuple[str, ...]) -> Iterator[str]:
 
 def _dead(found: LogStats) -> Iterator[str]:
     """Sensors that say the same throughout although the ship moved."""
-    ranges = {name: np.ptp(found[name].extremes) for name in ("yaw_rate", "speed", "rudder")}
+    ranges = {name: np.ptp(found[name].value_range) for name in ("yaw_rate", "speed", "rudder")}
     turned = ranges["yaw_rate"] > np.radians(0.1)
     for name, reach in ranges.items():
         if reach == 0 and (turned or name != "rudder"):
             yield f"{found[name].topic}: never changes; if the sensor was dead, choose another"
-    if found["speed"].median > 1.0 and found["rpm"].extremes == (0.0, 0.0):
+    if found["speed"].median > 1.0 and found["rpm"].value_range == (0.0, 0.0):
         yield f"{found['rpm'].topic}: 0 throughout, though the ship goes; the model needs it"
 
 
 def end_warnings(found: LogStats, clock: Clock, needed: tuple[str, ...]) -> Iterator[str]:
     """Parts of the log that are not replayed, or only predicted, for want of a channel."""
     first, last = clock.start_ns, clock.end_ns
-    begun = {name: found[name].known_span_ns[0] for name in needed}
-    ended = {name: found[name].known_span_ns[1] for name in needed}
+    begun = {name: found[name].valid_span_ns[0] for name in needed}
+    ended = {name: found[name].valid_span_ns[1] for name in needed}
     late = max(begun, key=lambda name: begun[name])
     wait = (first - min(begun.values())) * 1e-9
     if wait > found[late].gap_threshold_secs:

@@ -17,14 +17,14 @@ from analysis.signals.hold import InputHold
 from analysis.signals.signal_stats import SignalStats, SignalStatsCollector
 from shiplog import Channel, LogError, Signals, Vessel
 from shiplog.checks.channel_stats import LogStats, compute_log_stats
-from shiplog.checks.data_quality import faults
+from shiplog.checks.data_quality import data_warnings
 from shiplog.checks.gyro_bias import GyroBiasCheck
 from shiplog.checks.rudder_sign import RudderSignCheck
 from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, choose_clock, resample_chunks
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
 from shiplog.types import FloatArray, Log
-from shiplog.vessel.settings import SHORTEST_WINDOW_SECS
+from shiplog.vessel.settings import MIN_WINDOW_SECS
 
 from .channel_warnings import channel_warnings, end_warnings
 
@@ -90,7 +90,7 @@ def first_pass(log: Log, on_progress: ProgressCallback) -> FirstPass:
             f"a replay needs {', '.join(REQUIRED_CHANNELS)}"
         )
     optional = tuple(name for name in OPTIONAL_CHANNELS if name in log_stats)
-    warnings = (*log.warnings, *faults(log_stats, (*REQUIRED_CHANNELS, *optional)))
+    warnings = (*log.warnings, *data_warnings(log_stats, (*REQUIRED_CHANNELS, *optional)))
     clock = choose_clock(log, log_stats, channels=REQUIRED_CHANNELS, optional=("heading",))
     return FirstPass(log_stats, clock, warnings)
 
@@ -124,7 +124,7 @@ def second_pass(
     alphas, window_secs = vessel.coefficients or BARE, vessel.identifier.window_secs
     checks = RudderSignCheck(log_stats), GyroBiasCheck(log_stats)
     hold, collector = InputHold(clock), SignalStatsCollector(alphas)
-    expected = [clock.channels[name].usual_known_secs / clock.dt_secs for name in PAPER_OUTPUTS]
+    expected = [clock.channels[name].valid_interval_secs / clock.dt_secs for name in PAPER_OUTPUTS]
     intervals = np.maximum(np.round(expected), 1.0)
     equations = _Equations(alphas, clock, intervals, window_secs)
     listeners = hold.add_raw, *(check.add for check in checks)
@@ -230,7 +230,7 @@ class _Equations:
         }
         if self._window_secs > self._log_secs:
             text = f"{window} is longer than the log ({self._log_secs:.0f} s): the whole of it is "
-            room = self._log_secs > max(*least.values(), SHORTEST_WINDOW_SECS)
+            room = self._log_secs > max(*least.values(), MIN_WINDOW_SECS)
             shorter = "ask for shorter windows, or " if room else ""
             return [text + f"the one window; {shorter}give a longer log"]
         blank = [name for name, secs in least.items() if self._window_secs <= secs]

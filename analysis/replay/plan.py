@@ -21,7 +21,8 @@ from shiplog.resampling import Clock
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Log
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings
-from shiplog.vessel.vessel import idle, parse_vessel, with_settings
+from shiplog.vessel.vessel import unused_setting_warnings, with_settings
+from shiplog.vessel.vessel_parser import parse_vessel
 
 from .passes import FirstPass, SecondPass, first_pass, second_pass
 
@@ -122,7 +123,7 @@ def plan_replay(
         origin = FITTED_MODEL
     else:
         model_warnings = _other_model_warnings(vessel)
-    warnings += [*model_warnings, *idle(vessel)]
+    warnings += [*model_warnings, *unused_setting_warnings(vessel)]
     noise, noise_warnings = _noise(vessel, first, second.stats)
     disturbance, wave_warnings = _disturbance_settings(vessel, second.stats, noise)
     return Plan(
@@ -157,7 +158,7 @@ def _with_first_model(
     """Return the vessel with a model fitted to this log, and warnings about it."""
     warnings = []
     first = fit_first_model(second.yaw, second.surge, second.stats, log_name)
-    fitted, model = replace(vessel, coefficients=first.coefficients), first.paper
+    fitted, model = replace(vessel, coefficients=first.coefficients), first.paper_coefficients
     if vessel.model is None:
         fitted = replace(fitted, name=first.name, approach_rpm=first.approach_rpm)
     else:
@@ -185,7 +186,7 @@ def _other_model_warnings(vessel: Vessel) -> list[str]:
 def _noise(vessel: Vessel, first: FirstPass, stats: SignalStats) -> tuple[NoiseModel, list[str]]:
     """Return the noise that the filter assumes, and warnings about its wave."""
     settings = _averaged(vessel.filter, first.log_stats, first.clock.dt_secs)
-    noise, warnings = noise_of(stats, vessel.paper, settings), []
+    noise, warnings = noise_of(stats, vessel.paper_coefficients, settings), []
     if settings.wave and noise.wave is None:
         warnings.append(
             "no wave stands out of the yaw rate's residual: none is told from the ship's "
@@ -208,7 +209,7 @@ def _disturbance_settings(
         return settings, []
     frequency = settings.wave_frequency or vessel.filter.wave_frequency
     if frequency is None:
-        wave = noise.wave or wave_in(stats, vessel.paper, noise, vessel.filter)
+        wave = noise.wave or wave_in(stats, vessel.paper_coefficients, noise, vessel.filter)
         frequency = wave.frequency if wave is not None and wave.stands_out else None
     if frequency is None:
         frequency = DEFAULT_WAVE_FREQUENCY
@@ -227,6 +228,6 @@ def _averaged(settings: FilterSettings, log_stats: LogStats, dt_secs: float) -> 
     """
     stds = []
     for name, std in zip(PAPER_OUTPUTS, (settings.yaw_rate_std, settings.speed_std), strict=True):
-        together = max(1.0, dt_secs / log_stats[name].usual_secs)
+        together = max(1.0, dt_secs / log_stats[name].interval_secs)
         stds.append(None if std is None else std / sqrt(together))
     return replace(settings, yaw_rate_std=stds[0], speed_std=stds[1])

@@ -261,7 +261,9 @@ class _Stages:
         self._plan, self._log_name = plan, log_name
         self._filter, self._observer = _estimators(plan, log_name)
         self._residual_tests = [_residual_test(plan, i) for i in range(len(PAPER_OUTPUTS))]
-        weak_form = weak_form_on_clock(plan.vessel.paper, plan.clock, plan.stats.intervals)
+        weak_form = weak_form_on_clock(
+            plan.vessel.paper_coefficients, plan.clock, plan.stats.intervals
+        )
         count, window_secs = weak_form.row_count, plan.vessel.identifier.window_secs
         self._yaw = CoefficientStage(
             weak_form.yaw, count, plan.yaw_solution, constant=True, window_secs=window_secs
@@ -343,7 +345,7 @@ class _Stages:
 
 def _estimators(plan: Plan, log_name: str) -> tuple[Filter, ForceObserver]:
     """Design the filter and the observer; for a model that diverges neither may exist."""
-    model, noise, stats = plan.vessel.paper, plan.noise, plan.stats
+    model, noise, stats = plan.vessel.paper_coefficients, plan.noise, plan.stats
     settings = plan.disturbance_settings
     try:
         with np.errstate(over="ignore", invalid="ignore"):

@@ -35,7 +35,7 @@ class Tracker:
     """
 
     def __init__(self, clock: Clock, position: ChannelStats | None) -> None:
-        self._recorded = position if position is not None and position.known > 1 else None
+        self._recorded = position if position is not None and position.valid > 1 else None
         self._start_ns, self._reckoning = clock.start_ns, _DeadReckoner(clock)
         self._fixes: list[Track] = []  # since the last step
         self._datum: FloatArray | None = None  # the first position
@@ -50,7 +50,7 @@ class Tracker:
 
     def add_raw(self, chunk: tuple[Channel, ...]) -> None:
         """Look at the samples themselves for the positions recorded."""
-        channel = self._recorded.of(chunk) if self._recorded else None
+        channel = self._recorded.select(chunk) if self._recorded else None
         if channel is None:
             return
         known = np.isfinite(channel.values).all(axis=1)

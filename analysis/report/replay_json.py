@@ -15,7 +15,7 @@ from analysis.replay.replay import Findings
 from shiplog import __version__
 from shiplog.checks.channel_stats import ChannelStats
 from shiplog.ships.paper import COEFFICIENT_UNITS
-from shiplog.vessel.settings import as_table
+from shiplog.vessel.settings import settings_dict
 
 Summary = dict[str, Any]
 
@@ -40,7 +40,7 @@ def replay_json(findings: Findings) -> Summary:
             "origin": findings.plan.model_origin,
             "coefficients": {
                 name: {"value": value, "unit": COEFFICIENT_UNITS[name]}
-                for name, value in findings.plan.vessel.paper._asdict().items()
+                for name, value in findings.plan.vessel.paper_coefficients._asdict().items()
             },
         },
         "filter": {
@@ -63,7 +63,7 @@ def _channel(channel: ChannelStats) -> Summary:
     return {
         "unit": channel.unit,
         "samples": channel.samples,
-        "rate_hz": 1 / channel.usual_secs if channel.usual_secs else None,
+        "rate_hz": 1 / channel.interval_secs if channel.interval_secs else None,
         "gaps": len(channel.gaps),
         "longest_gap_secs": max((length for _, length in channel.gaps), default=0.0),
     }
@@ -90,11 +90,13 @@ def _residuals(findings: Findings, output: int) -> Summary:
 
 
 def _settings(findings: Findings) -> Summary:
-    filtering = as_table(findings.plan.vessel.filter) | {"kind": findings.plan.vessel.filter.chosen}
+    filtering = settings_dict(findings.plan.vessel.filter) | {
+        "kind": findings.plan.vessel.filter.chosen
+    }
     return {
         "filter": filtering,
-        "disturbance": as_table(findings.plan.disturbance_settings),
-        "identifier": as_table(findings.plan.vessel.identifier),
+        "disturbance": settings_dict(findings.plan.disturbance_settings),
+        "identifier": settings_dict(findings.plan.vessel.identifier),
     }
 
 

@@ -43,7 +43,7 @@ def replay_markdown(findings: Findings) -> str:
 def _log_section(findings: Findings) -> Section:
     log_stats, rows = findings.plan.log_stats, []
     for channel in log_stats:
-        rate = f"{1 / channel.usual_secs:.3g} Hz" if channel.usual_secs else ""
+        rate = f"{1 / channel.interval_secs:.3g} Hz" if channel.interval_secs else ""
         gaps = "none"
         if channel.gaps:
             longest = max(length for _, length in channel.gaps)
@@ -137,7 +137,7 @@ def _observed(findings: Findings) -> str:
 
 
 def _coefficient_section(findings: Findings) -> Section:
-    model, rows = findings.plan.vessel.paper._asdict(), []
+    model, rows = findings.plan.vessel.paper_coefficients._asdict(), []
     for found in (findings.yaw, findings.surge):
         for name, coefficient in found.coefficients.items():
             value, std = f"{coefficient.value:.4g}", f"{coefficient.std:.2g}"

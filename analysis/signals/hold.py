@@ -25,7 +25,7 @@ class InputHold:
     def add_raw(self, chunk: tuple[Channel, ...]) -> None:
         """Look at the samples themselves for what was known before the clock begins."""
         for name in PAPER_INPUTS:
-            channel = self._clock.channels[name].of(chunk)
+            channel = self._clock.channels[name].select(chunk)
             if channel is None:
                 continue
             earlier = np.isfinite(channel.values) & (channel.measured_ns <= self._clock.start_ns)

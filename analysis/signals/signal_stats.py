@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog import Signals
-from shiplog.checks.channel_stats import longest_step_secs
+from shiplog.checks.channel_stats import gap_threshold_secs
 from shiplog.checks.quantiles import Quantiles
 from shiplog.ships.paper import PAPER_OUTPUTS, Coefficients, rudder_effects
 from shiplog.types import FloatArray, concatenate_signals
@@ -41,7 +41,7 @@ class SignalStats:
     @property
     def longest_steps(self) -> FloatArray:
         """(2,) instants of the clock from sample to sample of an output, beyond which is a gap."""
-        return np.array([longest_step_secs(s) / self.dt_secs for s in self.interval_secs])
+        return np.array([gap_threshold_secs(s) / self.dt_secs for s in self.interval_secs])
 
 
 class SignalStatsCollector:

@@ -57,7 +57,7 @@ def equation_panels(findings: Findings, drawn: Drawn) -> tuple[list[Panel], list
 
 def history_panels(findings: Findings, drawn: Drawn) -> list[Panel]:
     """The history of each coefficient that any window could tell, beside the model's value."""
-    model = findings.plan.vessel.paper._asdict()
+    model = findings.plan.vessel.paper_coefficients._asdict()
     panels = [
         _coefficient(findings, drawn, name, coefficient, model[name], colour)
         for found, colour in ((findings.yaw, BLUE), (findings.surge, ORANGE))

@@ -12,7 +12,7 @@ from analysis.disturbance.observer import DISTURBANCE_UNITS
 from analysis.filters.base import OUTPUT_STATES
 from analysis.replay.replay import ReplayChunk
 from analysis.signals.signal_stats import SignalStats
-from shiplog.checks.channel_stats import longest_step_secs
+from shiplog.checks.channel_stats import gap_threshold_secs
 from shiplog.compiled import compiled
 from shiplog.resampling import Clock
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
@@ -156,7 +156,7 @@ def measured_line(values: FloatArray, dt: float) -> tuple[FloatArray, FloatArray
     """The times, in s, and the values of what was measured, (k,) each, with a NaN in each gap."""
     at = np.flatnonzero(np.isfinite(values))
     usual = float(np.median(np.diff(at))) if len(at) > 1 else 1.0
-    rows, columns = _Samples(longest_step_secs(usual * dt) / dt).step(0, values[:, None])
+    rows, columns = _Samples(gap_threshold_secs(usual * dt) / dt).step(0, values[:, None])
     return rows * dt, columns[:, 0]
 
 

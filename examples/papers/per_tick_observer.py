@@ -23,7 +23,7 @@ from analysis.design.placement import named, place_multilevel, polynomial_error
 from shiplog.errors import UsageError
 from shiplog.ships.paper import surge_acceleration, yaw_acceleration_rate
 from shiplog.types import FloatArray
-from shiplog.vessel.vessel import load_vessel
+from shiplog.vessel.vessel_parser import load_vessel
 
 Order = Literal["full", "reduced"]
 

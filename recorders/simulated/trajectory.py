@@ -23,7 +23,7 @@ from shiplog.ships.under_way import (
     write_rates_si,
 )
 from shiplog.types import FloatArray, TimeArray
-from shiplog.vessel.ship import ship_of
+from shiplog.vessel.ship import ship_from_vessel
 
 from .manoeuvres import Manoeuvre
 
@@ -126,7 +126,7 @@ def compute_trajectory(
     `rng` draws the random_forcing. Raises `UsageError` for a ship that runs away, or has no steady
     speed to begin with.
     """
-    ship, rpm = ship_of(vessel), ordered.orders[0].rpm
+    ship, rpm = ship_from_vessel(vessel), ordered.orders[0].rpm
     speed = ordered.initial_speed
     speed = ship.steady_speed(rpm) if speed is None else speed
     if ship.model.dimensionless and not speed > 0:

@@ -10,7 +10,7 @@ from shiplog.types import Channel, ChannelsByName, FloatArray, Log, TimeArray
 from shiplog.units import CATALOGUE, GEOGRAPHIC
 
 from .quantiles import Quantiles
-from .stuck import Stuck, StuckCheck
+from .stuck import StuckCheck, StuckStats
 
 Mask = NDArray[np.bool_]
 
@@ -22,11 +22,11 @@ _GLOBE = {"latitude": 90.0, "longitude": 180.0}
 
 
 @dataclass(frozen=True)
-class Cases:
+class Occurrences:
     """How often something was met in a channel, and what tells of one case."""
 
     count: int = 0
-    at_secs: float = 0.0  # of the first, since the channel's start
+    first_secs: float = 0.0  # of the first, since the channel's start
     extent: float = 0.0  # of the first or of the worst
 
 
@@ -40,22 +40,22 @@ class ChannelStats:
     fields: tuple[str, ...]
     samples: int
     span_ns: tuple[int, int]  # the first and the last instant; (0, 0) of none
-    usual_secs: float  # the median interval between samples; 0 where there is none
+    interval_secs: float  # the median interval between samples; 0 where there is none
     gaps: tuple[tuple[float, float], ...]  # start, since the channel's, and length, s
-    off_beat: float  # share of the other intervals that are more than half off the usual one
-    interval_range: tuple[float, float]  # s: their percentiles 1 and 99
-    repeated: int  # samples with the time of the one before
-    backwards: Cases  # by how many seconds the measured times first ran back
-    early: Cases  # received before measured, by seconds at the most
-    delay_ns: int  # from measurement to reception, at the most
+    irregular_share: float  # share of the other intervals that are more than half off the usual one
+    interval_range_secs: tuple[float, float]  # s: their percentiles 1 and 99
+    duplicate_times: int  # samples with the time of the one before
+    backward_steps: Occurrences  # by how many seconds the measured times first ran back
+    received_early: Occurrences  # received before measured, by seconds at the most
+    max_delay_ns: int  # from measurement to reception, at the most
     missing: int  # NaN
-    infinite: Cases
-    impossible: Cases  # and the worst value
-    stuck: Stuck | None
-    known: int
-    known_span_ns: tuple[int, int]
-    usual_known_secs: float
-    extremes: tuple[float, float]  # of the known values; NaN where there are none
+    infinite: Occurrences
+    impossible: Occurrences  # and the worst value
+    stuck: StuckStats | None
+    valid: int
+    valid_span_ns: tuple[int, int]
+    valid_interval_secs: float
+    value_range: tuple[float, float]  # of the known values; NaN where there are none
     median: float
     negative_share: float
     strict: bool = False
@@ -68,13 +68,13 @@ class ChannelStats:
     @property
     def gap_threshold_secs(self) -> float:
         """The silence beyond which the channel was not measured, not between two samples."""
-        return longest_step_secs(self.usual_secs)
+        return gap_threshold_secs(self.interval_secs)
 
-    def of(self, chunk: tuple[Channel, ...]) -> Channel | None:
+    def select(self, chunk: tuple[Channel, ...]) -> Channel | None:
         """The part of a chunk that is this channel's, what is not known as NaN."""
         for channel in chunk:
             if channel.topic == self.topic and channel.fields == self.fields:
-                return possible(channel) if self.strict else channel
+                return without_impossible(channel) if self.strict else channel
         return None
 
 
@@ -114,12 +114,12 @@ def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
     return LogStats(log.name, tuple(collector.result() for collector in collectors.values()))
 
 
-def longest_step_secs(usual_secs: float) -> float:
+def gap_threshold_secs(interval_secs: float) -> float:
     """How far apart two samples of a sensor of that usual period may stand without a gap."""
-    return max(GAP_PERIODS * usual_secs, GAP_SECS)
+    return max(GAP_PERIODS * interval_secs, GAP_SECS)
 
 
-def possible(channel: Channel) -> Channel:
+def without_impossible(channel: Channel) -> Channel:
     """The channel with what no ship does as not measured."""
     kind = CATALOGUE.get(channel.name)
     if kind is None or channel.fields:
@@ -142,7 +142,7 @@ class _ChannelStatsCollector:
         self._start = self._last = self._last_known = 0
         self._span, self._known_span = (_NEVER, -_NEVER), (_NEVER, -_NEVER)
         self._extremes = (np.inf, -np.inf)
-        self._backwards, self._early, self._infinite, self._impossible = (Cases(),) * 4
+        self._backwards, self._early, self._infinite, self._impossible = (Occurrences(),) * 4
         self._delay = 0
         self._worst_beyond = 0.0  # by which a value is impossible
         self._long = [np.zeros((0, 2), np.int64)]  # rows of the start and length of a long step
@@ -226,20 +226,20 @@ class _ChannelStatsCollector:
             met = self._met(self._impossible, len(bad), channel.measured_ns[bad[0]], 0.0)
             self._impossible = replace(met, extent=extent)
 
-    def _met(self, cases: Cases, count: int, at_ns: int, extent: float) -> Cases:
+    def _met(self, cases: Occurrences, count: int, at_ns: int, extent: float) -> Occurrences:
         """Some more cases; the first of all is told."""
         if cases.count:
             return replace(cases, count=cases.count + count)
-        return Cases(count, float(at_ns - self._start) * 1e-9, extent)
+        return Occurrences(count, float(at_ns - self._start) * 1e-9, extent)
 
     def result(self) -> ChannelStats:
         """What all that was added comes to."""
         channel, usual = self._channel, _median_secs(self._intervals)
         known = self._known_intervals
         long = np.concatenate(self._long)
-        long = long[long[:, 1] * 1e-9 > longest_step_secs(usual)]
+        long = long[long[:, 1] * 1e-9 > gap_threshold_secs(usual)]
         gaps = zip((long[:, 0] - self._span[0]) * 1e-9, long[:, 1] * 1e-9, strict=True)
-        off_beat, interval_range = _beat(self._intervals.values * 1e-9, usual)
+        irregular_share, interval_range_secs = _beat(self._intervals.values * 1e-9, usual)
         return ChannelStats(
             name=channel.name,
             source=channel.source,
@@ -247,22 +247,22 @@ class _ChannelStatsCollector:
             fields=channel.fields,
             samples=self._samples,
             span_ns=self._span if self._samples else (0, 0),
-            usual_secs=usual,
+            interval_secs=usual,
             gaps=tuple((float(start), float(length)) for start, length in gaps),
-            off_beat=off_beat,
-            interval_range=interval_range,
-            repeated=self._repeated,
-            backwards=self._backwards,
-            early=self._early,
-            delay_ns=self._delay,
+            irregular_share=irregular_share,
+            interval_range_secs=interval_range_secs,
+            duplicate_times=self._repeated,
+            backward_steps=self._backwards,
+            received_early=self._early,
+            max_delay_ns=self._delay,
             missing=self._missing,
             infinite=self._infinite,
             impossible=self._impossible,
             stuck=self._stuck.result(usual) if self._stuck else None,
-            known=self._known,
-            known_span_ns=self._known_span if self._known else (0, 0),
-            usual_known_secs=usual if known is self._intervals else _median_secs(known),
-            extremes=self._extremes,
+            valid=self._known,
+            valid_span_ns=self._known_span if self._known else (0, 0),
+            valid_interval_secs=usual if known is self._intervals else _median_secs(known),
+            value_range=self._extremes,
             median=self._values.median(),
             negative_share=self._negative / self._known if self._known else 0.0,
             strict=self._strict,
@@ -302,7 +302,7 @@ def _median_secs(intervals: Quantiles) -> float:
 
 def _beat(intervals: FloatArray, usual: float) -> tuple[float, tuple[float, float]]:
     """The share of intervals, but for gaps, that are more than half off, and their range."""
-    steps = intervals[intervals <= longest_step_secs(usual)]
+    steps = intervals[intervals <= gap_threshold_secs(usual)]
     if len(steps) < FEWEST_INTERVALS:
         return 0.0, (usual, usual)
     low, high = np.percentile(steps, [1, 99])

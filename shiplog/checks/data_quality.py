@@ -19,10 +19,10 @@ def examine(log: TrialLog, names: tuple[str, ...]) -> list[str]:
     Raises `LogError` where a channel is missing, holds an infinite value, or has measured times
     that run backwards: with these nothing can be computed.
     """
-    return faults(compute_log_stats(log), names)
+    return data_warnings(compute_log_stats(log), names)
 
 
-def faults(found: LogStats, names: tuple[str, ...]) -> list[str]:
+def data_warnings(found: LogStats, names: tuple[str, ...]) -> list[str]:
     """As `examine`, of a log that was surveyed."""
     said = []
     for name in names:
@@ -36,17 +36,17 @@ def faults(found: LogStats, names: tuple[str, ...]) -> list[str]:
 
 
 def _require_usable(found: LogStats, channel: ChannelStats) -> None:
-    infinite, back = channel.infinite, channel.backwards
+    infinite, back = channel.infinite, channel.backward_steps
     if infinite.count:
         raise LogError(
             f"{channel.topic} has {_count(infinite.count, 'infinite value')}, the first "
-            f"{infinite.at_secs:.3f} s after its start; convert the log to CSV, make it nan there "
-            f"and convert it back: {found.name}"
+            f"{infinite.first_secs:.3f} s after its start; convert the log to CSV, make it nan "
+            f"there and convert it back: {found.name}"
         )
     if back.count:
         raise LogError(
             f"the measured times of {channel.topic} run backwards {times_in_words(back.count)}, "
-            f"first by {back.extent:.3f} s, {back.at_secs:.3f} s after its start; "
+            f"first by {back.extent:.3f} s, {back.first_secs:.3f} s after its start; "
             f"`shiplog convert IN.mcap OUT.mcap` sorts them: {found.name}"
         )
 
@@ -56,23 +56,23 @@ def _faults(channel: ChannelStats) -> Iterator[str]:
         start, longest = max(channel.gaps, key=lambda gap: gap[1])
         count = _count(len(channel.gaps), "gap")
         yield f"{count}, the longest {longest:.1f} s, {start:.1f} s after its start"
-    if channel.repeated:
-        yield f"{_count(channel.repeated, 'sample')} with the time of the one before"
+    if channel.duplicate_times:
+        yield f"{_count(channel.duplicate_times, 'sample')} with the time of the one before"
     if channel.missing:
         share = 100 * channel.missing / channel.samples
         yield f"{_count(channel.missing, 'sample')} ({share:.1f} %) not measured (NaN)"
     yield from _stuck(channel)
     yield from _impossible(channel)
-    if channel.off_beat > IRREGULAR_SHARE:
-        low, high = channel.interval_range
+    if channel.irregular_share > IRREGULAR_SHARE:
+        low, high = channel.interval_range_secs
         yield (
-            f"irregular: {100 * channel.off_beat:.0f} % of its intervals are more than half off "
-            f"the usual {channel.usual_secs:.3g} s; they go from {low:.2g} to {high:.2g} s"
+            f"irregular: {100 * channel.irregular_share:.0f} % of its intervals are more than half "
+            f"off the usual {channel.interval_secs:.3g} s; they go from {low:.2g} to {high:.2g} s"
         )
-    if channel.early.count:
+    if channel.received_early.count:
         yield (
-            f"{_count(channel.early.count, 'sample')} received before measured, by up to "
-            f"{channel.early.extent:.3g} s: the sensor's clock is ahead of the recorder's"
+            f"{_count(channel.received_early.count, 'sample')} received before measured, by up to "
+            f"{channel.received_early.extent:.3g} s: the sensor's clock is ahead of the recorder's"
         )
 
 

@@ -8,7 +8,7 @@ from shiplog.types import Channel, FloatArray, Log
 from shiplog.units import conversion_factor
 
 from .channel_stats import ChannelStats, LogStats, compute_log_stats
-from .interpolate import Interpolator, known_samples
+from .interpolate import Interpolator, valid_samples
 
 BLOCKS = 8  # of a record, each telling the bias for itself
 SIGNIFICANT = 4.0  # standard errors
@@ -38,10 +38,10 @@ class GyroBiasCheck:
         self._duration_secs = found.duration_secs
         self._turned: _Turning | None = None
         gyro, compass = found.get("yaw_rate"), found.get("heading")
-        if gyro is None or compass is None or min(gyro.known, compass.known) < 4 * BLOCKS:
+        if gyro is None or compass is None or min(gyro.valid, compass.valid) < 4 * BLOCKS:
             return
-        start = max(gyro.known_span_ns[0], compass.known_span_ns[0])
-        end = min(gyro.known_span_ns[1], compass.known_span_ns[1])
+        start = max(gyro.valid_span_ns[0], compass.valid_span_ns[0])
+        end = min(gyro.valid_span_ns[1], compass.valid_span_ns[1])
         self._edges = np.linspace(0.0, (end - start) * 1e-9, BLOCKS + 1)
         self._turned = _Turning(gyro, self._edges, start, _integrated)
         self._headed = _Turning(compass, self._edges, start, _unwrapped)
@@ -95,10 +95,10 @@ class _Turning:
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
         """Take the next samples."""
-        channel = self.channel.of(chunk)
+        channel = self.channel.select(chunk)
         if channel is None or not len(channel):
             return
-        new = known_samples(channel, self._origin)
+        new = valid_samples(channel, self._origin)
         times, values = (np.concatenate(pair) for pair in zip(self._last, new, strict=True))
         self._last = times[-1:], values[-1:]
         if len(times) < 2:

@@ -44,7 +44,7 @@ class Interpolator:
         self._done = max(self._done, until)
 
 
-def known_samples(channel: Channel, origin_ns: int) -> tuple[FloatArray, FloatArray]:
+def valid_samples(channel: Channel, origin_ns: int) -> tuple[FloatArray, FloatArray]:
     """The known samples of a channel of scalars: seconds since `origin_ns` and values, (m,)."""
     known = np.isfinite(channel.values)
     return (channel.measured_ns[known] - origin_ns) * 1e-9, channel.values[known]

@@ -5,7 +5,7 @@ import numpy as np
 from shiplog.types import Channel, FloatArray, Log
 
 from .channel_stats import ChannelStats, LogStats, compute_log_stats
-from .interpolate import Interpolator, known_samples
+from .interpolate import Interpolator, valid_samples
 
 WINDOW_SECS = 10.0  # over which the rudder's effect on the yaw rate is looked at
 WINDOWS = 12  # at least so many of them must fit into a record
@@ -42,11 +42,11 @@ class RudderSignCheck:
         self._probes: dict[ChannelStats, Interpolator] = {}
         if self._rudder is None or yaw_rate is None:
             return
-        if min(yaw_rate.known, self._rudder.known) < 2 * WINDOWS:
+        if min(yaw_rate.valid, self._rudder.valid) < 2 * WINDOWS:
             return
-        start = max(yaw_rate.known_span_ns[0], self._rudder.known_span_ns[0])
-        span = (min(yaw_rate.known_span_ns[1], self._rudder.known_span_ns[1]) - start) * 1e-9
-        dt = max(yaw_rate.usual_secs, WINDOW_SECS / 100, span / 100_000)
+        start = max(yaw_rate.valid_span_ns[0], self._rudder.valid_span_ns[0])
+        span = (min(yaw_rate.valid_span_ns[1], self._rudder.valid_span_ns[1]) - start) * 1e-9
+        dt = max(yaw_rate.interval_secs, WINDOW_SECS / 100, span / 100_000)
         if span < 2 * WINDOWS * dt:
             return
         self._dt, self._start, at = dt, start, np.arange(int(span / dt) + 1) * dt
@@ -55,15 +55,15 @@ class RudderSignCheck:
             for channel in (yaw_rate, self._rudder)
         }
         speed = found.get("speed")
-        if speed is not None and speed.known:
+        if speed is not None and speed.valid:
             self._probes[speed] = Interpolator(at)
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
         """Take the next samples."""
         for surveyed, probe in self._probes.items():
-            channel = surveyed.of(chunk)
+            channel = surveyed.select(chunk)
             if channel is not None:
-                probe.add(*known_samples(channel, self._start))
+                probe.add(*valid_samples(channel, self._start))
 
     def result(self) -> str | None:
         """What there is to say, once all samples were added."""

@@ -15,7 +15,7 @@ STUCK_RUNS = 30  # and for so many times what is usual in its channel, is stuck
 
 
 @dataclass(frozen=True, eq=False)
-class Stuck:
+class StuckStats:
     """How often a channel was stuck, and the longest of it."""
 
     count: int
@@ -59,7 +59,7 @@ class StuckCheck:
         self._start, self._count = times[following], len(rows) - following
         self._jump = after[-1]
 
-    def result(self, usual_secs: float) -> Stuck | None:
+    def result(self, interval_secs: float) -> StuckStats | None:
         """What was stuck of all that was added, told once; `usual_secs` between samples."""
         if self._last is None:
             return None
@@ -67,7 +67,7 @@ class StuckCheck:
         start, jump = np.array([self._start]), np.array([self._jump])
         self._note(start, np.array([end]), np.array([self._count]), jump, np.zeros(1), value[None])
         start, lasted, before, after, *values = np.concatenate(self._long).T
-        least = max(STUCK_SECS, STUCK_PERIODS * usual_secs)
+        least = max(STUCK_SECS, STUCK_PERIODS * interval_secs)
         long = np.asarray(lasted > least)
         if not long.any() or np.count_nonzero(long) == self._runs:
             return None
@@ -80,7 +80,7 @@ class StuckCheck:
             return None
         worst = int(np.argmax(np.where(long, lasted, -1.0)))
         held = np.array(values)[:, worst]
-        return Stuck(int(np.count_nonzero(long)), held, start[worst], lasted[worst])
+        return StuckStats(int(np.count_nonzero(long)), held, start[worst], lasted[worst])
 
     def _note(
         self,

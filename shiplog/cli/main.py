@@ -62,7 +62,7 @@ def _run_simulate(arguments: argparse.Namespace) -> int:
     from recorders.simulated.simulate import simulate
     from recorders.simulated.trajectory import Gust, RandomForcing, WaveMoment
     from shiplog.mcap.writer import write
-    from shiplog.vessel.vessel import load_vessel
+    from shiplog.vessel.vessel_parser import load_vessel
 
     _require_distinct([arguments.output, arguments.truth], [arguments.vessel])
     _require_suffix(".mcap", arguments.output, arguments.truth)
@@ -124,7 +124,7 @@ def _run_replay(arguments: argparse.Namespace) -> int:
     from analysis.report.replay_json import replay_json
     from analysis.report.replay_tables import replay_markdown, replay_tables
     from shiplog.mcap.stream import open_log
-    from shiplog.vessel.vessel import load_vessel
+    from shiplog.vessel.vessel_parser import load_vessel
 
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     if Path(arguments.log).suffix == ".rrd":
@@ -174,7 +174,7 @@ def _run_identify(arguments: argparse.Namespace) -> int:
     from analysis.report.identification_json import identification_json
     from analysis.report.identification_tables import identification_tables
     from shiplog.mcap.stream import open_log
-    from shiplog.vessel.vessel import load_vessel
+    from shiplog.vessel.vessel_parser import load_vessel
 
     fitted, held_out = (
         [str(Path(path).resolve()) for path in paths]

@@ -5,7 +5,7 @@ from math import inf
 
 from shiplog.units import did_you_mean
 
-from .settings import number_fault
+from .settings import number_error
 
 PAPERS = ("burylin", "burylin-tied")  # stand in sections of their own
 SCALE = {"speed": (0.0, 50.0), "rpm": (0.0, 3000.0)}  # of the straight run, each positive
@@ -43,7 +43,7 @@ def model_section(table: object, length: float | None, faults: list[str]) -> Mod
     found: dict[str, float] = {}
     for key, value in table.items():
         if key in limits:
-            fault = number_fault(f"model.{key}", value, *limits[key], positive=key in SCALE)
+            fault = number_error(f"model.{key}", value, *limits[key], positive=key in SCALE)
             faults += [fault] if fault else []
             found[key] = float(value) if not fault else inf
         elif key != "name":

@@ -15,7 +15,7 @@ SMOOTHED = ("pseudo-input", "extended")  # whose gain is the one that a smoother
 DISTURBANCES = ("constant", "ramp", "wave")
 SPECTRA = ("butterworth", "binomial")
 
-SHORTEST_WINDOW_SECS = 60.0  # one bump of the equations in integral form
+MIN_WINDOW_SECS = 60.0  # one bump of the equations in integral form
 
 Settings = TypeVar("Settings", "FilterSettings", "DisturbanceSettings", "IdentifierSettings")
 
@@ -84,7 +84,7 @@ class DisturbanceSettings:
 class IdentifierSettings:
     """What a vessel file says of the windows in which coefficients are identified."""
 
-    window_secs: float = _number(200.0, least=SHORTEST_WINDOW_SECS, most=1e9)
+    window_secs: float = _number(200.0, least=MIN_WINDOW_SECS, most=1e9)
 
 
 ONLY_OF = {  # what the settings of single filters do nothing without
@@ -98,10 +98,10 @@ ONLY_OF = {  # what the settings of single filters do nothing without
 }
 
 
-def without_effect(filtering: FilterSettings, observing: DisturbanceSettings) -> list[str]:
+def unused_settings(filtering: FilterSettings, observing: DisturbanceSettings) -> list[str]:
     """The settings, by their names, that are not as by default and do nothing."""
-    usual, names = as_table(FilterSettings()), []
-    changed = [key for key, value in as_table(filtering).items() if usual.get(key) != value]
+    usual, names = settings_dict(FilterSettings()), []
+    changed = [key for key, value in settings_dict(filtering).items() if usual.get(key) != value]
     names += [key for key in changed if filtering.chosen not in ONLY_OF.get(key, FILTERS)]
     of_wave = ("wave_frequency", "wave_damping", "wave_std")
     observes = "wave" in observing.models
@@ -137,7 +137,7 @@ def identifier_settings(table: Mapping[str, object], faults: list[str]) -> Ident
     return _parsed("identifier", IdentifierSettings, table, faults)
 
 
-def as_table(
+def settings_dict(
     settings: FilterSettings | DisturbanceSettings | IdentifierSettings,
 ) -> dict[str, object]:
     """The section that gives these settings."""
@@ -174,7 +174,7 @@ def _fault(label: str, value: object, wanted: Mapping[str, Any]) -> str | None:
     if kind is bool:
         return None if isinstance(value, bool) else f"{label} must be true or false, got {value!r}"
     if kind is float:
-        return number_fault(
+        return number_error(
             label, value, wanted["least"], wanted["most"], positive=wanted["positive"]
         )
     among = f"{', '.join(wanted['of'])}"
@@ -184,7 +184,7 @@ def _fault(label: str, value: object, wanted: Mapping[str, Any]) -> str | None:
     return None if several else f"{label} must be a list of some of {among}, got {value!r}"
 
 
-def number_fault(
+def number_error(
     label: str, value: object, least: float, most: float, *, positive: bool = False
 ) -> str | None:
     """What is wrong with a number of a vessel file, if anything."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from shiplog import Vessel
 from shiplog.types import FloatArray
-from shiplog.vessel.vessel import parse_vessel
+from shiplog.vessel.vessel_parser import parse_vessel
 
 LENGTH, SPEED, RPM = 180.0, 8.0, 90.0
 _SLIPSTREAM = {

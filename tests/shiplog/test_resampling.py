@@ -163,7 +163,7 @@ def test_jittered_times_keep_the_usual_period_and_lose_no_sample() -> None:
     rng = np.random.default_rng(3)
     seconds = np.arange(500) * 0.1 + rng.uniform(-0.02, 0.02, 500)
     jittered = channel("yaw_rate", seconds, np.arange(500.0))
-    assert compute_log_stats(log_of(jittered))[jittered.name].usual_secs == pytest.approx(
+    assert compute_log_stats(log_of(jittered))[jittered.name].interval_secs == pytest.approx(
         0.1, abs=0.005
     )
     signals = resample(log_of(jittered), 0.1)

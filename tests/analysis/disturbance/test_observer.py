@@ -33,8 +33,8 @@ from shiplog.resampling import resample_chunks
 from shiplog.ships.paper import Coefficients
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
+from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import DISTURBANCES, DisturbanceSettings
-from shiplog.vessel.vessel import PRESETS
 
 NAMES = ("yaw_rate", "speed", "rudder", "rpm")
 STEP = radians(2)

@@ -20,7 +20,7 @@ from recorders.simulated.simulate import simulate
 from shiplog import Channel, LogError, TrialLog, UsageError, load_vessel
 from shiplog.cli.arguments import SHIP_MODELS
 from shiplog.ships import model_names
-from shiplog.vessel.vessel import parse_vessel
+from shiplog.vessel.vessel_parser import parse_vessel
 
 VESSEL, TOML = load_vessel("table1")
 LONG = TOML.replace("angle_unit", "length = 200.0\nangle_unit", 1)

@@ -22,8 +22,9 @@ from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import compute_trajectory
 from shiplog import LogError, TrialLog, Vessel
 from shiplog.types import FloatArray
-from shiplog.vessel.ship import ship_of
-from shiplog.vessel.vessel import PRESETS, parse_vessel
+from shiplog.vessel.presets import PRESETS
+from shiplog.vessel.ship import ship_from_vessel
+from shiplog.vessel.vessel_parser import parse_vessel
 
 NOISE = {"yaw_rate.white": 1e-4, "speed.white": 0.03, "heading.white": 1e-3, "sway.white": 0.03}
 RUNS = ("zigzag-20-20", "pseudo-random", "turning-circle-35-port")
@@ -60,7 +61,7 @@ def truth(vessel: Vessel, run: str) -> dict[str, FloatArray]:
 def test_a_simulated_ship_of_any_model_is_found_within_her_intervals(name: str) -> None:
     found, _ = found_of(name)
     # in her own units: the speed of the straight run, as measured, is off by its noise
-    whole = fit(replace(found.fit.problem, scale=ship_of(vessel_of(name)).scale))
+    whole = fit(replace(found.fit.problem, scale=ship_from_vessel(vessel_of(name)).scale))
     told = uncertainty(whole)
     true = np.array([SHIPS[name][parameter] for parameter in told.names])
     off = np.abs(told.values - true) / told.std
@@ -73,7 +74,7 @@ def test_a_simulated_ship_of_any_model_is_found_within_her_intervals(name: str) 
 def test_the_file_is_the_ship_that_was_found(name: str) -> None:
     found, text = found_of(name)
     vessel = parse_vessel(text, "v.toml")
-    ship = ship_of(vessel)
+    ship = ship_from_vessel(vessel)
     assert ship.model is found.model
     assert ship.scale == found.fit.problem.scale
     assert ship.coefficients == found.model.coefficients(found.fit.parameters)
@@ -99,7 +100,7 @@ def test_the_ship_that_was_found_sails_as_the_true_one_does_what_neither_saw(nam
 @pytest.mark.parametrize("name", SECOND_ORDER)
 def test_the_papers_model_of_the_same_logs_stands_beside_it_for_replay(name: str) -> None:
     _, text = found_of(name)
-    paper = parse_vessel(text, "v.toml").paper
+    paper = parse_vessel(text, "v.toml").paper_coefficients
     assert "# what `record simulate` sails\n[model]" in text
     assert "What `replay` filters by: the paper's model, fitted to the same logs" in text
     alone = identify(logs_of(name), "burylin").fit.parameters

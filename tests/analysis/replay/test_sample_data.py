@@ -12,8 +12,8 @@ from analysis.replay.replay import analyse
 from shiplog import load_vessel, read
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
+from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import DISTURBANCES, FILTERS, SMOOTHED
-from shiplog.vessel.vessel import PRESETS
 
 LOGS = logs_in(SAMPLE_DATA)
 

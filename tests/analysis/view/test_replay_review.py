@@ -25,7 +25,7 @@ from analysis.view.viewer import view_review
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog.errors import ShiplogError
-from shiplog.vessel.vessel import load_vessel
+from shiplog.vessel.vessel_parser import load_vessel
 
 RERUN = shutil.which("rerun", path=str(Path(sys.executable).parent))
 GREY, BLUE = (140, 140, 140, 255), (66, 150, 245, 255)

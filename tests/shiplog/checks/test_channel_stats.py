@@ -8,7 +8,7 @@ from faults import dropout, freeze, spike
 from trial_logs import InChunks
 
 from shiplog import Channel, TrialLog
-from shiplog.checks.channel_stats import ChannelStats, compute_log_stats, possible
+from shiplog.checks.channel_stats import ChannelStats, compute_log_stats, without_impossible
 
 START = 1_700_000_000 * 10**9
 
@@ -37,24 +37,24 @@ def test_gaps_are_told_by_when_and_how_long() -> None:
 
 def test_a_channel_without_samples_is_there() -> None:
     empty = of(channel("speed", [], []))
-    assert (empty.samples, empty.known, empty.usual_secs, empty.span_ns) == (0, 0, 0.0, (0, 0))
+    assert (empty.samples, empty.valid, empty.interval_secs, empty.span_ns) == (0, 0, 0.0, (0, 0))
 
 
 def test_only_possible_values_are_known_where_it_is_strict() -> None:
     wild = channel("speed", [0, 1, 2, 3], [5, 1e9, 6, np.nan])
-    assert of(wild).known == 3
-    assert of(wild, strict=True).known == 2
-    assert of(wild, strict=True).extremes == (5.0, 6.0)
+    assert of(wild).valid == 3
+    assert of(wild, strict=True).valid == 2
+    assert of(wild, strict=True).value_range == (5.0, 6.0)
     assert of(wild).impossible.count == 1
-    np.testing.assert_array_equal(possible(wild).values, [5, np.nan, 6, np.nan])
+    np.testing.assert_array_equal(without_impossible(wild).values, [5, np.nan, 6, np.nan])
 
 
 def test_the_usual_period_of_what_is_known_leaves_out_what_is_not() -> None:
     values = np.full(100, np.nan)
     values[::10] = 1.0
     found = of(channel("speed", list(0.1 * np.arange(100)), values))
-    assert found.usual_secs == pytest.approx(0.1)
-    assert found.usual_known_secs == pytest.approx(1.0)
+    assert found.interval_secs == pytest.approx(0.1)
+    assert found.valid_interval_secs == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("seed", range(3))

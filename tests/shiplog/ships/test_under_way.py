@@ -19,9 +19,9 @@ from shiplog.ships.paper import (
     yaw_acceleration_rate,
 )
 from shiplog.ships.under_way import Excitation, Ship, rates_si, runge_kutta_step, straight_run
-from shiplog.vessel.ship import ship_of
+from shiplog.vessel.ship import ship_from_vessel
 
-TABLE1 = load_vessel("table1")[0].paper
+TABLE1 = load_vessel("table1")[0].paper_coefficients
 
 
 def papers(c: Coefficients = TABLE1) -> Ship:
@@ -72,7 +72,7 @@ def test_a_ship_that_nothing_holds_back_gains_what_the_forces_give() -> None:
 
 
 def test_the_papers_ship_begins_at_her_speed_in_closed_form(vessel: Vessel) -> None:
-    assert ship_of(vessel).steady_speed(80.0) == steady_speed(TABLE1, 80.0)
+    assert ship_from_vessel(vessel).steady_speed(80.0) == steady_speed(TABLE1, 80.0)
 
 
 # ---- any model's
@@ -80,7 +80,7 @@ def test_the_papers_ship_begins_at_her_speed_in_closed_form(vessel: Vessel) -> N
 
 @pytest.mark.parametrize("name", SHIPS)
 def test_a_straight_run_settles_where_nothing_changes_the_speed(name: str) -> None:
-    ship = ship_of(vessel_of(name))
+    ship = ship_from_vessel(vessel_of(name))
     speed = ship.steady_speed(RPM)
     assert speed == pytest.approx(approach(name), rel=1e-12)
     rates = rates_si(
@@ -98,14 +98,14 @@ def test_a_straight_run_settles_where_nothing_changes_the_speed(name: str) -> No
 
 @pytest.mark.parametrize("changes", [{"h": -0.01}, {"g": 0.0}])
 def test_a_ship_without_a_steady_speed_has_none(changes: dict[str, float]) -> None:
-    ship = ship_of(vessel_of("nomoto"))
+    ship = ship_from_vessel(vessel_of("nomoto"))
     other = Ship(ship.model, ship.coefficients._replace(**changes), ship.scale)
     assert other.steady_speed(RPM) == 0.0
 
 
 @pytest.mark.parametrize("name", SHIPS)
 def test_the_rates_in_si_are_those_of_the_equations_as_printed(name: str) -> None:
-    ship, rng = ship_of(vessel_of(name)), np.random.default_rng(1)
+    ship, rng = ship_from_vessel(vessel_of(name)), np.random.default_rng(1)
     speed = approach(name)
     constants, straight_state = ship.constants(speed, RPM), ship.straight_state(speed)
     for _ in range(50):
@@ -122,7 +122,7 @@ def test_the_rates_in_si_are_those_of_the_equations_as_printed(name: str) -> Non
 
 @pytest.mark.parametrize("name", SHIPS)
 def test_a_moment_pushes_to_its_side_and_slows_nobody(name: str) -> None:
-    ship = ship_of(vessel_of(name))
+    ship = ship_from_vessel(vessel_of(name))
     constants = ship.constants(SPEED, RPM)
     size, unit = ship.moment_per_rudder(constants)
     assert size > 0

@@ -8,8 +8,9 @@ from places import PROJECT
 
 from shiplog import VesselError, load_vessel
 from shiplog.ships import ship_model
-from shiplog.vessel.ship import ship_of
-from shiplog.vessel.vessel import PRESETS, parse_vessel
+from shiplog.vessel.presets import PRESETS
+from shiplog.vessel.ship import ship_from_vessel
+from shiplog.vessel.vessel_parser import parse_vessel
 
 TEXT = toml_of("three-dof")
 
@@ -23,25 +24,25 @@ def fault_of(text: str) -> str:
 @pytest.mark.parametrize("name", SHIPS)
 def test_a_model_alone_is_a_vessel_that_sails_by_it(name: str) -> None:
     vessel = parse_vessel(toml_of(name), "ship.toml")
-    ship = ship_of(vessel)
+    ship = ship_from_vessel(vessel)
     assert ship.model is ship_model(name)
     assert ship.coefficients._asdict().items() >= SHIPS[name].items()
     assert (ship.scale.secs, ship.scale.speed, ship.scale.rpm) == (LENGTH / SPEED, SPEED, RPM)
     assert vessel.coefficients is None
     with pytest.raises(VesselError, match=f"has a .model. alone.*too: a {name}"):
-        _ = vessel.paper
+        _ = vessel.paper_coefficients
 
 
 def test_without_a_model_of_its_own_she_sails_by_the_papers() -> None:
     vessel = load_vessel("table1")[0]
     assert vessel.model is None
-    assert ship_of(vessel).coefficients == vessel.coefficients
+    assert ship_from_vessel(vessel).coefficients == vessel.coefficients
 
 
 def test_both_may_stand_there_and_she_sails_by_her_own() -> None:
     both = parse_vessel(f"length = 180.0\n{PRESETS['table1']}{own_section()}", "ship.toml")
     assert both.coefficients == load_vessel("table1")[0].coefficients
-    assert ship_of(both).model.name == "three-dof"
+    assert ship_from_vessel(both).model.name == "three-dof"
     assert both.rudder_max == pytest.approx(radians(35))
 
 

@@ -9,21 +9,23 @@ from analysis.regression.weak_form import BUMP_SECS
 from shiplog import Vessel, load_vessel
 from shiplog.cli.arguments import parser, replay_settings
 from shiplog.errors import UsageError, VesselError
+from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import (
     DISTURBANCES,
     FILTERS,
-    SHORTEST_WINDOW_SECS,
+    MIN_WINDOW_SECS,
     SMOOTHED,
     DisturbanceSettings,
     FilterSettings,
     IdentifierSettings,
-    as_table,
     disturbance_settings,
     filter_settings,
     identifier_settings,
-    without_effect,
+    settings_dict,
+    unused_settings,
 )
-from shiplog.vessel.vessel import PRESETS, idle, parse_vessel, with_settings
+from shiplog.vessel.vessel import unused_setting_warnings, with_settings
+from shiplog.vessel.vessel_parser import parse_vessel
 
 PARSERS = {
     "filter": filter_settings,
@@ -66,7 +68,7 @@ def test_every_disturbance_can_be_named_in_a_vessel_file(models: list[str]) -> N
 
 def test_windows_are_what_a_file_and_the_command_line_say(vessel: Vessel) -> None:
     assert vessel.identifier.window_secs == WINDOW_SECS
-    assert SHORTEST_WINDOW_SECS == BUMP_SECS
+    assert MIN_WINDOW_SECS == BUMP_SECS
     stated = parse_vessel(f"{PRESETS['table1']}[identifier]\nwindow_secs = 300\n", "ship.toml")
     assert stated.identifier.window_secs == 300.0
     chosen = given("--set", "identifier.window_secs=400")
@@ -79,7 +81,7 @@ def test_windows_are_what_a_file_and_the_command_line_say(vessel: Vessel) -> Non
 def test_settings_are_their_table_and_back(settings: FilterSettings | DisturbanceSettings) -> None:
     faults: list[str] = []
     parse = filter_settings if isinstance(settings, FilterSettings) else disturbance_settings
-    assert parse(as_table(settings), faults) == settings
+    assert parse(settings_dict(settings), faults) == settings
     assert not faults
 
 
@@ -161,9 +163,9 @@ def test_a_setting_of_which_nothing_comes_is_told(
     vessel: Vessel, settings: dict[str, object], names: list[str]
 ) -> None:
     changed = with_settings(vessel, settings)
-    assert without_effect(changed.filter, changed.disturbance) == names
-    assert all(name in idle(changed)[0] for name in names)
-    assert bool(idle(changed)) == bool(names)
+    assert unused_settings(changed.filter, changed.disturbance) == names
+    assert all(name in unused_setting_warnings(changed)[0] for name in names)
+    assert bool(unused_setting_warnings(changed)) == bool(names)
 
 
 def test_settings_of_another_kind_are_refused_all_at_once(vessel: Vessel) -> None:

@@ -4,8 +4,9 @@ from pathlib import Path
 import pytest
 
 from shiplog import VesselError, load_vessel
+from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import FilterSettings
-from shiplog.vessel.vessel import PRESETS, parse_vessel
+from shiplog.vessel.vessel_parser import parse_vessel
 
 DEG = 180 / pi  # degrees in a radian
 
