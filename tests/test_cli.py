@@ -12,7 +12,10 @@ from places import KVLCC2, LAYOUTS, PROJECT
 from recorders.record import record
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Channel, LogWriter, TrialLog, load_vessel, read, write
-from shiplog.cli.main import DATA_LOST, FAILURE, FINE, USAGE, main
+from shiplog.cli.main import main
+from shiplog.cli.verb import ExitCode
+
+FINE, FAILURE, USAGE, DATA_LOST = ExitCode
 
 
 @pytest.fixture(autouse=True)
@@ -471,7 +474,7 @@ def test_a_folder_that_hides_our_package_is_named(recorded: Path) -> None:
         check=False,
     )
     assert done.returncode == FAILURE
-    assert "another package called 'analysis' hides shiplog's own" in done.stderr
+    assert "another package named 'analysis' shadows shiplog's own" in done.stderr
     assert "Traceback" not in done.stderr
 
 
@@ -491,7 +494,7 @@ def test_an_output_is_called_what_it_is(
     capsys: pytest.CaptureFixture[str], arguments: str, suffix: str
 ) -> None:
     said = refusal(capsys, USAGE, *arguments.split())
-    assert f"what is written is a {suffix} file; call it so" in said
+    assert f"the output is a {suffix} file; give it a name that ends so" in said
 
 
 # ---- identify
@@ -514,7 +517,7 @@ def test_a_ship_is_identified_validated_written_sailed_and_replayed(
 ) -> None:
     zigzag, circle = two_runs
     capsys.readouterr()
-    arguments = ["--known", "T3=0.5", "--validate", circle, "-o", "found.toml", "--json", "f.json"]
+    arguments = ["--fix", "T3=0.5", "--validate", circle, "-o", "found.toml", "--json", "f.json"]
     assert main(["identify", zigzag, *arguments]) == FINE
     said = capsys.readouterr()
     assert "the paper's model, b1 = -d and e = T3 d" in said.out
@@ -573,8 +576,8 @@ def test_the_best_model_is_chosen_on_the_command_line(
     [
         (USAGE, "Z Z", "named twice"),
         (USAGE, "Z --validate Z", "not validated on a log it has seen"),
-        (USAGE, "Z --known T3", "--known wants NAME=VALUE, such as T3=0.5"),
-        (USAGE, "Z --known T4=1", "no parameter 'T4'; it has a, b1"),
+        (USAGE, "Z --fix T3", "--fix takes NAME=VALUE, such as T3=0.5"),
+        (USAGE, "Z --fix T4=1", "no parameter 'T4'; it has a, b1"),
         (USAGE, "Z --model burylon", "did you mean 'burylin'?"),
         (USAGE, "Z --model auto", "give two logs or more, or name the model"),
         (USAGE, "Z -o x.txt", "is a .toml file"),

@@ -18,8 +18,6 @@ from analysis.report.identification_tables import identification_tables
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import Channel, LogError, TrialLog, UsageError, load_vessel
-from shiplog.cli.arguments import SHIP_MODELS
-from shiplog.ships import model_names
 from shiplog.vessel.vessel_parser import parse_vessel
 
 VESSEL, TOML = load_vessel("table1")
@@ -180,10 +178,6 @@ def test_logs_that_cannot_identify_anything_are_refused(number: int) -> None:
     for model in ("burylin", "three-dof"):
         with pytest.raises(LogError, match=said):
             identify([log], model)
-
-
-def test_the_command_line_names_every_model() -> None:
-    assert sorted(SHIP_MODELS) == list(model_names())
 
 
 def test_no_logs_no_models_and_no_numbers_are_refused() -> None:

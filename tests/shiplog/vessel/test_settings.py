@@ -1,13 +1,14 @@
 """The settings of filter and observer, from a vessel file, the command line and Python alike."""
 
+from argparse import ArgumentParser
 from dataclasses import fields
 
 import pytest
 
+from analysis.cli import REPLAY, replay_settings
 from analysis.regression.sliding import WINDOW_SECS
 from analysis.regression.weak_form import BUMP_SECS
 from shiplog import Vessel, load_vessel
-from shiplog.cli.arguments import parser, replay_settings
 from shiplog.errors import UsageError, VesselError
 from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import (
@@ -41,7 +42,9 @@ def faults_of(section: str, table: dict[str, object]) -> str:
 
 
 def given(*arguments: str) -> dict[str, object]:
-    return replay_settings(parser().parse_args(["replay", "x.mcap", *arguments]))
+    parser = ArgumentParser()
+    REPLAY.configure(parser)
+    return replay_settings(parser.parse_args(["x.mcap", *arguments]))
 
 
 def test_what_a_vessel_file_leaves_out_is_the_papers() -> None:
@@ -191,7 +194,7 @@ def test_the_command_line_gives_them_by_name() -> None:
 
 @pytest.mark.parametrize("text", ["filter.gate", "=3", "filter.gate="])
 def test_a_setting_that_is_none_is_refused(text: str) -> None:
-    with pytest.raises(UsageError, match="--set wants KEY=VALUE"):
+    with pytest.raises(UsageError, match="--set takes KEY=VALUE"):
         given("--set", text)
 
 

@@ -1,0 +1,176 @@
+"""What a verb prints: progress, tables, warnings, JSON."""
+
+import json
+import sys
+import textwrap
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Protocol
+
+from shiplog.files import atomic_write
+from shiplog.progress import ProgressCallback
+
+MIN_NAME_WIDTH = 12  # characters of a shortened cell in the first column
+EDGES, GAP = 4, 3  # of a printed table, in characters
+FIRST_ESTIMATE_SECS = 2.0  # of work, before the remaining time is estimated
+
+
+class Table(Protocol):
+    """A table for people: a title, columns, rows of text, and remarks below."""
+
+    @property
+    def title(self) -> str: ...  # noqa: D102
+    @property
+    def columns(self) -> tuple[str, ...]: ...  # noqa: D102
+    @property
+    def rows(self) -> tuple[tuple[str, ...], ...]: ...  # noqa: D102
+    @property
+    def remarks(self) -> tuple[str, ...]: ...  # noqa: D102
+
+
+@contextmanager
+def progress(compiles: str | None = None, *, lines: bool = False) -> Iterator[ProgressCallback]:
+    """Show the progress of long work on stderr.
+
+    On a terminal as a bar with the elapsed and the remaining time; elsewhere only where `lines`
+    is set, one line a step.
+
+    Parameters
+    ----------
+    compiles
+        The package whose loops the work needs; where they were never compiled on this computer,
+        the text says that they are.
+    lines
+        Whether to print a line for each step of a known share where stderr is no terminal.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    console, note = Console(stderr=True), ""
+    if compiles:
+        from shiplog.compiled import is_compiled
+
+        note = "" if is_compiled(compiles) else " (first run: compiling the loops, once)"
+    bar_columns = (SpinnerColumn(), BarColumn(bar_width=24), TimeElapsedColumn())
+    columns = (*bar_columns, TextColumn("{task.description}"))
+    start, last, shown = time.monotonic(), "", console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
+        task = bar.add_task("", total=None)
+
+        def on_progress(step: str, share: float | None = None, /) -> None:
+            nonlocal last
+            text = f"{step}{note}{_remaining(time.monotonic() - start, share)}"
+            if shown:
+                total = None if share is None else 1.0
+                bar.update(task, description=text, total=total, completed=share or 0.0)
+            elif lines and share is not None and step != last:
+                print(text, file=sys.stderr, flush=True)
+            last = step
+
+        yield on_progress
+
+
+def _remaining(elapsed_secs: float, share: float | None) -> str:
+    """Estimate the remaining time, in words; nothing where it is too early."""
+    if not share or elapsed_secs < FIRST_ESTIMATE_SECS or share >= 1.0:
+        return ""
+    secs = elapsed_secs * (1 - share) / share
+    return f", about {secs:.0f} s left" if secs < 100 else f", about {secs / 60:.0f} min left"
+
+
+def print_tables(tables: Sequence[Table], *, to_stderr: bool = False) -> None:
+    """Print tables and their remarks, in the width of the console.
+
+    No word and no number is broken: headings wrap between words, long names in the first column
+    are shortened in the middle, and a table that is still too wide is printed in parts.
+    """
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table as RichTable
+
+    console = Console(stderr=to_stderr, highlight=False, markup=False)  # [deg] is a unit
+    for table in tables:
+        for number, part in enumerate(_fitted(table.columns, table.rows, console.width)):
+            title = table.title if number == 0 else f"{table.title} (continued)"
+            shown = RichTable(title=title, title_justify="left", title_style="bold", box=SIMPLE)
+            for i, heading in enumerate(part[0]):
+                shown.add_column(heading, justify="left" if i == 0 else "right", no_wrap=True)
+            for row in part[1:]:
+                shown.add_row(*row)
+            console.print(shown)
+        for remark in table.remarks:
+            console.print(remark)
+        console.print()
+
+
+def _fitted(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], width: int
+) -> Iterator[list[list[str]]]:
+    """Parts of a table that fit a width, headings first, the first column in each."""
+    room = width - EDGES
+    sizes = _sizes(columns, rows, lambda heading: max(map(len, heading.split("\n"))))
+    least = _sizes(columns, rows, lambda heading: max(map(len, heading.split()), default=0))
+    least[0] = min(least[0], MIN_NAME_WIDTH)  # its cells can be shortened
+    while _total(sizes) > room and sizes != least:
+        widest = max(range(len(sizes)), key=lambda i: (sizes[i] - least[i], -i))
+        sizes[widest] -= 1
+    first, parts, used = sizes[0], [[0]], sizes[0]
+    for i in range(1, len(columns)):
+        if used + GAP + sizes[i] > room and len(parts[-1]) > 1:
+            parts.append([0])
+            used = first
+        parts[-1].append(i)
+        used += GAP + sizes[i]
+    for part in parts:
+        headings = [_wrapped(columns[i], sizes[i]) for i in part]
+        cells = [[shortened(row[i], sizes[i]) if i == 0 else row[i] for i in part] for row in rows]
+        yield [headings, *cells]
+
+
+def _sizes(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], least: Callable[[str], int]
+) -> list[int]:
+    """Return the width of each column, given the least width of a heading."""
+    return [
+        max(1, least(heading), *(len(row[i]) for row in rows)) for i, heading in enumerate(columns)
+    ]
+
+
+def _total(sizes: Sequence[int]) -> int:
+    return sum(sizes) + GAP * (len(sizes) - 1)
+
+
+def _wrapped(heading: str, size: int) -> str:
+    lines = [textwrap.wrap(line, size, break_long_words=False) for line in heading.split("\n")]
+    return "\n".join(part for line in lines for part in line)
+
+
+def shortened(text: str, size: int) -> str:
+    """Shorten a text in the middle to a number of characters.
+
+    Examples
+    --------
+    >>> shortened("trials/2026/zigzag_20_20.mcap", 18)
+    'trials/2…0_20.mcap'
+    """
+    if len(text) <= size:
+        return text
+    head = (size - 1) // 2
+    return f"{text[:head]}…{text[len(text) - (size - 1 - head) :]}"
+
+
+def print_warnings(warnings: Sequence[str]) -> None:
+    """Print warnings on stderr, a line each."""
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+
+
+def write_json(value: object, where: str) -> None:
+    """Write a value as JSON to a file, or to stdout where its name is ``-``."""
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    if where == "-":
+        sys.stdout.write(text)
+        return
+    with atomic_write(where) as part:
+        part.write_text(text, encoding="utf-8")

@@ -1,0 +1,42 @@
+"""A verb of the command line, and the exit codes."""
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """What the exit code of the command means."""
+
+    OK = 0
+    FAILURE = 1
+    USAGE = 2  # the command line or a setting is wrong
+    DATA_LOST = 3  # finished, but a part of the input could not be read
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One verb: `shiplog VERB ...`.
+
+    A package adds a verb by an entry point of the group ``shiplog.verbs`` whose name is the verb
+    and whose object is a `Verb`. Its module is imported for ``shiplog --help`` too, so that heavy
+    libraries are best imported inside `run`.
+
+    Attributes
+    ----------
+    help
+        One line for the list of verbs.
+    configure
+        Adds the arguments to the verb's parser.
+    run
+        Does the work on the parsed arguments and returns the exit code. A `ShiplogError` becomes
+        one line on stderr.
+    examples
+        Command lines for the end of the help text, one a line.
+    """
+
+    help: str
+    configure: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], ExitCode]
+    examples: tuple[str, ...]

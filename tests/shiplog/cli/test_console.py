@@ -1,0 +1,88 @@
+"""Printed tables fit the console without breaking a word or a number."""
+
+import re
+from dataclasses import dataclass
+
+import pytest
+
+from shiplog.cli.console import print_tables, progress, shortened
+
+
+@dataclass(frozen=True)
+class Table:
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    remarks: tuple[str, ...] = ()
+
+
+NUMBERS = ("-2.22e-05", "0.00478", "62.7 s", "123.456", "± 0.0029")
+
+
+def printed(
+    table: Table, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> list[str]:
+    monkeypatch.setenv("COLUMNS", str(width))
+    print_tables([table])
+    return capsys.readouterr().out.split("\n")
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 100, 200])
+@pytest.mark.parametrize("count", [2, 5, 9, 14])
+def test_no_number_and_no_word_of_a_heading_is_broken(
+    width: int, count: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    headings = tuple(f"yaw rate bias{i}\n[deg/s]" for i in range(count))
+    rows = tuple(
+        (f"zigzag_of_a_long_trial_{row}.mcap", *(NUMBERS[i % 5] for i in range(1, count)))
+        for row in range(3)
+    )
+    lines = printed(Table("Fit", headings, rows), width, capsys, monkeypatch)
+    assert all(len(line) <= width for line in lines)
+    text = "\n".join(lines)
+    assert all(number in text for number in NUMBERS[1 : min(count, 5)])
+    words = set(re.findall(r"\S+", text))
+    assert {f"bias{i}" for i in range(count)} <= words
+    assert sum(line.count("…") for line in lines) in (0, *(3 * n for n in range(1, count)))
+
+
+def test_a_long_name_keeps_its_beginning_and_its_end() -> None:
+    assert shortened("zigzag_20_20.mcap", 17) == "zigzag_20_20.mcap"
+    for size in range(3, 17):
+        text = shortened("zigzag_20_20.mcap", size)
+        assert len(text) == size
+        head, tail = text.split("…")
+        assert "zigzag_20_20.mcap".startswith(head)
+        assert "zigzag_20_20.mcap".endswith(tail)
+
+
+def test_a_table_without_rows_is_its_headings(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert "heading" in "\n".join(printed(Table("T", ("heading",), ()), 80, capsys, monkeypatch))
+
+
+def test_without_a_terminal_each_step_is_a_line_where_it_is_asked_for(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with progress(lines=True) as on_progress:
+        on_progress("model 1 of 7", 0.0)
+        on_progress("model 1 of 7", 0.1)
+        on_progress("model 2 of 7", 0.2)
+    assert capsys.readouterr().err.split("\n") == ["model 1 of 7", "model 2 of 7", ""]
+    with progress() as on_progress:
+        on_progress("read")
+    assert capsys.readouterr().err == ""
+
+
+def test_the_remaining_time_follows_from_the_share_that_is_done(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter([0.0, 1.0, 10.0, 600.0])
+    monkeypatch.setattr("shiplog.cli.console.time.monotonic", lambda: next(clock))
+    with progress(lines=True) as on_progress:
+        on_progress("a", 0.1)
+        on_progress("b", 0.2)
+        on_progress("c", 0.5)
+    lines = capsys.readouterr().err.strip().split("\n")
+    assert lines == ["a", "b, about 40 s left", "c, about 10 min left"]
