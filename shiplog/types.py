@@ -3,13 +3,17 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import LogError
 from .units import did_you_mean
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 CHUNK_SAMPLES = 1 << 16  # of the fastest channel, about: what fits the processor's cache
 
@@ -222,6 +226,51 @@ class TrialLog(ChannelsByName[Channel]):
         """From the first measurement to the last."""
         start, end = self.span_ns
         return (end - start) * 1e-9
+
+    def to_pandas(
+        self, dt_secs: float | None = None, *, display_units: bool = False
+    ) -> "pd.DataFrame":
+        """Convert the trial to a wide data frame: one row per instant of a uniform clock.
+
+        Every channel with at least two valid samples is resampled, as `resample` does it; NaN means
+        not measured. `shiplog.tables.table.to_frame` gives the long form instead, which keeps
+        every sample.
+
+        Parameters
+        ----------
+        dt_secs
+            Step of the clock in s; by default the sampling interval of the fastest channel.
+        display_units
+            Use `deg`, `deg/s` and `kn` instead of SI and radians, with the unit in the name of
+            each column, such as `speed [kn]`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns by quantity, such as `yaw_rate` and `position_north`; a second source of a
+            quantity as `yaw_rate/mems`. The index has the time in UTC, `attrs["units"]` the unit
+            of each column.
+
+        Examples
+        --------
+        >>> import shiplog
+        >>> frame = shiplog.read("sample_data/zigzag_20_20.mcap").to_pandas(dt_secs=1.0)
+        >>> frame["speed"].shape
+        (601,)
+        """
+        from .tables.wide import to_wide_frame  # noqa: PLC0415 - tables imports this module
+
+        return to_wide_frame(self, dt_secs, display_units=display_units)
+
+    def to_xarray(self, dt_secs: float | None = None) -> "xr.Dataset":
+        """Convert the trial to an xarray dataset on a uniform clock, in SI units and radians.
+
+        The variables are the columns of `to_pandas`, each with its unit in `attrs["units"]`; the
+        coordinate `time` is in UTC. Needs the package xarray (`pip install 'shiplog[xarray]'`).
+        """
+        from .tables.wide import to_dataset  # noqa: PLC0415 - tables imports this module
+
+        return to_dataset(self, dt_secs)
 
 
 def is_sorted(times: TimeArray | FloatArray) -> bool:
