@@ -1,1 +1,68 @@
-"""What a trial says: states, disturbances, coefficients, and how far to trust them."""
+"""Replay and identification of sea trials.
+
+analyse
+    Replay a log: states, disturbances, coefficients, residuals, as one `Analysis`.
+plan_replay, Replay
+    The same in chunks, for logs longer than memory: the plan first, then the replay.
+identify
+    Fit a ship model to one or several logs, with intervals and validation.
+compare
+    Compare a replay with its reference.
+
+The names are imported when they are first used, so that ``import analysis`` costs nothing.
+
+Examples
+--------
+>>> from analysis import analyse
+>>> analysis = analyse("sample_data/zigzag_20_20.mcap")
+>>> analysis.estimates.states.shape  # yaw rate, its two derivatives, speed, its derivative
+(6001, 5)
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .check.compare import Comparison, compare
+    from .identification.identify import IdentifiedShip, identify
+    from .replay.plan import Plan, plan_replay
+    from .replay.replay import Analysis, Findings, Replay, ReplayChunk, analyse
+
+_MODULES = {
+    "Analysis": "replay.replay",
+    "Comparison": "check.compare",
+    "Findings": "replay.replay",
+    "IdentifiedShip": "identification.identify",
+    "Plan": "replay.plan",
+    "Replay": "replay.replay",
+    "ReplayChunk": "replay.replay",
+    "analyse": "replay.replay",
+    "compare": "check.compare",
+    "identify": "identification.identify",
+    "plan_replay": "replay.plan",
+}
+
+__all__ = [
+    "Analysis",
+    "Comparison",
+    "Findings",
+    "IdentifiedShip",
+    "Plan",
+    "Replay",
+    "ReplayChunk",
+    "analyse",
+    "compare",
+    "identify",
+    "plan_replay",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name on its first use."""
+    if name not in _MODULES:
+        raise AttributeError(f"module 'analysis' has no attribute {name!r}")
+    return getattr(import_module(f".{_MODULES[name]}", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
