@@ -9,7 +9,6 @@ from math import ceil, exp, log, nan, pi, sqrt
 
 import numpy as np
 from scipy.fft import dct, irfft, next_fast_len, rfft
-from scipy.signal.windows import tukey
 
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray
@@ -105,6 +104,8 @@ def _segments(residual: FloatArray) -> tuple[FloatArray, FloatArray]:
     values = np.full((count, length), nan)
     values.flat[: len(residual)] = residual - np.mean(residual[np.isfinite(residual)])
     known = np.isfinite(values)
+    from scipy.signal.windows import tukey  # noqa: PLC0415 - scipy.signal takes long to import
+
     return np.where(known, values, 0.0), tukey(length, TAPERED) * known
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from math import nan, sqrt
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from shiplog.types import FloatArray
 
@@ -56,7 +56,7 @@ def _together(ratios: Sequence[float]) -> float:
         return 1.0
     # all runs together lose as much as their number less one would, each fitted by itself
     told = float(np.sum(known**2)) / (len(known) - 1)
-    chance = float(chi2.ppf(1 - DOUBTFUL, INDEPENDENT)) / INDEPENDENT
+    chance = 2 * float(gammaincinv(INDEPENDENT / 2, 1 - DOUBTFUL)) / INDEPENDENT  # of chi-squared
     return float(np.sqrt(told)) if told > chance else 1.0
 
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from analysis.regression.newey_west import few_rows
 from shiplog.types import FloatArray
@@ -166,4 +166,4 @@ def _jackknife(others: FloatArray) -> FloatArray:
     if count < LEAST_RUNS:
         return np.full(others.shape[1], np.nan)
     spread = np.sum((others - others.mean(axis=0)) ** 2, axis=0) * (count - 1) / count
-    return np.asarray(np.sqrt(spread) * t.ppf(0.975, count - 1) / 1.96)
+    return np.asarray(np.sqrt(spread) * stdtrit(count - 1, 0.975) / 1.96)

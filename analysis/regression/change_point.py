@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtr
 
 from shiplog.types import FloatArray
 
@@ -157,7 +157,7 @@ def _split_as_given(blocks: Blocks, columns: tuple[int, ...]) -> ChangeFit | Non
     degrees = 1.5 * weights.sum(0) ** 2 / run_squares(weights, blocks.run)
     inflation = independent / freedom
     stds = np.sqrt(inflation * run_squares(influences[:, p:], blocks.run))
-    chances = 2 * t.sf(np.abs(values[p:]) / np.maximum(stds, TINY), degrees)
+    chances = 2 * stdtr(degrees, -np.abs(values[p:]) / np.maximum(stds, TINY))  # Student's t
     return ChangeFit(at, columns, values, influences, inflation, degrees, chances, spread)
 
 
@@ -223,7 +223,7 @@ def largest_of_instants(chance: float, spread: float) -> float:
     By the expansion of DeLong ("Crossing probabilities for a square root boundary by a Bessel
     process", 1981) for one coefficient, exact in the tail; `spread` is log of Andrews' lambda.
     """
-    z = float(norm.isf(max(chance, 1e-300) / 2))
+    z = float(-ndtri(max(chance, 1e-300) / 2))
     if z <= 1:
         return 1.0
     density = exp(-(z**2) / 2) / sqrt(2 * pi)

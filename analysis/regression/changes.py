@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import inf, nan, sqrt
 
 import numpy as np
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from shiplog.compiled import compiled
 from shiplog.ships.paper import COEFFICIENT_UNITS
@@ -228,7 +228,7 @@ def _change(blocks: Blocks, split: ChangeFit, c: int, instead: tuple[str, ...]) 
         before_std=float(stds[0] / blocks.units[i]),
         after_std=float(stds[1] / blocks.units[i]),
         share=float(share) if sure else nan,
-        share_half=float(t.isf(0.025, split.degrees[c]) * stds[2]) if sure else nan,
+        share_half=float(-stdtrit(split.degrees[c], 0.025) * stds[2]) if sure else nan,
         instead=instead,
     )
 
