@@ -11,8 +11,9 @@ from math import floor, inf
 
 import numpy as np
 
-from shiplog.checks.channel_stats import ChannelStats, LogStats, compute_log_stats
+from shiplog.checks.channel_stats import ChannelStats, LogStats
 from shiplog.checks.interpolate import valid_samples
+from shiplog.checks.log_stats import compute_log_stats
 
 from .errors import LogError, UsageError
 from .types import Channel, FloatArray, Log, Signals, concatenate_signals, is_sorted

@@ -6,8 +6,9 @@ from itertools import count
 
 import numpy as np
 
-from shiplog.checks.channel_stats import LogStats, compute_log_stats
+from shiplog.checks.channel_stats import LogStats
 from shiplog.checks.data_quality import data_warnings
+from shiplog.checks.log_stats import compute_log_stats
 from shiplog.checks.rudder_sign import rudder_sign_warning
 from shiplog.errors import LogError, UsageError
 from shiplog.resampling import resample

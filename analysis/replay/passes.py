@@ -16,9 +16,10 @@ from analysis.regression.weak_form import WeakForm
 from analysis.signals.hold import InputHold
 from analysis.signals.signal_stats import SignalStats, SignalStatsCollector
 from shiplog import Channel, LogError, Signals, Vessel
-from shiplog.checks.channel_stats import LogStats, compute_log_stats
+from shiplog.checks.channel_stats import LogStats
 from shiplog.checks.data_quality import data_warnings
 from shiplog.checks.gyro_bias import GyroBiasCheck
+from shiplog.checks.log_stats import compute_log_stats
 from shiplog.checks.rudder_sign import RudderSignCheck
 from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, choose_clock, resample_chunks

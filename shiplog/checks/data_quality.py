@@ -6,7 +6,8 @@ from shiplog.errors import LogError
 from shiplog.types import TrialLog
 from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 
-from .channel_stats import ChannelStats, LogStats, compute_log_stats
+from .channel_stats import ChannelStats, LogStats
+from .log_stats import compute_log_stats
 
 IRREGULAR_SHARE = 0.1  # of the intervals, which may be more than half off the usual one
 

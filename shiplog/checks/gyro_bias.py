@@ -7,8 +7,9 @@ import numpy as np
 from shiplog.types import Channel, FloatArray, Log
 from shiplog.units import conversion_factor
 
-from .channel_stats import ChannelStats, LogStats, compute_log_stats
+from .channel_stats import ChannelStats, LogStats
 from .interpolate import Interpolator, valid_samples
+from .log_stats import compute_log_stats
 
 BLOCKS = 8  # of a record, each telling the bias for itself
 SIGNIFICANT = 4.0  # standard errors

@@ -4,8 +4,9 @@ import numpy as np
 
 from shiplog.types import Channel, FloatArray, Log
 
-from .channel_stats import ChannelStats, LogStats, compute_log_stats
+from .channel_stats import ChannelStats, LogStats
 from .interpolate import Interpolator, valid_samples
+from .log_stats import compute_log_stats
 
 WINDOW_SECS = 10.0  # over which the rudder's effect on the yaw rate is looked at
 WINDOWS = 12  # at least so many of them must fit into a record

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shiplog.checks.channel_stats import compute_log_stats
+from shiplog.checks.log_stats import compute_log_stats
 from shiplog.errors import LogError, UsageError
 from shiplog.resampling import MAX_SAMPLES, Clock, resample_chunks
 from shiplog.types import Channel, FloatArray, TimeArray, TrialLog, concatenate_signals

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shiplog import Channel, LogError, TrialLog, UsageError, resample
-from shiplog.checks.channel_stats import compute_log_stats
+from shiplog.checks.log_stats import compute_log_stats
 from shiplog.resampling import choose_clock, resample_chunks
 from shiplog.types import concatenate_signals
 

@@ -18,7 +18,7 @@ from analysis.signals.signal_stats import SignalStats, signal_stats
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import Channel, Signals, TrialLog, Vessel, resample
-from shiplog.checks.channel_stats import compute_log_stats
+from shiplog.checks.log_stats import compute_log_stats
 from shiplog.resampling import choose_clock, resample_chunks
 from shiplog.ships.paper import steady_speed
 from shiplog.vessel.settings import FILTERS, FilterSettings

@@ -6,7 +6,7 @@ import pytest
 from analysis.replay.track import EARTH_RADIUS, Track, Tracker
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Channel, Signals, TrialLog, resample
-from shiplog.checks.channel_stats import compute_log_stats
+from shiplog.checks.log_stats import compute_log_stats
 from shiplog.resampling import Clock
 
 

@@ -3,7 +3,7 @@ import pytest
 
 from analysis.signals.hold import InputHold, held_throughout
 from shiplog import Channel, Signals, TrialLog
-from shiplog.checks.channel_stats import compute_log_stats
+from shiplog.checks.log_stats import compute_log_stats
 from shiplog.resampling import Clock
 
 START = 1_700_000_000 * 10**9

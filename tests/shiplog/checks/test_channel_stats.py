@@ -8,7 +8,8 @@ from faults import dropout, freeze, spike
 from trial_logs import InChunks
 
 from shiplog import Channel, TrialLog
-from shiplog.checks.channel_stats import ChannelStats, compute_log_stats, without_impossible
+from shiplog.checks.channel_stats import ChannelStats, without_impossible
+from shiplog.checks.log_stats import compute_log_stats
 
 START = 1_700_000_000 * 10**9
 

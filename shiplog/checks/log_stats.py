@@ -1,0 +1,243 @@
+"""One pass over a log that computes the statistics of all its channels."""
+
+from copy import deepcopy
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shiplog.types import Channel, FloatArray, Log, TimeArray
+from shiplog.units import CATALOGUE, GEOGRAPHIC
+
+from .channel_stats import GAP_SECS, ChannelStats, LogStats, Occurrences, gap_threshold_secs
+from .quantiles import Quantiles
+from .stuck import StuckCheck
+
+Mask = NDArray[np.bool_]
+
+MIN_INTERVALS = 10  # fewer do not show whether a channel is irregular
+LAST_INSTANT_NS = np.iinfo(np.int64).max
+MAX_DEGREES = {"latitude": 90.0, "longitude": 180.0}
+
+
+def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
+    """Compute the statistics of all channels in one pass over the log.
+
+    The log may be longer than memory holds. Where its chunks are cut changes no result.
+
+    Parameters
+    ----------
+    log
+        The log; its chunks are read once.
+    strict
+        Treat impossible values as not measured: they are then not valid.
+
+    Examples
+    --------
+    >>> import shiplog
+    >>> stats = compute_log_stats(shiplog.read("sample_data/zigzag_20_20.mcap"))
+    >>> stats["yaw_rate"].samples, round(stats["yaw_rate"].interval_secs, 3)
+    (6001, 0.1)
+    """
+    collectors: dict[tuple[str, tuple[str, ...]], _ChannelStatsCollector] = {}
+    for chunk in log.chunks():
+        for channel in chunk:
+            if channel.key not in collectors:
+                collectors[channel.key] = _ChannelStatsCollector(channel, strict=strict)
+            collectors[channel.key].add(channel)
+    return LogStats(log.name, tuple(collector.result() for collector in collectors.values()))
+
+
+class _ChannelStatsCollector:
+    """Accumulates the statistics of one channel chunk by chunk."""
+
+    def __init__(self, channel: Channel, *, strict: bool) -> None:
+        self._channel, self._strict = channel, strict  # the channel for its name, unit and fields
+        kind = CATALOGUE.get(channel.name)
+        self._stuck = None if kind is not None and kind.commanded else StuckCheck()
+        self._samples = self._duplicates = self._missing = self._valid = self._negative = 0
+        self._start = self._last = self._last_valid = 0
+        self._span = self._valid_span = (LAST_INSTANT_NS, -LAST_INSTANT_NS)
+        self._value_range = (np.inf, -np.inf)
+        self._backward_steps, self._received_early = Occurrences(), Occurrences()
+        self._infinite, self._impossible = Occurrences(), Occurrences()
+        self._max_delay_ns = 0
+        self._worst_excess = 0.0  # of an impossible value over its limit
+        self._long_intervals = [np.zeros((0, 2), np.int64)]  # rows of start and length, ns
+        self._intervals, self._values = Quantiles(), Quantiles()
+        self._valid_intervals = self._intervals  # one object until the first invalid sample
+
+    def add(self, channel: Channel) -> None:
+        """Add the next samples of the channel."""
+        if not len(channel):
+            return
+        if not self._samples:
+            self._start = self._last = self._last_valid = int(channel.measured_ns[0])
+        rows = channel.values.reshape(len(channel), -1)
+        valid = _valid(channel, rows, strict=self._strict)
+        if not valid.all() and self._valid_intervals is self._intervals:
+            self._valid_intervals = deepcopy(self._intervals)
+        self._add_times(channel, valid)
+        self._add_values(channel, rows, valid)
+        if self._stuck:
+            self._stuck.add((channel.measured_ns - self._start) * 1e-9, rows)
+        self._samples += len(channel)
+
+    def _add_times(self, channel: Channel, valid: Mask) -> None:
+        times = channel.measured_ns
+        with_last = np.concatenate(([self._last], times)) if self._samples else times
+        steps = np.diff(with_last)
+        backward = np.flatnonzero(steps < 0)
+        if len(backward):
+            first_step = -float(steps[backward[0]]) * 1e-9
+            self._backward_steps = self._with_more(
+                self._backward_steps, len(backward), with_last[backward[0]], first_step
+            )
+            with_last = np.sort(with_last)
+            steps = np.diff(with_last)
+        self._duplicates += int(np.count_nonzero(steps == 0))
+        self._intervals.add(steps[steps > 0].astype(float))
+        long = np.flatnonzero(steps > GAP_SECS * 1e9)
+        self._long_intervals.append(np.column_stack((with_last[long], steps[long])))
+        self._add_delays(channel)
+        if self._valid_intervals is not self._intervals:
+            with_last = np.concatenate(([self._last_valid] * (self._valid > 0), times[valid]))
+            steps = np.diff(np.sort(with_last))
+            self._valid_intervals.add(steps[steps > 0].astype(float))
+        self._span = _extended_span(self._span, times)
+        self._valid_span = _extended_span(self._valid_span, times[valid])
+        self._last = int(times[-1])
+        if valid.any():
+            self._last_valid = int(times[valid][-1])
+
+    def _add_delays(self, channel: Channel) -> None:
+        lead = channel.measured_ns - channel.received_ns
+        self._max_delay_ns = max(self._max_delay_ns, -int(lead.min()))
+        largest_lead = float(lead.max()) * 1e-9
+        if largest_lead > 0:
+            extent = max(self._received_early.extent, largest_lead)
+            early = lead > 0
+            count, first_ns = int(np.count_nonzero(early)), int(channel.measured_ns[early.argmax()])
+            more = self._with_more(self._received_early, count, first_ns, 0.0)
+            self._received_early = replace(more, extent=extent)
+
+    def _add_values(self, channel: Channel, rows: FloatArray, valid: Mask) -> None:
+        if not valid.all() or channel.fields or not self._strict:
+            times = channel.measured_ns
+            self._missing += int(np.count_nonzero(np.isnan(rows).all(axis=1)))
+            infinite = np.flatnonzero(np.isinf(rows).any(axis=1))
+            if len(infinite):
+                self._infinite = self._with_more(
+                    self._infinite, len(infinite), times[infinite[0]], 0.0
+                )
+            self._add_impossible(channel, rows)
+        values = rows[valid]
+        self._valid += len(values)
+        if len(values) and not channel.fields:
+            low, high = self._value_range
+            # + 0.0: a negative zero becomes a zero
+            low, high = min(low, float(values.min())), max(high, float(values.max()))
+            self._value_range = low + 0.0, high + 0.0
+            self._negative += int(np.count_nonzero(values < 0))
+            self._values.add(values[:, 0])
+
+    def _add_impossible(self, channel: Channel, rows: FloatArray) -> None:
+        excess = _excess(channel, rows)
+        impossible = np.flatnonzero(excess > 0)
+        if len(impossible):
+            worst = int(np.nanargmax(excess))
+            extent = self._impossible.extent
+            if excess[worst] > self._worst_excess:
+                self._worst_excess, extent = float(excess[worst]), float(rows[worst, 0])
+            first_ns = channel.measured_ns[impossible[0]]
+            more = self._with_more(self._impossible, len(impossible), first_ns, 0.0)
+            self._impossible = replace(more, extent=extent)
+
+    def _with_more(
+        self, occurrences: Occurrences, count: int, at_ns: int, extent: float
+    ) -> Occurrences:
+        """Add occurrences to those before; time and extent stay those of the first one."""
+        if occurrences.count:
+            return replace(occurrences, count=occurrences.count + count)
+        return Occurrences(count, float(at_ns - self._start) * 1e-9, extent)
+
+    def result(self) -> ChannelStats:
+        """Return the statistics of all samples added."""
+        channel, interval = self._channel, _median_secs(self._intervals)
+        all_valid = self._valid_intervals is self._intervals
+        irregular_share, interval_range = _regularity(self._intervals.values * 1e-9, interval)
+        return ChannelStats(
+            name=channel.name,
+            source=channel.source,
+            unit=channel.unit,
+            fields=channel.fields,
+            samples=self._samples,
+            span_ns=self._span if self._samples else (0, 0),
+            interval_secs=interval,
+            gaps=self._gaps(interval),
+            irregular_share=irregular_share,
+            interval_range_secs=interval_range,
+            duplicate_times=self._duplicates,
+            backward_steps=self._backward_steps,
+            received_early=self._received_early,
+            max_delay_ns=self._max_delay_ns,
+            missing=self._missing,
+            infinite=self._infinite,
+            impossible=self._impossible,
+            stuck=self._stuck.result(interval) if self._stuck else None,
+            valid=self._valid,
+            valid_span_ns=self._valid_span if self._valid else (0, 0),
+            valid_interval_secs=interval if all_valid else _median_secs(self._valid_intervals),
+            value_range=self._value_range,
+            median=self._values.median(),
+            negative_share=self._negative / self._valid if self._valid else 0.0,
+            strict=self._strict,
+        )
+
+    def _gaps(self, interval: float) -> tuple[tuple[float, float], ...]:
+        """Start and length of each gap, s."""
+        long = np.concatenate(self._long_intervals)
+        long = long[long[:, 1] * 1e-9 > gap_threshold_secs(interval)]
+        gaps = zip((long[:, 0] - self._span[0]) * 1e-9, long[:, 1] * 1e-9, strict=True)
+        return tuple((float(start), float(length)) for start, length in gaps)
+
+
+def _valid(channel: Channel, rows: FloatArray, *, strict: bool) -> Mask:
+    """Which samples are finite and, with `strict`, possible, (n,)."""
+    kind = CATALOGUE.get(channel.name)
+    if channel.fields or kind is None or not strict:
+        return np.asarray(np.isfinite(rows).all(axis=1))
+    return np.asarray((rows[:, 0] >= kind.lowest) & (rows[:, 0] <= kind.highest))
+
+
+def _excess(channel: Channel, rows: FloatArray) -> FloatArray:
+    """By how much each sample exceeds the limits of what is possible, (n,); <= 0 within them."""
+    kind = CATALOGUE.get(channel.name)
+    if channel.fields == GEOGRAPHIC:
+        limits = np.array([MAX_DEGREES.get(field, np.inf) for field in channel.fields])
+        with np.errstate(invalid="ignore"):  # an infinite altitude
+            excess = np.abs(rows) - limits
+        return np.asarray(np.nan_to_num(excess, nan=-np.inf).max(axis=1))
+    if channel.fields or kind is None:
+        return np.full(len(rows), -np.inf)
+    return np.asarray(np.maximum(kind.lowest - rows[:, 0], rows[:, 0] - kind.highest))
+
+
+def _extended_span(span: tuple[int, int], times: TimeArray) -> tuple[int, int]:
+    if not len(times):
+        return span
+    return min(span[0], int(times.min())), max(span[1], int(times.max()))
+
+
+def _median_secs(intervals: Quantiles) -> float:
+    """Median of intervals in ns, as s; 0 without any."""
+    return intervals.median() * 1e-9 if len(intervals.values) else 0.0
+
+
+def _regularity(intervals: FloatArray, typical: float) -> tuple[float, tuple[float, float]]:
+    """Share of intervals, gaps excluded, more than half off the typical one, and their range."""
+    steps = intervals[intervals <= gap_threshold_secs(typical)]
+    if len(steps) < MIN_INTERVALS:
+        return 0.0, (typical, typical)
+    low, high = np.percentile(steps, [1, 99])
+    return float(np.mean(np.abs(steps - typical) > 0.5 * typical)), (float(low), float(high))
