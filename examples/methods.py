@@ -523,7 +523,7 @@ def bridged(log: TrialLog, vessel: Vessel, settings: Settings) -> tuple[float, .
         kept &= at <= found.signals.time_secs[-1]
         error = estimated(found, at[kept], STATES.index(name)) - channel.values[kept]
         errors.append(rms(error) / float(np.nanstd(channel.values)))
-    squares = [residuals.normalised_squared for residuals in found.findings.residuals]
+    squares = [residuals.mean_nis for residuals in found.findings.residuals]
     gated = sum(residuals.gated for residuals in found.findings.residuals)
     return (
         *errors,

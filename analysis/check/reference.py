@@ -98,8 +98,8 @@ def _estimated(analysis: Analysis) -> Iterator[Channel]:
         yield _blocks(analysis, name, "innovation", estimates.innovations[:, i])
         judged = analysis.findings.residuals[i]
         yield _single(analysis, f"{name}_rms", "verdict", judged.rms)
-        yield _single(analysis, f"{name}_squared", "verdict", judged.normalised_squared)
-        yield _single(analysis, f"{name}_expected", "verdict", judged.expected[1])
+        yield _single(analysis, f"{name}_squared", "verdict", judged.mean_nis)
+        yield _single(analysis, f"{name}_expected", "verdict", judged.nis_band[1])
         yield _single(analysis, f"{name}_whiteness", "verdict", judged.whiteness_p)
         yield _single(analysis, f"{name}_gated", "count", float(judged.gated))
     for kind, course in analysis.findings.disturbances.items():

@@ -1,4 +1,4 @@
-"""What in a log may not be what it seems: said before anything is built on it."""
+"""Warnings about sensors that seem dead, channels that start late, and sources to choose from."""
 
 from collections.abc import Iterator
 
@@ -7,49 +7,95 @@ import numpy as np
 from shiplog.checks.channel_stats import LogStats
 from shiplog.resampling import Clock
 
-ASTERN_SHARE = 0.01  # of the samples: a single one may be noise about rest
+MAX_ASTERN_SHARE = 0.01  # of the samples; a single one may be noise about zero
+MIN_TURN_RATE = np.radians(0.1)  # rad/s, range of the yaw rate beyond which the ship has turned
+MIN_WAY = 1.0  # m/s, median speed beyond which the ship makes way
 
 
-def channel_warnings(found: LogStats, needed: tuple[str, ...]) -> Iterator[str]:
-    """Sources to choose from, and sensors that seem dead or to go astern."""
-    for name in needed:
-        sources = [channel.source for channel in found if channel.name == name]
+def channel_warnings(log_stats: LogStats, names: tuple[str, ...]) -> Iterator[str]:
+    """Warn of channels with several sources, of sensors that seem dead, and of going astern.
+
+    Parameters
+    ----------
+    log_stats
+        Statistics of the log's channels.
+    names
+        The channels that a replay uses.
+
+    Yields
+    ------
+    str
+        A warning, in a sentence.
+    """
+    for name in names:
+        sources = [channel.source for channel in log_stats if channel.name == name]
         if len(sources) > 1:
             yield (
-                f"{name}: {len(sources)} sources ({', '.join(sources)}), {sources[0]} is used; "
-                f"--source {name}={sources[1]} chooses another"
+                f"{name}: {len(sources)} sources ({', '.join(sources)}); {sources[0]} is used, "
+                f"--source {name}={sources[1]} selects another"
             )
-    yield from _dead(found)
+    yield from _dead_sensor_warnings(log_stats)
     for name in ("speed", "rpm"):
-        if found[name].negative_share > ASTERN_SHARE:
-            yield f"{name}: astern in places, where the model does not hold"
+        share = log_stats[name].negative_share
+        if share > MAX_ASTERN_SHARE:
+            yield f"{name}: negative in {share:.0%} of the samples; the model does not hold astern"
 
 
-def _dead(found: LogStats) -> Iterator[str]:
-    """Sensors that say the same throughout although the ship moved."""
-    ranges = {name: np.ptp(found[name].value_range) for name in ("yaw_rate", "speed", "rudder")}
-    turned = ranges["yaw_rate"] > np.radians(0.1)
-    for name, reach in ranges.items():
-        if reach == 0 and (turned or name != "rudder"):
-            yield f"{found[name].topic}: never changes; if the sensor was dead, choose another"
-    if found["speed"].median > 1.0 and found["rpm"].value_range == (0.0, 0.0):
-        yield f"{found['rpm'].topic}: 0 throughout, though the ship goes; the model needs it"
+def _dead_sensor_warnings(log_stats: LogStats) -> Iterator[str]:
+    """Warn of sensors whose value never changes although the ship moved."""
+    ranges = {name: np.ptp(log_stats[name].value_range) for name in ("yaw_rate", "speed", "rudder")}
+    turned = ranges["yaw_rate"] > MIN_TURN_RATE
+    for name, value_range in ranges.items():
+        if value_range == 0 and (turned or name != "rudder"):
+            yield (
+                f"{log_stats[name].topic}: constant throughout the log; "
+                "if the sensor was dead, choose another source"
+            )
+    if log_stats["speed"].median > MIN_WAY and log_stats["rpm"].value_range == (0.0, 0.0):
+        yield (
+            f"{log_stats['rpm'].topic}: 0 throughout the log although the ship makes way; "
+            "the model needs the revolutions"
+        )
 
 
-def end_warnings(found: LogStats, clock: Clock, needed: tuple[str, ...]) -> Iterator[str]:
-    """Parts of the log that are not replayed, or only predicted, for want of a channel."""
-    first, last = clock.start_ns, clock.end_ns
-    begun = {name: found[name].valid_span_ns[0] for name in needed}
-    ended = {name: found[name].valid_span_ns[1] for name in needed}
-    late = max(begun, key=lambda name: begun[name])
-    wait = (first - min(begun.values())) * 1e-9
-    if wait > found[late].gap_threshold_secs:
-        yield f"{late}: sets in {wait:.1f} s after the others; the replay begins there"
-    rest = (max(ended.values()) - last) * 1e-9
-    if rest > max(found[name].gap_threshold_secs for name in needed):
-        ceased = min(needed, key=lambda name: abs(ended[name] - last))
-        yield f"{ceased}: ends {rest:.1f} s before the others; the replay ends there"
-    for name in needed:
-        silent = (last - ended[name]) * 1e-9
-        if silent > found[name].gap_threshold_secs:
-            yield f"{name}: silent for the last {silent:.1f} s, which are only predicted"
+def end_warnings(log_stats: LogStats, clock: Clock, names: tuple[str, ...]) -> Iterator[str]:
+    """Warn of parts of the log that are not replayed, or only predicted, as a channel is missing.
+
+    Parameters
+    ----------
+    log_stats
+        Statistics of the log's channels.
+    clock
+        The clock of the replay.
+    names
+        The channels that a replay needs.
+
+    Yields
+    ------
+    str
+        A warning, in a sentence.
+    """
+    clock_start, clock_end = clock.start_ns, clock.end_ns
+    starts = {name: log_stats[name].valid_span_ns[0] for name in names}
+    ends = {name: log_stats[name].valid_span_ns[1] for name in names}
+    last_to_start = max(starts, key=lambda name: starts[name])
+    delay = (clock_start - min(starts.values())) * 1e-9
+    if delay > log_stats[last_to_start].gap_threshold_secs:
+        yield (
+            f"{last_to_start}: starts {delay:.1f} s after the other channels; "
+            "the replay starts there"
+        )
+    remainder = (max(ends.values()) - clock_end) * 1e-9
+    if remainder > max(log_stats[name].gap_threshold_secs for name in names):
+        first_to_end = min(names, key=lambda name: abs(ends[name] - clock_end))
+        yield (
+            f"{first_to_end}: ends {remainder:.1f} s before the other channels; "
+            "the replay ends there"
+        )
+    for name in names:
+        missing = (clock_end - ends[name]) * 1e-9
+        if missing > log_stats[name].gap_threshold_secs:
+            yield (
+                f"{name}: no samples in the last {missing:.1f} s; "
+                "the states there are only predicted"
+            )

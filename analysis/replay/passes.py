@@ -87,7 +87,7 @@ def first_pass(log: Log, on_progress: ProgressCallback) -> FirstPass:
     if missing:
         present = ", ".join(sorted({channel.name for channel in log_stats}))
         raise LogError(
-            f"no channel {missing[0]!r} in {log_stats.name}; it has {present or 'none'}; "
+            f"no channel {missing[0]!r} in {log_stats.name}; it has {present or 'no channels'}; "
             f"a replay needs {', '.join(REQUIRED_CHANNELS)}"
         )
     optional = tuple(name for name in OPTIONAL_CHANNELS if name in log_stats)
@@ -230,23 +230,24 @@ class _Equations:
             "surge": least_window_secs(self._weak_form.surge),
         }
         if self._window_secs > self._log_secs:
-            text = f"{window} is longer than the log ({self._log_secs:.0f} s): the whole of it is "
-            room = self._log_secs > max(*least.values(), MIN_WINDOW_SECS)
-            shorter = "ask for shorter windows, or " if room else ""
-            return [text + f"the one window; {shorter}give a longer log"]
-        blank = [name for name, secs in least.items() if self._window_secs <= secs]
-        if not blank:
+            long_enough = self._log_secs > max(*least.values(), MIN_WINDOW_SECS)
+            shorter = "shorten the windows or " if long_enough else ""
+            text = f"{window} is longer than the log ({self._log_secs:.0f} s): one window covers "
+            return [text + f"the whole log; {shorter}use a longer log"]
+        too_short = [name for name, secs in least.items() if self._window_secs <= secs]
+        if not too_short:
             return []
-        needed = max(least[name] for name in blank)
-        text = f"{window} is too short to tell so many coefficients of {' and '.join(blank)}: its "
-        return [text + f"windows are blank; ask for more than {needed:.0f} s"]
+        needed = max(least[name] for name in too_short)
+        text = f"{window} is too short for the coefficients of {' and '.join(too_short)}: "
+        return [text + f"their windows are empty; use more than {needed:.0f} s"]
 
 
 def _require_outputs(log: Log, stats: SignalStats) -> None:
+    """Raise `LogError` where yaw rate or speed has too few samples to estimate its noise."""
     for name, count in zip(PAPER_OUTPUTS, stats.measured, strict=True):
         if count < MIN_OUTPUT_SAMPLES:
             raise LogError(
-                f"channel {name!r} has {count} samples while the others are there too, "
-                f"and {MIN_OUTPUT_SAMPLES} are needed; check the recorder or choose another log: "
+                f"channel {name!r} has {count} samples where the other channels have some, too, "
+                f"but {MIN_OUTPUT_SAMPLES} are needed; check the recorder or choose another log: "
                 f"{log.name}"
             )

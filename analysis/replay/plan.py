@@ -26,7 +26,9 @@ from shiplog.vessel.vessel_parser import parse_vessel
 
 from .passes import FirstPass, SecondPass, first_pass, second_pass
 
-FITTED_MODEL = "a first model, fitted to this log"
+GIVEN_MODEL = "given"
+ATTACHED_MODEL = "attached to the log"
+FITTED_MODEL = "first model, fitted to this log"
 DEFAULT_WAVE_FREQUENCY = 0.6  # rad/s, typical of a sea, where the log shows no wave
 
 
@@ -45,7 +47,7 @@ class Plan:
     vessel
         The vessel, with the coefficients and the settings that the replay uses.
     model_origin
-        Where the coefficients came from: ``"given"``, ``"carried by the log"`` or `FITTED_MODEL`.
+        Where the coefficients came from: `GIVEN_MODEL`, `ATTACHED_MODEL` or `FITTED_MODEL`.
     stats
         Statistics of the resampled signals.
     noise
@@ -145,10 +147,10 @@ def _stated_vessel(
 ) -> tuple[Vessel, str]:
     """Return the vessel with the settings given, and where its model came from."""
     if given is not None:
-        return with_settings(given, settings), "given"
+        return with_settings(given, settings), GIVEN_MODEL
     if log.vessel_toml is not None:
-        carried = parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}")
-        return with_settings(carried, settings), "carried by the log"
+        attached = parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}")
+        return with_settings(attached, settings), ATTACHED_MODEL
     return with_settings(Vessel("", None), settings), FITTED_MODEL
 
 
@@ -163,11 +165,14 @@ def _with_first_model(
         fitted = replace(fitted, name=first.name, approach_rpm=first.approach_rpm)
     else:
         warnings.append(
-            f"the vessel file has {vessel.model.name} alone, and filters are built on the "
-            "paper's model: a first one is fitted to this log"
+            f"the vessel file has only a model {vessel.model.name!r}, but the filters use the "
+            "paper's model: a first one was fitted to this log"
         )
     if not (model.a < 0 and model.g <= 0 and model.h >= 0):
-        warnings.append("the model fitted to this log is no ship's: too little moves in it to tell")
+        warnings.append(
+            "the model fitted to this log is not that of a ship (a < 0, g <= 0 and h >= 0 "
+            "expected): the ship moves too little in it"
+        )
     return fitted, warnings
 
 
@@ -176,9 +181,8 @@ def _other_model_warnings(vessel: Vessel) -> list[str]:
     if vessel.model is None:
         return []
     text = (
-        "filters are built on the paper's model: this is a replay by [yaw] and [surge] of "
-        f"the vessel file, not by its {vessel.model.name}; what differs between the two "
-        "counts as disturbance"
+        "the filters use the paper's model, [yaw] and [surge] of the vessel file, and not its "
+        f"model {vessel.model.name!r}; the difference between the two counts as a disturbance"
     )
     return [text]
 
@@ -189,13 +193,14 @@ def _noise(vessel: Vessel, first: FirstPass, stats: SignalStats) -> tuple[NoiseM
     noise, warnings = noise_of(stats, vessel.paper_coefficients, settings), []
     if settings.wave and noise.wave is None:
         warnings.append(
-            "no wave stands out of the yaw rate's residual: none is told from the ship's "
-            "turning; if there is one state filter.wave_frequency, filter.wave_damping and "
+            "no wave found in the residual of the yaw rate: none is separated from the ship's "
+            "turning; if there are waves, set filter.wave_frequency, filter.wave_damping and "
             "filter.wave_std"
         )
     if noise.wave is not None and noise.wave.evidence < 0:
         warnings.append(
-            "the wave stated is less likely than none: the yaw rate's residual has no such peak"
+            "the wave set in [filter] is less likely than no wave: the residual of the yaw rate "
+            "has no such peak"
         )
     return noise, warnings
 
@@ -214,8 +219,8 @@ def _disturbance_settings(
     if frequency is None:
         frequency = DEFAULT_WAVE_FREQUENCY
         warnings.append(
-            f"no wave stands out of the yaw rate's residual: one of {frequency:g} rad/s is"
-            " observed, where the sea often is; state disturbance.wave_frequency"
+            f"no wave found in the residual of the yaw rate: a wave of {frequency:g} rad/s, "
+            "typical of the sea, is estimated; set disturbance.wave_frequency to another"
         )
     warnings += blindness(frequency, stats)
     return replace(settings, wave_frequency=frequency), warnings

@@ -28,7 +28,7 @@ from shiplog.types import Log
 
 from .passes import resampled_chunks, weak_form_on_clock
 from .plan import Plan, plan_replay
-from .residuals import OutputResiduals, ResidualTest
+from .residuals import ResidualSummary, ResidualTest
 from .track import Track, Tracker
 
 # the steps reported as progress; the fourth only where states are smoothed
@@ -88,7 +88,7 @@ class Findings:
 
     plan: Plan
     metadata: dict[str, str]
-    residuals: tuple[OutputResiduals, ...]
+    residuals: tuple[ResidualSummary, ...]
     disturbances: dict[str, DisturbanceSummary]
     yaw: CoefficientFit
     surge: CoefficientFit
@@ -163,9 +163,9 @@ def analyse(
     --------
     >>> analysis = analyse("sample_data/zigzag_20_20.mcap")
     >>> analysis.estimates.states.shape
-    (6000, 5)
-    >>> round(analysis.findings.yaw.coefficients["d"].value, 7)
-    1.95e-05
+    (6001, 5)
+    >>> print(f"{analysis.findings.yaw.coefficients['d'].value:.3g}")
+    0.000133
     """
     if isinstance(log, str | os.PathLike):
         log = open_log(log)
@@ -203,7 +203,7 @@ class Replay:
     >>> log = open_log("sample_data/zigzag_20_20.mcap")
     >>> replay = Replay(log, plan_replay(log))
     >>> sum(len(chunk.signals) for chunk in replay.chunks())
-    6000
+    6001
     """
 
     def __init__(
@@ -222,7 +222,7 @@ class Replay:
             Where the filter or the observer diverges.
         """
         if self._started:
-            raise ValueError("the chunks of a replay come once; make another")
+            raise ValueError("the chunks of a replay can be read once only; make another Replay")
         self._started = True
         clock = self.plan.clock
         adjoints = self._backward_pass() if self.plan.vessel.filter.smooth else None
@@ -238,7 +238,7 @@ class Replay:
     def findings(self) -> Findings:
         """The findings; raises `ValueError` before the chunks were iterated over."""
         if self._findings is None:
-            raise ValueError("go through the chunks first")
+            raise ValueError("no findings yet; iterate over chunks() first")
         return self._findings
 
     def _backward_pass(self) -> Iterator[Adjoint]:
@@ -316,7 +316,7 @@ class _Stages:
         """Return the findings, once all chunks were replayed."""
         residuals = tuple(test.result() for test in self._residual_tests)
         changes = self._change_test.result()
-        warnings = [residual.caution for residual in residuals if residual.caution]
+        warnings = [residual.warning for residual in residuals if residual.warning]
         return Findings(
             plan=self._plan,
             metadata=metadata,
@@ -358,8 +358,9 @@ def _estimators(plan: Plan, log_name: str) -> tuple[Filter, ForceObserver]:
 
 def _diverged(plan: Plan, log_name: str, reason: str = "") -> LogError:
     return LogError(
-        f"the filter or the observer runs away{reason}: the model ({plan.model_origin}) or "
-        f"the settings do not fit this log; give the ship's own with --vessel: {log_name}"
+        f"the filter or the disturbance observer diverges{reason}: the model "
+        f"({plan.model_origin}) or the settings do not fit this log; give another model with "
+        f"--vessel: {log_name}"
     )
 
 

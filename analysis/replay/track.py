@@ -1,4 +1,4 @@
-"""Where the ship went."""
+"""The track of the ship, from recorded positions or by dead reckoning."""
 
 from dataclasses import dataclass
 
@@ -12,44 +12,59 @@ from shiplog.types import FloatArray, Signals
 from shiplog.units import GEOGRAPHIC
 
 EARTH_RADIUS = 6_371_008.8  # m, mean
-BRIDGED = 1 << 20  # instants of a compass's silence; beyond, the gyro goes on from its last word
+MAX_COMPASS_GAP = 1 << 20  # instants; after a longer gap the yaw rate is integrated alone
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Positions in m from the first one."""
+    """Positions relative to the first one.
 
-    time_secs: FloatArray  # (k,) since the signals' start
-    north: FloatArray  # (k,)
-    east: FloatArray  # (k,)
+    Attributes
+    ----------
+    time_secs
+        (k,) s since the start of the signals.
+    north, east
+        (k,) m.
+    """
+
+    time_secs: FloatArray
+    north: FloatArray
+    east: FloatArray
 
 
-NOWHERE = Track(np.zeros(0), np.zeros(0), np.zeros(0))
+EMPTY_TRACK = Track(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
 class Tracker:
-    """Follows the ship in chunks: the positions recorded, or else dead reckoning.
+    """Computes the track chunk by chunk, from recorded positions or else by dead reckoning.
 
-    The latter is from heading and speed ahead; where there is no heading the yaw rate is
-    integrated, which also bridges where the compass was silent.
+    Dead reckoning uses heading and speed ahead. Where the log has no heading, or the compass has
+    a gap, the yaw rate is integrated.
+
+    Parameters
+    ----------
+    clock
+        The clock of the signals.
+    position
+        The statistics of the position channel; None where the log has none.
     """
 
     def __init__(self, clock: Clock, position: ChannelStats | None) -> None:
         self._recorded = position if position is not None and position.valid > 1 else None
         self._start_ns, self._reckoning = clock.start_ns, _DeadReckoner(clock)
         self._fixes: list[Track] = []  # since the last step
-        self._datum: FloatArray | None = None  # the first position
+        self._origin_position: FloatArray | None = None  # the first position
 
     @property
     def origin(self) -> str:
-        """How the track is known, in words, once it all is."""
+        """How the track was obtained, in words; final once all chunks were given."""
         if self._recorded:
-            return "positions recorded"
-        heading = "heading" if self._reckoning.by_compass else "yaw rate"
-        return f"dead reckoning from {heading} and speed ahead"
+            return "recorded positions"
+        source = "heading" if self._reckoning.by_compass else "yaw rate"
+        return f"dead reckoning from {source} and speed"
 
     def add_raw(self, chunk: tuple[Channel, ...]) -> None:
-        """Look at the samples themselves for the positions recorded."""
+        """Read the recorded positions from a chunk of raw channels."""
         channel = self._recorded.select(chunk) if self._recorded else None
         if channel is None:
             return
@@ -60,79 +75,93 @@ class Tracker:
             self._fixes.append(Track(at, north, east))
 
     def step(self, chunk: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
-        """The track as far as it is known by now; the filter's rates on the chunk, (n,)."""
+        """Return the part of the track that has become known.
+
+        Parameters
+        ----------
+        chunk
+            The next signals, (n,) samples.
+        yaw_rate
+            (n,) rad/s, as estimated by the filter.
+        speed
+            (n,) m/s, as estimated by the filter.
+        """
         if not self._recorded:
             return self._reckoning.step(chunk, yaw_rate, speed)
         fixes, self._fixes = self._fixes, []
-        return concatenate([NOWHERE, *fixes])
+        return concatenate([EMPTY_TRACK, *fixes])
 
     def _in_metres(self, channel: Channel, positions: FloatArray) -> FloatArray:
-        """North and east of the first position, (n, 2)."""
-        if self._datum is None:
-            self._datum = positions[0]
+        """Return positions as north and east of the first one, (n, 2) m."""
+        if self._origin_position is None:
+            self._origin_position = positions[0]
         if channel.fields != GEOGRAPHIC:
-            return positions - self._datum
-        per_radian = np.array([EARTH_RADIUS, EARTH_RADIUS * np.cos(np.radians(self._datum[0]))])
-        return np.asarray(np.radians(positions) * per_radian - np.radians(self._datum) * per_radian)
+            return positions - self._origin_position
+        per_radian = np.array(
+            [EARTH_RADIUS, EARTH_RADIUS * np.cos(np.radians(self._origin_position[0]))]
+        )
+        return np.asarray(
+            np.radians(positions) * per_radian - np.radians(self._origin_position) * per_radian
+        )
 
 
 class _DeadReckoner:
-    """Dead reckoning in chunks; what follows the last heading known waits for the next.
+    """Dead reckoning in chunks; instants after the last heading wait for the next heading.
 
-    It does not wait for ever: after a silence of `BRIDGED` the compass is taken for lost, and the
-    gyro goes on alone until there is a heading again.
+    After a gap of `MAX_COMPASS_GAP` they no longer wait: the yaw rate is integrated alone until
+    there is a heading again.
     """
 
     def __init__(self, clock: Clock) -> None:
         self._clock, self._compass = clock, "heading" in clock.channels
-        self._waiting = np.zeros((0, 2))  # rows of how far she turned and of her speed
-        self._reckoned = 0  # instants
+        self._waiting = np.zeros((0, 2))  # rows of the angle turned and the speed
+        self._reckoned = 0  # instants so far
         self._turned, self._made_good = 0.0, np.zeros(2)  # running sums of rates and of speeds
-        self._off = np.zeros((0, 2))  # rows of instant, heading less what was turned until then
+        self._offsets = np.zeros((0, 2))  # rows of instant, heading minus the angle turned
         self._start: FloatArray | None = None
 
     @property
     def by_compass(self) -> bool:
-        """Whether there was a heading."""
-        return len(self._off) > 0
+        """Whether there was a heading so far."""
+        return len(self._offsets) > 0
 
     def step(self, chunk: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
-        """The track as far as the heading is known by now."""
+        """Return the track up to the last known heading."""
         dt, end = chunk.dt_secs, chunk.first + len(chunk)
         sums = np.cumsum(np.concatenate(([self._turned], yaw_rate)))[1:]
         self._turned, turned = float(sums[-1]), sums * dt
         self._waiting = np.concatenate((self._waiting, np.column_stack((turned, speed))))
         if self._compass:
-            self._look_at_compass(chunk, turned)
-        last = int(self._off[-1, 0]) if len(self._off) else -1
-        waits = self._compass and end < self._clock.count and end - 1 - last <= BRIDGED
+            self._add_headings(chunk, turned)
+        last = int(self._offsets[-1, 0]) if len(self._offsets) else -1
+        waits = self._compass and end < self._clock.count and end - 1 - last <= MAX_COMPASS_GAP
         until = last + 1 if waits else end
         at = np.arange(self._reckoned, until)
         turned, speed = self._waiting[: len(at)].T
         self._waiting, self._reckoned = self._waiting[len(at) :], until
-        heading = turned + np.interp(at, *self._off.T) if len(self._off) else turned
-        self._off = self._off[-1:]
+        heading = turned + np.interp(at, *self._offsets.T) if len(self._offsets) else turned
+        self._offsets = self._offsets[-1:]
         steps = np.column_stack((speed * np.cos(heading), speed * np.sin(heading)))
         made_good = np.cumsum(np.vstack((self._made_good, steps)), axis=0)[1:]
         if not len(at):
-            return NOWHERE
+            return EMPTY_TRACK
         self._made_good = made_good[-1]
         positions = made_good * dt
         self._start = positions[0] if self._start is None else self._start
         north, east = (positions - self._start).T
         return Track(at * dt, north, east)
 
-    def _look_at_compass(self, chunk: Signals, turned: FloatArray) -> None:
-        """Add how far off each heading is from what was turned.
+    def _add_headings(self, chunk: Signals, turned: FloatArray) -> None:
+        """Add the offset of each heading from the angle turned.
 
-        Where two are further apart than is bridged, the first is said again just before the
-        second, so that what lies between them is not led from one to the other.
+        Where two headings are further apart than `MAX_COMPASS_GAP`, the first offset is repeated
+        just before the second, so that the offset is not interpolated across the gap.
         """
         known = np.flatnonzero(np.isfinite(chunk["heading"]))
-        off = np.column_stack((known + chunk.first, chunk["heading"][known] - turned[known]))
-        before = self._off if len(self._off) else np.array([[-1.0, 0.0]])
-        rows = np.concatenate((before, off))
-        lost = np.flatnonzero(np.diff(rows[:, 0]) > BRIDGED)
-        held = np.column_stack((rows[lost + 1, 0] - 1, rows[lost, 1]))
-        rows = np.insert(rows, lost + 1, held, axis=0)
-        self._off = rows[len(before) - len(self._off) :]
+        offsets = np.column_stack((known + chunk.first, chunk["heading"][known] - turned[known]))
+        before = self._offsets if len(self._offsets) else np.array([[-1.0, 0.0]])
+        rows = np.concatenate((before, offsets))
+        before_gap = np.flatnonzero(np.diff(rows[:, 0]) > MAX_COMPASS_GAP)
+        held = np.column_stack((rows[before_gap + 1, 0] - 1, rows[before_gap, 1]))
+        rows = np.insert(rows, before_gap + 1, held, axis=0)
+        self._offsets = rows[len(before) - len(self._offsets) :]

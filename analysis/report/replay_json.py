@@ -1,4 +1,4 @@
-"""What a replay found, as plain numbers: the summary in JSON."""
+"""The results of a replay as plain numbers in SI, for JSON."""
 
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -17,49 +17,70 @@ from shiplog.checks.channel_stats import ChannelStats
 from shiplog.ships.paper import COEFFICIENT_UNITS
 from shiplog.vessel.settings import settings_dict
 
-Summary = dict[str, Any]
+JsonObject = dict[str, Any]
 
 
-def replay_json(findings: Findings) -> Summary:
-    """The summary as plain numbers in SI, ready for JSON; what is not a number is None."""
-    log_stats, clock = findings.plan.log_stats, findings.plan.clock
-    start_ns, _ = log_stats.span_ns
-    summary = {
+def replay_json(findings: Findings) -> JsonObject:
+    """Return the results of a replay as plain numbers, ready for JSON.
+
+    Numbers are in SI units and radians; what is NaN or infinite is None.
+
+    Returns
+    -------
+    dict
+        ``log``, ``model``, ``settings``, ``residuals`` (by output), ``wave``, ``disturbances``,
+        ``coefficients``, ``changes``, ``windows`` (by equation), ``track_origin``, ``warnings``.
+    """
+    plan = findings.plan
+    result = {
         "shiplog": __version__,
-        "log": {
-            "name": findings.plan.name,
-            "start": datetime.fromtimestamp(start_ns * 1e-9, UTC).isoformat(),
-            "duration_secs": log_stats.duration_secs,
-            "dt_secs": clock.dt_secs,
-            "samples": clock.count,
-            "provenance": findings.metadata,
-            "channels": {channel.topic: _channel(channel) for channel in log_stats},
-        },
+        "log": _log(findings),
         "model": {
-            "name": findings.plan.vessel.name,
-            "origin": findings.plan.model_origin,
+            "name": plan.vessel.name,
+            "origin": plan.model_origin,
             "coefficients": {
                 name: {"value": value, "unit": COEFFICIENT_UNITS[name]}
-                for name, value in findings.plan.vessel.paper_coefficients._asdict().items()
+                for name, value in plan.vessel.paper_coefficients._asdict().items()
             },
         },
-        "filter": {
+        "settings": {
+            "filter": settings_dict(plan.vessel.filter) | {"kind": plan.vessel.filter.chosen},
+            "disturbance": settings_dict(plan.disturbance_settings),
+            "identifier": settings_dict(plan.vessel.identifier),
+        },
+        "residuals": {
             residuals.name: _residuals(findings, i)
             for i, residuals in enumerate(findings.residuals)
         },
-        "settings": _settings(findings),
-        "wave": _wave(findings.plan.noise.wave),
-        "disturbance": _disturbance(findings),
+        "wave": _wave(plan.noise.wave),
+        "disturbances": {
+            "yaw_as_rudder" if name == "rudder" else name: _disturbance(summary)
+            for name, summary in findings.disturbances.items()
+        },
         "coefficients": _coefficients(findings.yaw) | _coefficients(findings.surge),
         "changes": [_change(change) for change in findings.changes],
         "windows": {"yaw": _windows(findings.yaw), "surge": _windows(findings.surge)},
-        "track": findings.track_origin,
+        "track_origin": findings.track_origin,
         "warnings": list(findings.warnings),
     }
-    return _without_nan(summary)  # type: ignore[no-any-return]
+    return _without_nan(result)  # type: ignore[no-any-return]
 
 
-def _channel(channel: ChannelStats) -> Summary:
+def _log(findings: Findings) -> JsonObject:
+    log_stats, clock = findings.plan.log_stats, findings.plan.clock
+    start_ns, _ = log_stats.span_ns
+    return {
+        "name": findings.plan.name,
+        "start": datetime.fromtimestamp(start_ns * 1e-9, UTC).isoformat(),
+        "duration_secs": log_stats.duration_secs,
+        "dt_secs": clock.dt_secs,
+        "samples": clock.count,
+        "metadata": findings.metadata,
+        "channels": {channel.topic: _channel(channel) for channel in log_stats},
+    }
+
+
+def _channel(channel: ChannelStats) -> JsonObject:
     return {
         "unit": channel.unit,
         "samples": channel.samples,
@@ -69,101 +90,84 @@ def _channel(channel: ChannelStats) -> Summary:
     }
 
 
-def _residuals(findings: Findings, output: int) -> Summary:
+def _residuals(findings: Findings, output: int) -> JsonObject:
     residuals, noise = findings.residuals[output], findings.plan.noise
     return {
         "unit": residuals.unit,
-        "innovations": residuals.count,
-        "innovation_rms": residuals.rms,
-        "normalised_innovation_squared": residuals.normalised_squared,
-        "expected": list(residuals.expected),
+        "count": residuals.count,
+        "rms": residuals.rms,
+        "mean_nis": residuals.mean_nis,
+        "nis_band_99": list(residuals.nis_band),
         "whiteness_p": residuals.whiteness_p,
         "white": residuals.white,
+        "rejected": residuals.gated,
         "measurement_std": float(noise.measurement_std[output]),
-        "measurement_std_origin": "the log" if noise.measured[output] else "the vessel file",
+        "measurement_std_origin": "log" if noise.measured[output] else "vessel file",
         "process_ratio": float(noise.process_ratio[output]),
-        "process_ratio_origin": (
-            "likeliest for the log" if noise.tuned[output] else "the vessel file"
-        ),
-        "gated": residuals.gated,
+        "process_ratio_origin": "log" if noise.tuned[output] else "vessel file",
     }
 
 
-def _settings(findings: Findings) -> Summary:
-    filtering = settings_dict(findings.plan.vessel.filter) | {
-        "kind": findings.plan.vessel.filter.chosen
-    }
-    return {
-        "filter": filtering,
-        "disturbance": settings_dict(findings.plan.disturbance_settings),
-        "identifier": settings_dict(findings.plan.vessel.identifier),
-    }
-
-
-def _wave(wave: Wave | None) -> Summary | None:
-    """The wave told from the turning: of none, None."""
+def _wave(wave: Wave | None) -> JsonObject | None:
+    """Return the wave that was separated from the ship's turning; None where none was."""
     if wave is None:
         return None
     return {
-        "frequency_rad_per_s": wave.frequency,
+        "frequency": wave.frequency,
         "damping": wave.damping,
-        "std_rad_per_s": wave.std,
+        "std": wave.std,
         "evidence": wave.evidence,
         "evidence_needed": wave.needed,
         "contrast": wave.contrast,
     }
 
 
-def _disturbance(findings: Findings) -> Summary:
-    keys = {"rudder": "yaw_as_rudder"}
-    return {keys.get(name, name): _course(course) for name, course in findings.disturbances.items()}
-
-
-def _course(course: DisturbanceSummary) -> Summary:
+def _disturbance(summary: DisturbanceSummary) -> JsonObject:
     return {
-        "mean": course.mean,
-        "rms": course.rms,
-        "lowest": course.lowest,
-        "highest": course.highest,
-        "last": course.last,
-        "sensor_noise_std": course.std,
-        "settling_secs": course.settling_secs,
-        "unit": course.unit,
+        "unit": summary.unit,
+        "mean": summary.mean,
+        "rms": summary.rms,
+        "min": summary.lowest,
+        "max": summary.highest,
+        "at_end": summary.last,
+        "sensor_noise_std": summary.std,
+        "settling_secs": summary.settling_secs,
     }
 
 
-def _coefficients(found: CoefficientFit) -> Summary:
+def _coefficients(fit: CoefficientFit) -> JsonObject:
     return {
         name: {
             "value": coefficient.value,
             "std": coefficient.std,
             "unit": coefficient.unit,
             "determined": coefficient.determined,
-            "condition": found.condition,
+            "condition": fit.condition,
         }
-        for name, coefficient in found.coefficients.items()
+        for name, coefficient in fit.coefficients.items()
     }
 
 
-def _change(change: Change) -> Summary:
+def _change(change: Change) -> JsonObject:
     return asdict(change) | {"instead": list(change.instead)}
 
 
-def _windows(found: CoefficientFit) -> Summary:
-    """How well the sliding windows could tell: their condition numbers, and how many are blank."""
-    conditions = found.window_conditions
+def _windows(fit: CoefficientFit) -> JsonObject:
+    """Return the condition numbers of the sliding windows, and how many determine nothing."""
+    conditions = fit.window_conditions
     known = conditions[np.isfinite(conditions)]
     return {
         "count": len(conditions),
-        "blank": found.blank_windows,
+        "empty": fit.blank_windows,
         "condition_median": float(np.median(known)) if len(known) else None,
-        "condition_worst": float(np.max(known)) if len(known) else None,
+        "condition_max": float(np.max(known)) if len(known) else None,
         "conditions": conditions.tolist(),
-        "time_secs": found.window_ends_secs.tolist(),
+        "end_secs": fit.window_ends_secs.tolist(),
     }
 
 
 def _without_nan(value: Any) -> Any:  # noqa: ANN401 - walks a tree of JSON
+    """Replace every float that JSON does not know by None."""
     if isinstance(value, dict):
         return {key: _without_nan(inner) for key, inner in value.items()}
     if isinstance(value, list):

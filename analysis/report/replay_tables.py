@@ -1,173 +1,179 @@
-"""What a replay found as tables and words: for the terminal, and for Rerun's page."""
+"""The results of a replay as tables and sentences, for the terminal and for Rerun."""
 
+from collections.abc import Iterator
 from math import degrees, isfinite, pi
 
 import numpy as np
 
-from analysis.disturbance.observer import DISTURBANCE_UNITS
-from analysis.replay.plan import FITTED_MODEL
 from analysis.replay.replay import Findings
-from analysis.replay.residuals import OutputResiduals
-from analysis.view.series import BAND_STDS
+from analysis.replay.residuals import ResidualSummary
 from shiplog.units import CATALOGUE, conversion_factor
 
+from .display import BAND_STDS, DISTURBANCES
 from .section import Section, markdown_page
-
-DISTURBANCES = {
-    "rudder": "yaw, as rudder",
-    "yaw": "yaw",
-    "yaw_wave": "yaw, wave",
-    "surge": "surge",
-    "surge_wave": "surge, wave",
-}
 
 
 def replay_tables(findings: Findings) -> tuple[Section, ...]:
-    """The summary as tables, in the units people use, and its verdicts in words."""
+    """Return the results of a replay as tables in the units people use.
+
+    Returns
+    -------
+    tuple of Section
+        The log, the filter's residuals, the disturbances and the coefficients; then the changes of
+        coefficients within the trial, where there are any.
+    """
     return (
-        _log_section(findings),
-        _filter_section(findings),
-        _disturbance_section(findings),
-        _coefficient_section(findings),
-        *_change_sections(findings),
+        _log_table(findings),
+        _residual_table(findings),
+        _disturbance_table(findings),
+        _coefficient_table(findings),
+        *_change_tables(findings),
     )
 
 
 def replay_markdown(findings: Findings) -> str:
-    """The summary as a page of text."""
-    log, *found = replay_tables(findings)
-    # what was found first: a page is read from its top
-    return markdown_page(findings.plan.name, (*found, log), findings.warnings)
+    """Return the results of a replay as a page in Markdown, the table of the log last."""
+    log, *results = replay_tables(findings)
+    return markdown_page(findings.plan.name, (*results, log), findings.warnings)
 
 
-def _log_section(findings: Findings) -> Section:
+def _log_table(findings: Findings) -> Section:
     log_stats, rows = findings.plan.log_stats, []
     for channel in log_stats:
         rate = f"{1 / channel.interval_secs:.3g} Hz" if channel.interval_secs else ""
         gaps = "none"
         if channel.gaps:
             longest = max(length for _, length in channel.gaps)
-            gaps = f"{len(channel.gaps)}, the longest {longest:.1f} s"
+            gaps = f"{len(channel.gaps)}, longest {longest:.1f} s"
         rows.append((channel.topic, f"{channel.samples}", rate, gaps))
     start = np.datetime64(log_stats.span_ns[0], "ns").astype("M8[s]")
-    title = f"Log, {log_stats.duration_secs:.0f} s from {start} UTC"
+    title = f"Log: {log_stats.duration_secs:.0f} s from {start} UTC"
     return Section(title, ("channel", "samples", "rate", "gaps"), tuple(rows))
 
 
-def _filter_section(findings: Findings) -> Section:
-    fitted = findings.plan.model_is_fitted
-    model = (
-        FITTED_MODEL if fitted else f"{findings.plan.vessel.name} ({findings.plan.model_origin})"
-    )
-    rows, remarks = [], [f"Model: {model}.", _chosen(findings)]
+def _residual_table(findings: Findings) -> Section:
+    rows = []
     for residuals in findings.residuals:
         unit = CATALOGUE[residuals.name].display_unit
         rms = residuals.rms * conversion_factor(residuals.unit, unit)
-        rows.append(
-            (
-                f"{residuals.name} [{unit}]",
-                f"{rms:.3g}",
-                f"{residuals.normalised_squared:.4g}",
-                f"{residuals.whiteness_p:.2g}",
-                f"{residuals.gated}",
-            )
+        low, high = residuals.nis_band
+        cells = (
+            f"{_words(residuals.name)} [{unit}]",
+            f"{rms:.3g}",
+            f"{residuals.mean_nis:.4g}",
+            f"{low:.3g} to {high:.3g}",
+            f"{residuals.whiteness_p:.2g}",
+            f"{residuals.gated}",
         )
-        remarks.append(_verdict(residuals))
-    columns = ("output", "innovation rms", "normalised, squared (1)", "whiteness p", "gated")
-    return Section("Filter", columns, tuple(rows), tuple(remarks))
+        rows.append(cells)
+    columns = (
+        "innovation of", "rms", "mean NIS", "expected\n(99 %)", "whiteness\np-value", "rejected",
+    )  # fmt: skip
+    remarks = (*_filter_remarks(findings), *map(_residual_remark, findings.residuals))
+    return Section("Filter residuals", columns, tuple(rows), remarks)
 
 
-def _chosen(findings: Findings) -> str:
-    """Which filter it was, in words."""
-    settings, wave = findings.plan.vessel.filter, findings.plan.noise.wave
-    smoothed = ", smoothed from the end back" if settings.smooth else ""
-    said = f"Filter: {settings.chosen}{smoothed}; gated: off by over {settings.gate:g} σ."
-    if wave is None:
-        return said
-    return (
-        f"{said} Waves of {degrees(wave.std):.2g} deg/s rms about {wave.frequency:.3g} rad/s "
-        f"({2 * pi / wave.frequency:.3g} s) are told from the ship's turning."
+def _filter_remarks(findings: Findings) -> Iterator[str]:
+    """Describe the model, the filter and the wave, and explain the table."""
+    plan = findings.plan
+    origin = plan.model_origin
+    model = origin if plan.model_is_fitted else f"{plan.vessel.name} ({origin})"
+    settings, wave = plan.vessel.filter, plan.noise.wave
+    smoothed = ", smoothed backwards from the end" if settings.smooth else ""
+    yield f"Model: {model}."
+    yield f"Filter: {settings.chosen}{smoothed}."
+    if wave is not None:
+        yield (
+            f"Waves of {degrees(wave.std):.2g} deg/s rms at {wave.frequency:.3g} rad/s (period "
+            f"{2 * pi / wave.frequency:.3g} s) are separated from the ship's own turning."
+        )
+    yield (
+        "Innovation: measured minus predicted. NIS: its square over the variance that the filter "
+        f"expects. Rejected: samples further than {settings.gate:g} σ from the prediction."
     )
 
 
-def _verdict(residuals: OutputResiduals) -> str:
-    size = ""
+def _residual_remark(residuals: ResidualSummary) -> str:
+    """Describe the size and the whiteness of an output's innovations in a sentence."""
+    size = "as large as expected"
     if not residuals.consistent:
-        larger = residuals.normalised_squared > residuals.expected[1]
-        size = f"; they are {'larger' if larger else 'smaller'} than the noise assumed"
+        larger = residuals.mean_nis > residuals.nis_band[1]
+        size = f"{'larger' if larger else 'smaller'} than expected"
+    name = _words(residuals.name)
     if residuals.white is None:
-        return f"{residuals.name}: the innovations cannot be told to be white or not{size}."
+        return f"{name}: innovations {size}; too few samples to test whether they are white."
     if residuals.white:
-        return f"{residuals.name}: innovations are white (test at 1 %){size}."
+        return f"{name}: innovations {size} and white (test at 1 %)."
     return (
-        f"{residuals.name}: innovations are NOT white (test at 1 %){size}: "
-        "the model or the noise does not explain the data."
+        f"{name}: innovations {size} and NOT white (test at 1 %): the model or the noise does not "
+        "explain the data."
     )
 
 
-def _disturbance_section(findings: Findings) -> Section:
-    rows = []
-    slow = {"constant", "ramp"} & set(findings.plan.disturbance_settings.models)
-    for name, label in DISTURBANCES.items():
-        if name not in findings.disturbances or not (slow or name.endswith("wave")):
+def _disturbance_table(findings: Findings) -> Section:
+    settings, rows = findings.plan.disturbance_settings, []
+    slow = {"constant", "ramp"} & set(settings.models)
+    for key, (name, unit, scale) in DISTURBANCES.items():
+        if key not in findings.disturbances or not (slow or key.endswith("wave")):
             continue
-        course, (_, unit, scale) = findings.disturbances[name], DISTURBANCE_UNITS[name]
-        values = (course.mean, course.rms, course.last, course.std)
-        rows.append(
-            (f"{label} [{unit}]", *(f"{v * scale:.3g}" if isfinite(v) else "" for v in values))
-        )
-    columns = ("disturbance", "mean", "rms", "at the end", "std by noise")
-    caution = (
-        "As rudder: the angle that would do the same at the speed then. "
-        "The std is by sensor noise alone; an error of the model counts as a disturbance."
-    )
-    remarks = [f"Models: {_observed(findings)}.", caution]
-    if findings.plan.model_is_fitted:
-        remarks.append("The model was fitted to this log: this is what it leaves unexplained.")
-    return Section("Disturbance observed", columns, tuple(rows), tuple(remarks))
-
-
-def _observed(findings: Findings) -> str:
-    """Which disturbances were looked for, in words."""
-    settings = findings.plan.disturbance_settings
-    said = [model for model in dict.fromkeys(settings.models) if model != "wave"]
+        summary = findings.disturbances[key]
+        values = (summary.mean, summary.rms, summary.last, summary.std)
+        cells = (f"{value * scale:.3g}" if isfinite(value) else "" for value in values)
+        rows.append((f"{name} [{unit}]", *cells))
+    columns = ("disturbance of", "mean", "rms", "at the end", "std from\nsensor noise")
+    models = [model for model in dict.fromkeys(settings.models) if model != "wave"]
     if "wave" in settings.models and settings.wave_frequency is not None:
-        said.append(f"a wave of {settings.wave_frequency:.3g} rad/s")
-    return ", ".join(said)
-
-
-def _coefficient_section(findings: Findings) -> Section:
-    model, rows = findings.plan.vessel.paper_coefficients._asdict(), []
-    for found in (findings.yaw, findings.surge):
-        for name, coefficient in found.coefficients.items():
-            value, std = f"{coefficient.value:.4g}", f"{coefficient.std:.2g}"
-            if not coefficient.determined:
-                value, std = "not determined", f"{coefficient.std:.2g}" if std != "nan" else ""
-            rows.append((name, value, std, coefficient.unit, f"{model[name]:.4g}"))
-    if findings.plan.model_is_fitted:  # beside itself it would only seem confirmed
-        rows = [(*row[:-1], "") for row in rows]
-    remark = (
-        f"Condition of the scaled regressors: yaw {findings.yaw.condition:.0f}, "
-        f"surge {findings.surge.condition:.0f}. "
-        "Not determined: the log cannot tell it from the others, or not even its sign. "
-        "Two standard deviations are about a 95 % interval, less where a few seconds tell all. "
-        "A gyro's bias goes into b1, b2, b3 and e."
+        models.append(f"wave of {settings.wave_frequency:.3g} rad/s")
+    explanation = (
+        "Yaw, as rudder angle: the rudder that would have the same effect at the speed of that "
+        "moment. Errors of the model count as disturbances."
     )
-    remarks = [remark]
-    if any(residuals.gated for residuals in findings.residuals):
-        remarks.append("Gated samples are in this fit all the same: spikes spoil b1, b2, b3 and e.")
+    remarks = [f"Disturbance models: {', '.join(models)}.", explanation]
     if findings.plan.model_is_fitted:
-        remarks.append(
-            "With no model the rudder is taken to work in proportion to the speed (α = 1, 0, 0): "
-            "d and e are not to be laid beside those of a vessel whose slipstream is known."
-        )
+        remarks.append("The model was fitted to this log: this is what it does not explain.")
+    return Section("Disturbances", columns, tuple(rows), tuple(remarks))
+
+
+def _coefficient_table(findings: Findings) -> Section:
+    plan, rows = findings.plan, []
+    model = plan.vessel.paper_coefficients._asdict()
+    for fit in (findings.yaw, findings.surge):
+        for name, coefficient in fit.coefficients.items():
+            std = f"{coefficient.std:.2g}" if isfinite(coefficient.std) else ""
+            value = f"{coefficient.value:.4g}" if coefficient.determined else "not determined"
+            # beside the model fitted to the same log the value would only seem confirmed
+            in_model = "" if plan.model_is_fitted else f"{model[name]:.4g}"
+            rows.append((name, value, std, coefficient.unit, in_model))
     columns = ("coefficient", "from this log", "std", "unit", "in the model")
-    return Section("Coefficients", columns, tuple(rows), tuple(remarks))
+    return Section("Coefficients", columns, tuple(rows), tuple(_coefficient_remarks(findings)))
 
 
-def _change_sections(findings: Findings) -> tuple[Section, ...]:
-    """What changed within the trial; nothing where nothing did."""
-    rows = [
+def _coefficient_remarks(findings: Findings) -> Iterator[str]:
+    """Explain the table of coefficients."""
+    yield (
+        "Least squares over the whole trial; condition number of the scaled regressors: yaw "
+        f"{findings.yaw.condition:.0f}, surge {findings.surge.condition:.0f}. Two standard "
+        "deviations are about a 95 % interval, less where few seconds hold all the information. "
+        "Not determined: the data do not separate it from the other coefficients, or not even its "
+        "sign is certain. A bias of the gyro goes into b1, b2, b3 and e."
+    )
+    if any(residuals.gated for residuals in findings.residuals):
+        yield (
+            "Samples rejected by the filter are used in this fit all the same: spikes distort b1, "
+            "b2, b3 and e."
+        )
+    if findings.plan.model_is_fitted:
+        yield (
+            "Without a model the rudder is taken to act in proportion to the speed (α = 1, 0, 0): "
+            "d and e cannot be compared with those of a vessel whose slipstream is known."
+        )
+
+
+def _change_tables(findings: Findings) -> tuple[Section, ...]:
+    """Return a table of the coefficients that changed within the trial; none if none did."""
+    if not findings.changes:
+        return ()
+    rows = tuple(
         (
             f"{change.name} [{change.unit}]",
             f"{change.at_secs:.0f} s",
@@ -176,20 +182,22 @@ def _change_sections(findings: Findings) -> tuple[Section, ...]:
             change.by.removeprefix("by ").replace(" %", "", 1) if isfinite(change.share) else "",
         )
         for change in findings.changes
-    ]
-    if not rows:
-        return ()
-    remark = (
-        "A coefficient that differs before and after says that the ship did, her loading, the "
-        "depth or the weather, or that the model does not hold for both; over the whole trial it "
-        "is a mixture. Each by itself, ±2σ; the difference with its 95 % interval."
     )
-    remarks = [remark]
+    explanation = (
+        "A coefficient differs before and after where the ship, its loading, the depth or the "
+        "weather changed, or where the model does not hold for both parts; the value over the "
+        "whole trial is then a mixture. Values ± 2σ, difference with its 95 % interval."
+    )
+    remarks = [explanation]
     remarks += [
-        f"At {change.at_secs:.0f} s {' or '.join(change.instead)} may have changed in place of "
-        f"{change.name}: the log cannot tell which."
+        f"At {change.at_secs:.0f} s {' or '.join(change.instead)} may have changed instead of "
+        f"{change.name}: the data do not show which."
         for change in findings.changes
         if change.instead
     ]
     columns = ("coefficient", "at", "before", "after", "difference")
-    return (Section("Changes within the trial", columns, tuple(rows), tuple(remarks)),)
+    return (Section("Changes within the trial", columns, rows, tuple(remarks)),)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")

@@ -23,7 +23,7 @@ from analysis.filters.factory import filter_states, make_filter
 from analysis.filters.noise_model import NoiseModel
 from analysis.filters.pseudo_input import MotionState, motion
 from analysis.filters.tuning import noise_of
-from analysis.replay.residuals import judge
+from analysis.replay.residuals import assess_innovations
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import signal_stats
 from recorders.simulated.sensors import suite
@@ -75,7 +75,7 @@ def test_under_white_noise_the_true_models_innovations_are_white_and_as_large_as
     _, estimates = filtered(trial, vessel)
     for i, name in enumerate(PAPER_OUTPUTS):
         e, s = estimates.innovations[:, i], estimates.innovation_stds[:, i]
-        found = judge(name, "", e, s, noise_measured=True)
+        found = assess_innovations(name, "", e, s, noise_measured=True)
         assert found.white, found
         assert found.consistent, found
 
@@ -85,7 +85,7 @@ def test_the_papers_slow_wave_makes_the_innovations_coloured(
 ) -> None:
     _, estimates = filtered(zigzag, vessel)
     e, s = estimates.innovations[:, 1], estimates.innovation_stds[:, 1]
-    assert not judge("speed", "", e, s, noise_measured=True).white
+    assert not assess_innovations("speed", "", e, s, noise_measured=True).white
 
 
 def test_without_noise_the_filter_follows_the_truth_in_all_five_states(vessel: Vessel) -> None:

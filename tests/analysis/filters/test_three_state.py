@@ -23,7 +23,7 @@ from analysis.filters.noise_model import NoiseModel
 from analysis.filters.ship_step import predict, tell
 from analysis.filters.tuning import noise_of
 from analysis.filters.wave_fit import Wave
-from analysis.replay.residuals import judge
+from analysis.replay.residuals import assess_innovations
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from recorders.simulated.sensors import suite
@@ -323,7 +323,7 @@ def test_under_white_noise_the_true_models_innovations_are_white_and_as_large_as
     estimates = filter_states(signals, vessel.coefficients, *stated(vessel.coefficients, signals))
     for i, name in enumerate(PAPER_OUTPUTS):
         e, s = estimates.innovations[:, i], estimates.innovation_stds[:, i]
-        found = judge(name, "", e, s, noise_measured=True)
+        found = assess_innovations(name, "", e, s, noise_measured=True)
         assert found.white, found
         assert found.consistent, found
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from analysis.replay.residuals import _Products, judge, whiteness
+from analysis.replay.residuals import _Products, assess_innovations, whiteness
 from analysis.signals.signal_stats import noise_level
 
 
@@ -47,14 +47,14 @@ def test_too_few_samples_give_no_verdict() -> None:
 
 def test_noise_larger_than_assumed_is_not_consistent() -> None:
     noise = noises(1)[0]
-    right = judge("yaw_rate", "rad/s", noise, np.ones(2000), noise_measured=False)
+    right = assess_innovations("yaw_rate", "rad/s", noise, np.ones(2000), noise_measured=False)
     assert right.consistent
-    assert right.normalised_squared == pytest.approx(np.mean(noise**2))
+    assert right.mean_nis == pytest.approx(np.mean(noise**2))
     assert right.rms == pytest.approx(np.sqrt(np.mean(noise**2)))
-    assert not judge(
+    assert not assess_innovations(
         "yaw_rate", "rad/s", noise, np.full(2000, 0.9), noise_measured=False
     ).consistent
-    assert not judge(
+    assert not assess_innovations(
         "yaw_rate", "rad/s", noise, np.full(2000, 1.1), noise_measured=False
     ).consistent
 
@@ -62,15 +62,19 @@ def test_noise_larger_than_assumed_is_not_consistent() -> None:
 def test_only_what_was_measured_is_counted() -> None:
     noise = noises(1)[0]
     noise[::2] = np.nan
-    assert judge("speed", "m/s", noise, np.ones(2000), noise_measured=False).count == 1000
+    assert (
+        assess_innovations("speed", "m/s", noise, np.ones(2000), noise_measured=False).count == 1000
+    )
 
 
 def test_noise_taken_from_the_same_log_widens_the_band_as_it_must() -> None:
     ratios = []
     for noise in noises(400, 1000):
-        found = judge("speed", "m/s", noise, np.full(1000, noise_level(noise)), noise_measured=True)
-        ratios.append(found.normalised_squared)
-    low, high = found.expected
+        found = assess_innovations(
+            "speed", "m/s", noise, np.full(1000, noise_level(noise)), noise_measured=True
+        )
+        ratios.append(found.mean_nis)
+    low, high = found.nis_band
     assert np.mean(ratios) == pytest.approx(1, abs=0.01)
     assert (high - low) / 2 == pytest.approx(2.576 * np.std(ratios), rel=0.1)
 
@@ -85,7 +89,7 @@ def test_a_slow_sensor_on_a_fast_clock_is_tested_over_its_own_measurements() -> 
 
 
 def test_what_was_never_tested_is_not_called_white() -> None:
-    few = judge("speed", "m/s", np.ones(30), np.ones(30), noise_measured=False)
+    few = assess_innovations("speed", "m/s", np.ones(30), np.ones(30), noise_measured=False)
     assert few.white is None
 
 

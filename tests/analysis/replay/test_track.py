@@ -24,7 +24,7 @@ def tracked(
 def test_recorded_positions_are_the_track(zigzag: SimulatedTrial, zigzag_log: TrialLog) -> None:
     signals = resample(zigzag_log, channels=("yaw_rate", "heading"))
     track, origin = tracked(zigzag_log, signals, signals["yaw_rate"], signals["yaw_rate"])
-    assert origin == "positions recorded"
+    assert origin == "recorded positions"
     truth = zigzag.trajectory.at(np.arange(501.0))["position"]
     assert np.column_stack((track.north, track.east)) == pytest.approx(truth, abs=1e-6)
 
@@ -80,7 +80,7 @@ def test_positions_on_the_globe_become_metres() -> None:
 
 def test_after_a_long_silence_the_gyro_goes_on_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """And does so as it goes, holding no more than that silence."""
-    monkeypatch.setattr("analysis.replay.track.BRIDGED", 100)
+    monkeypatch.setattr("analysis.replay.track.MAX_COMPASS_GAP", 100)
     count = 1000
     heading = np.full(count, np.nan)
     heading[[10, 60, 700]] = 0.0, 0.5, 2.0

@@ -7,16 +7,16 @@ from analysis.report.replay_tables import replay_markdown, replay_tables
 from shiplog import TrialLog
 
 
-def test_the_papers_wave_is_said_to_colour_the_innovations(zigzag_analysis: Analysis) -> None:
+def test_the_papers_wave_colours_the_innovations(zigzag_analysis: Analysis) -> None:
     page = replay_markdown(zigzag_analysis.findings)
-    assert "speed: innovations are NOT white" in page
-    assert "yaw_rate: innovations are white" in page
+    assert "speed: innovations larger than expected and NOT white" in page
+    assert "yaw rate: innovations as large as expected and white" in page
 
 
-def test_what_the_data_cannot_tell_is_not_printed_as_a_number(zigzag_analysis: Analysis) -> None:
-    doubtful = replace(zigzag_analysis.findings.yaw.coefficients["b1"], value=1e-4, std=1e-3)
+def test_a_coefficient_that_is_not_determined_is_not_printed(zigzag_analysis: Analysis) -> None:
+    uncertain = replace(zigzag_analysis.findings.yaw.coefficients["b1"], value=1e-4, std=1e-3)
     findings = zigzag_analysis.findings
-    yaw = replace(findings.yaw, coefficients=findings.yaw.coefficients | {"b1": doubtful})
+    yaw = replace(findings.yaw, coefficients=findings.yaw.coefficients | {"b1": uncertain})
     tables = replay_tables(replace(findings, yaw=yaw))
     rows = {row[0]: row for table in tables for row in table.rows}
     assert rows["b1"][1] == "not determined"
@@ -24,21 +24,21 @@ def test_what_the_data_cannot_tell_is_not_printed_as_a_number(zigzag_analysis: A
     assert rows["a"][1].startswith("-0.026")
 
 
-def test_people_read_degrees_and_knots(zigzag_analysis: Analysis) -> None:
+def test_tables_are_in_degrees_and_knots(zigzag_analysis: Analysis) -> None:
     rows = {row[0]: row for table in replay_tables(zigzag_analysis.findings) for row in table.rows}
     rms = zigzag_analysis.findings.residuals[0].rms * 180 / np.pi
-    assert rows["yaw_rate [deg/s]"][1] == f"{rms:.3g}"
+    assert rows["yaw rate [deg/s]"][1] == f"{rms:.3g}"
     rms = zigzag_analysis.findings.residuals[1].rms * 3600 / 1852
     assert rows["speed [kn]"][1] == f"{rms:.3g}"
 
 
-def test_a_fitted_model_is_said_to_be_one(zigzag_log: TrialLog) -> None:
+def test_a_fitted_model_is_named_on_the_page(zigzag_log: TrialLog) -> None:
     page = replay_markdown(analyse(replace(zigzag_log, vessel_toml=None)).findings)
-    assert "a first model, fitted to this log" in page
+    assert "first model, fitted to this log" in page
     assert "in proportion to the speed" in page
 
 
-def test_which_filter_it_was_is_said(zigzag_log: TrialLog) -> None:
+def test_the_filter_is_named_on_the_page(zigzag_log: TrialLog) -> None:
     settings = {"filter.kind": "extended", "filter.smooth": True}
     page = replay_markdown(analyse(zigzag_log, settings=settings).findings)
     assert "Filter: extended, smoothed" in page

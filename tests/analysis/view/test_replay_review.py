@@ -16,7 +16,7 @@ from analysis.disturbance.observer import Disturbance
 from analysis.filters.base import Estimates
 from analysis.regression.sliding import History
 from analysis.replay.replay import Analysis, ReplayChunk, analyse
-from analysis.replay.track import NOWHERE
+from analysis.replay.track import EMPTY_TRACK
 from analysis.view.panels import Drawn, equation_panels, history_panels, limits
 from analysis.view.replay_review import write_replay_review
 from analysis.view.series import Line, Series, Sketch, Thinning, _Samples
@@ -188,7 +188,7 @@ def test_the_blueprint_holds_every_view(review: Path) -> None:
     for expected in (
         "yaw rate [deg/s]", "speed [kn]", "rudder [deg]", "rpm", "yaw disturbance [0.001 deg/s³]",
         "surge disturbance [mm/s²]", "yaw rate residual [expected std]",
-        "speed residual [expected std]", "track, north up: positions recorded", "summary",
+        "speed residual [expected std]", "track, north up: recorded positions", "summary",
     ):  # fmt: skip
         assert expected in names
     coefficients = sorted(name.split()[0] for name in names if "±" in name)
@@ -400,7 +400,7 @@ def test_the_chart_has_east_right_and_north_up(review: Path, analysis: Analysis)
     assert bow[1] < stern[1]  # headed north at first, and y points down
     length, unit = drawn.scale_label.split()
     assert drawn.scale[1, 0] - drawn.scale[0, 0] == float(length) * {"m": 1, "km": 1000}[unit]
-    nowhere = replace(analysis, track=NOWHERE)
+    nowhere = replace(analysis, track=EMPTY_TRACK)
     assert draw_track(nowhere.findings, drawn_of(nowhere)) is None
 
 
