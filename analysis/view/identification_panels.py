@@ -29,10 +29,10 @@ from .series import (
     Line,
     Series,
     banded,
+    decimated,
     measured_line,
-    thinned,
 )
-from .track_chart import Chart, chart
+from .track_chart import TrackChart, make_chart
 
 COLOURS = dict(zip(MODEL_OUTPUTS, (BLUE, ORANGE, CYAN, GREEN), strict=True))
 METHODS = {  # by what name, on top of those before it in the alphabet, and in which colour
@@ -57,7 +57,7 @@ class RunSheet:
     inputs: tuple[Panel, ...]
     correlation: Panel
     lag_secs: float  # up to which the correlation goes
-    track: Chart | None
+    track: TrackChart | None
 
 
 def run_sheets(found: IdentifiedShip) -> Iterator[RunSheet]:
@@ -82,7 +82,7 @@ def run_sheets(found: IdentifiedShip) -> Iterator[RunSheet]:
 
 def _sheet(
     origin: str, title: str, segment: Segment, simulated: FloatArray, found: IdentifiedShip,
-    track: Chart | None,
+    track: TrackChart | None,
 ) -> RunSheet:  # fmt: skip
     shown = [
         name
@@ -110,7 +110,7 @@ def _output(origin: str, segment: Segment, simulated: FloatArray, name: str) -> 
     drawn = Series("simulated", segment.signals.time_secs, (line,))
     return Panel(
         f"{origin}/{name}", f"{name.replace('_', ' ')} [{unit}]",
-        (thinned(measured), thinned(drawn)), limits(values, line.values),
+        (decimated(measured), decimated(drawn)), limits(values, line.values),
     )  # fmt: skip
 
 
@@ -132,7 +132,7 @@ def _input(origin: str, segment: Segment, name: str) -> Panel:
         "given", segment.signals.time_secs, (Line(name, values, GREEN, 1.5),), spiky=True
     )
     title = name if name == unit else f"{name} [{unit}]"
-    return Panel(f"{origin}/{name}", title, (thinned(drawn),), limits(values))
+    return Panel(f"{origin}/{name}", title, (decimated(drawn),), limits(values))
 
 
 def _normalised(
@@ -151,7 +151,7 @@ def _residual(origin: str, segment: Segment, name: str, normalised: FloatArray) 
     ends = segment.signals.time_secs[[0, -1]]
     return Panel(
         f"{origin}/residual_{name}", f"{name.replace('_', ' ')} residual [usual std]",
-        (thinned(drawn), _guides(ends, SIGMA_LIMIT)),
+        (decimated(drawn), _guides(ends, SIGMA_LIMIT)),
         limits(values, np.array([-2.0, 2.0]) * SIGMA_LIMIT),
     )  # fmt: skip
 
@@ -171,7 +171,7 @@ def _correlation(
     for name, values in normalised.items():
         found, count = autocorrelation(values, int(lags[-1]))
         line = Line(name.replace("_", " "), found[1:], COLOURS[name], 1.5)
-        series.append(thinned(Series(name, lags * segment.dt_secs, (line,))))
+        series.append(decimated(Series(name, lags * segment.dt_secs, (line,))))
         counts.append(count)
     bound = SIGMA_LIMIT / np.sqrt(max(min(counts, default=1), 1))
     series.append(_guides(np.array([0.0, lag_secs]), bound))
@@ -199,7 +199,7 @@ def autocorrelation(values: FloatArray, most: int) -> tuple[FloatArray, int]:
         return mean / mean[0], int(known.sum())
 
 
-def _track(validation: Validation, length: float | None) -> Chart | None:
+def _track(validation: Validation, length: float | None) -> TrackChart | None:
     segment = validation.segment
     heading = (
         segment.measured[:, MODEL_OUTPUTS.index("heading")] if segment.has("heading") else None
@@ -207,7 +207,7 @@ def _track(validation: Validation, length: float | None) -> Chart | None:
     if heading is not None:
         at = np.flatnonzero(np.isfinite(heading))
         heading = np.interp(np.arange(len(heading)), at, heading[at])
-    return chart(
+    return make_chart(
         "track, north up: grey as sailed, blue as simulated", validation.measured_track,
         segment.signals.time_secs, heading, length, validation.track,
     )  # fmt: skip
@@ -263,4 +263,4 @@ def _course(
             lines += banded(histories.method, sure, SIGMA_LIMIT * stds * scale, colour)
         else:
             lines.append(Line(histories.method, sure, colour, 1.5))
-    return [thinned(Series(slug, histories.time_secs, tuple(lines)))]
+    return [decimated(Series(slug, histories.time_secs, tuple(lines)))]

@@ -15,15 +15,15 @@ from analysis.report.section import markdown_page
 from .identification_panels import RunSheet, parameter_panels, run_sheets
 from .panels import Panel
 from .rerun_io import (
+    axis_until,
     chart_view,
-    laid_out,
-    plot,
-    saving,
+    make_blueprint,
+    plot_view,
+    save_recording,
     send_chart,
     send_points,
     send_style,
     send_text,
-    until,
 )
 
 MOST_LARGE = 12  # coefficients; more are drawn smaller
@@ -43,7 +43,7 @@ def write_review(found: IdentifiedShip, path: str | os.PathLike[str]) -> None:
     """
     recording = _recording(found)
     sheets, coefficients = list(run_sheets(found)), parameter_panels(found)
-    with saving(recording, path):
+    with save_recording(recording, path):
         rr.send_blueprint(_blueprint(found, sheets, coefficients), recording=recording)
         text = markdown_page(
             f"{found.model.title}, identified", identification_tables(found), found.warnings
@@ -87,23 +87,23 @@ def _track_origin(i: int) -> str:
 def _blueprint(
     found: IdentifiedShip, sheets: list[RunSheet], coefficients: list[Panel]
 ) -> rrb.Blueprint:
-    axis = until(run_secs(found.fit.problem.segments))
+    axis = axis_until(run_secs(found.fit.problem.segments))
     columns = 3 if len(coefficients) <= MOST_LARGE else 4
     overview = rrb.Horizontal(
-        rrb.Grid(*(plot(panel, axis) for panel in coefficients), grid_columns=columns),
+        rrb.Grid(*(plot_view(panel, axis) for panel in coefficients), grid_columns=columns),
         rrb.TextDocumentView(origin="summary", name="summary"),
         column_shares=[3, 2],
         name="coefficients",
     )
     runs = [_run(i, sheet) for i, sheet in enumerate(sheets)]
-    return laid_out(rrb.Tabs(overview, *runs, active_tab=0))
+    return make_blueprint(rrb.Tabs(overview, *runs, active_tab=0))
 
 
 def _run(i: int, sheet: RunSheet) -> rrb.Container:
-    axis = until(sheet.duration_secs)
-    left = [plot(panel, axis) for panel in (*sheet.outputs, *sheet.inputs)]
-    right: list[rrb.View] = [plot(panel, axis) for panel in sheet.residuals]
-    right.append(plot(sheet.correlation, until(sheet.lag_secs)))
+    axis = axis_until(sheet.duration_secs)
+    left = [plot_view(panel, axis) for panel in (*sheet.outputs, *sheet.inputs)]
+    right: list[rrb.View] = [plot_view(panel, axis) for panel in sheet.residuals]
+    right.append(plot_view(sheet.correlation, axis_until(sheet.lag_secs)))
     if sheet.track is not None:
         right.append(chart_view(_track_origin(i), sheet.track))
     shares = [1] * (len(right) - 1) + [2 if sheet.track is not None else 1]

@@ -16,16 +16,16 @@ from analysis.replay.replay import Analysis, Findings, ReplayChunk
 from .panels import Panel, equation_panels, history_panels
 from .rerun_io import (
     chart_view,
-    laid_out,
-    plot,
-    saving,
+    make_blueprint,
+    plot_view,
+    save_recording,
     send_chart,
     send_points,
     send_style,
     send_text,
 )
-from .series import Sketch
-from .track_chart import Chart, draw_track
+from .series import SeriesBuilder
+from .track_chart import TrackChart, draw_track
 
 ROWS = [1.3, 0.9, 1.0, 0.9]  # heights: outputs, inputs, disturbances, residuals
 KEY = """\
@@ -44,7 +44,7 @@ class ReplayReview:
     def __init__(self, plan: Plan, recording: rr.RecordingStream, *, full: bool) -> None:
         self._recording, self._full = recording, full
         self._start_ns = plan.clock.start_ns
-        self._sketch = Sketch(plan.clock, plan.stats)
+        self._sketch = SeriesBuilder(plan.clock, plan.stats)
 
     def add(self, chunk: ReplayChunk) -> None:
         """Draw the next chunk."""
@@ -87,7 +87,7 @@ def open_replay_review(
     the end.
     """
     recording = _recording(plan)
-    with saving(recording, path):
+    with save_recording(recording, path):
         yield ReplayReview(plan, recording, full=full)
 
 
@@ -133,18 +133,18 @@ def _send_properties(recording: rr.RecordingStream, findings: Findings) -> None:
 
 
 def _blueprint(
-    yaw: list[Panel], surge: list[Panel], coefficients: list[Panel], drawn: Chart | None
+    yaw: list[Panel], surge: list[Panel], coefficients: list[Panel], drawn: TrackChart | None
 ) -> rrb.Blueprint:
     plots = rrb.Horizontal(
-        *(rrb.Vertical(*map(plot, column), row_shares=ROWS) for column in (yaw, surge))
+        *(rrb.Vertical(*map(plot_view, column), row_shares=ROWS) for column in (yaw, surge))
     )
     page: list[rrb.View | rrb.Container] = [rrb.TextDocumentView(origin="summary", name="summary")]
     if drawn is not None:
         page.insert(0, chart_view("track", drawn))
     side: list[rrb.View | rrb.Container] = [rrb.Horizontal(*page)]
     if coefficients:
-        side.append(rrb.Grid(*map(plot, coefficients), grid_columns=3, name="coefficients"))
-    return laid_out(
+        side.append(rrb.Grid(*map(plot_view, coefficients), grid_columns=3, name="coefficients"))
+    return make_blueprint(
         rrb.Horizontal(
             plots, rrb.Vertical(*side, row_shares=[2, 3][: len(side)]), column_shares=[1, 1]
         )

@@ -14,7 +14,7 @@ from shiplog.types import FloatArray
 
 from .panels import Panel
 from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Series
-from .track_chart import Chart
+from .track_chart import TrackChart
 
 ROWS_SENT = 1 << 16  # at once
 WHOLE_RUN = rrb.TimeAxis(
@@ -25,7 +25,7 @@ WHOLE_RUN = rrb.TimeAxis(
 
 
 @contextmanager
-def saving(recording: rr.RecordingStream, path: str | os.PathLike[str]) -> Iterator[None]:
+def save_recording(recording: rr.RecordingStream, path: str | os.PathLike[str]) -> Iterator[None]:
     """What is sent to the recording becomes the .rrd file `path` when all was sent.
 
     Raises `ShiplogError` where `path` cannot be written to, or not to the end.
@@ -74,7 +74,9 @@ def send_text(recording: rr.RecordingStream, entity: str, text: str) -> None:
     recording.log(entity, page, static=True)
 
 
-def send_chart(recording: rr.RecordingStream, origin: str, drawn: Chart, start_ns: int) -> None:
+def send_chart(
+    recording: rr.RecordingStream, origin: str, drawn: TrackChart, start_ns: int
+) -> None:
     """Draw a track."""
     thin, dot = rr.Radius.ui_points(0.8), rr.Radius.ui_points(5.0)
     track = rr.LineStrips2D([drawn.track], colors=[GREY], radii=thin)
@@ -99,7 +101,7 @@ def send_chart(recording: rr.RecordingStream, origin: str, drawn: Chart, start_n
     )
 
 
-def plot(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesView:
+def plot_view(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesView:
     """A view of a panel, over the whole trial unless told otherwise."""
     return rrb.TimeSeriesView(
         origin=panel.name,
@@ -110,20 +112,20 @@ def plot(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesView:
     )
 
 
-def until(secs: float) -> rrb.TimeAxis:
+def axis_until(secs: float) -> rrb.TimeAxis:
     """An axis from the start for so long."""
     ends = (rr.TimeRangeBoundary.absolute(seconds=at) for at in (0.0, secs))
     return rrb.TimeAxis(view_range=rr.TimeRange(*ends))
 
 
-def chart_view(origin: str, drawn: Chart) -> rrb.Spatial2DView:
+def chart_view(origin: str, drawn: TrackChart) -> rrb.Spatial2DView:
     """A view of a track."""
     low, high = drawn.bounds
     bounds = rrb.VisualBounds2D(x_range=(low[0], high[0]), y_range=(low[1], high[1]))
     return rrb.Spatial2DView(origin=origin, name=drawn.title, visual_bounds=bounds)
 
 
-def laid_out(content: rrb.View | rrb.Container) -> rrb.Blueprint:
+def make_blueprint(content: rrb.View | rrb.Container) -> rrb.Blueprint:
     """The content as all there is to be seen."""
     return rrb.Blueprint(
         content,

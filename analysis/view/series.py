@@ -51,12 +51,12 @@ class Series:
     spiky: bool = False  # where many points fall on a pixel, its extremes matter, not its mean
 
 
-class Sketch:
+class SeriesBuilder:
     """Draws a replay as its chunks come, and keeps of each series what a screen can show."""
 
     def __init__(self, clock: Clock, stats: SignalStats) -> None:
         self._clock, self._spiky = clock, clock.count > POINTS
-        self._thinned: dict[str, Thinning] = {}
+        self._thinned: dict[str, Decimator] = {}
         self._samples = {
             name: _Samples(longest)
             for name, longest in zip(PAPER_OUTPUTS, stats.longest_steps, strict=True)
@@ -72,13 +72,13 @@ class Sketch:
         for entity, series in (dense | _sparse(chunk)).items():
             if entity not in self._thinned:
                 stretch = _stretch(self._clock.count, len(series.lines))
-                self._thinned[entity] = Thinning(stretch * self._clock.dt_secs)
+                self._thinned[entity] = Decimator(stretch * self._clock.dt_secs)
             self._thinned[entity].add(series)
         return dense
 
     def result(self) -> dict[str, Series]:
         """All series, by entity, each thinned to about `POINTS`, once all chunks were added."""
-        return {entity: thinned.result() for entity, thinned in self._thinned.items()}
+        return {entity: decimated.result() for entity, decimated in self._thinned.items()}
 
     def _outputs(self, chunk: ReplayChunk) -> dict[str, Series]:
         drawn = {}
@@ -160,11 +160,11 @@ def measured_line(values: FloatArray, dt: float) -> tuple[FloatArray, FloatArray
     return rows * dt, columns[:, 0]
 
 
-def thinned(series: Series) -> Series:
+def decimated(series: Series) -> Series:
     """A series that is all there, thinned to about `POINTS`."""
     at = series.time_secs
     count = _stretch(len(at), len(series.lines))
-    thinning = Thinning(count * float(at[-1] - at[0]) / max(len(at) - 1, 1) if count else 0.0)
+    thinning = Decimator(count * float(at[-1] - at[0]) / max(len(at) - 1, 1) if count else 0.0)
     thinning.add(series)
     return thinning.result()
 
@@ -200,7 +200,7 @@ def _stretch(count: int, lines: int) -> int:
     return -(-count // max(1, POINTS // (2 * lines))) if count > POINTS else 0
 
 
-class Thinning:
+class Decimator:
     """Keeps of a series that comes in chunks each line's extremes in each of equal stretches.
 
     What is kept stands at its own time. The first point of every gap is kept, and both ends. A

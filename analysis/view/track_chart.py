@@ -22,7 +22,7 @@ HULL = np.array(  # forward and starboard, in lengths: bow, shoulders, stern
 
 
 @dataclass(frozen=True, eq=False)
-class Chart:
+class TrackChart:
     """What is drawn of a track."""
 
     title: str
@@ -35,7 +35,7 @@ class Chart:
     simulated: FloatArray | None = None  # (m, 2) another track, of a simulated ship
 
 
-def draw_track(findings: Findings, drawn: Mapping[str, Series]) -> Chart | None:
+def draw_track(findings: Findings, drawn: Mapping[str, Series]) -> TrackChart | None:
     """The chart of a track; None where no position is known."""
     track, compass = drawn["track"], drawn.get("heading")
     north, east = (line.values for line in track.lines)
@@ -44,17 +44,17 @@ def draw_track(findings: Findings, drawn: Mapping[str, Series]) -> Chart | None:
         heading = np.interp(track.time_secs, compass.time_secs, compass.lines[0].values)
     title = f"track, north up: {findings.track_origin}"
     positions = np.column_stack((north, east))
-    return chart(title, positions, track.time_secs, heading, findings.plan.vessel.length)
+    return make_chart(title, positions, track.time_secs, heading, findings.plan.vessel.length)
 
 
-def chart(
+def make_chart(
     title: str,
     positions: FloatArray,
     at: FloatArray,
     heading: FloatArray | None,
     length: float | None,
     simulated: FloatArray | None = None,
-) -> Chart | None:
+) -> TrackChart | None:
     """The chart of positions north and east, (k, 2) in m, at so many seconds, (k,).
 
     `heading`, (k,) rad, turns the ships, else the track does; `simulated`, (m, 2), is another
@@ -71,7 +71,7 @@ def chart(
     bar = _round_length(width / 4)
     foot = np.array([low[0], high[1] + 0.12 * width])
     margin = 0.08 * width
-    return Chart(
+    return TrackChart(
         title, points, at,
         _ships(points, None if heading is None else heading[known],
                max(length or 0.0, SYMBOL * width)),

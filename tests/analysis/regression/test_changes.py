@@ -18,7 +18,7 @@ from analysis.replay.replay import Analysis, analyse
 from analysis.report.replay_json import replay_json
 from analysis.report.replay_tables import replay_markdown, replay_tables
 from analysis.view.panels import history_panels
-from analysis.view.series import Sketch
+from analysis.view.series import SeriesBuilder
 from benchmarks.changed_ship import changed_trial
 from benchmarks.changes import Case, halfway, told, unchanged
 from recorders.simulated.sensors import suite
@@ -181,7 +181,7 @@ def test_a_replay_tells_of_it_in_words_in_a_table_and_in_numbers(changed: Analys
 
 
 def test_its_levels_are_drawn_and_meet_at_the_change(changed: Analysis) -> None:
-    sketch = Sketch(changed.findings.plan.clock, changed.findings.plan.stats)
+    sketch = SeriesBuilder(changed.findings.plan.clock, changed.findings.plan.stats)
     sketch.add(changed.as_chunk())
     panels = {panel.name: panel for panel in history_panels(changed.findings, sketch.result())}
     step = panels["coefficient_d"].series[-1]

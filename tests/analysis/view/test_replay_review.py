@@ -19,7 +19,7 @@ from analysis.replay.replay import Analysis, ReplayChunk, analyse
 from analysis.replay.track import EMPTY_TRACK
 from analysis.view.panels import Drawn, equation_panels, history_panels, limits
 from analysis.view.replay_review import write_replay_review
-from analysis.view.series import Line, Series, Sketch, Thinning, _Samples
+from analysis.view.series import Decimator, Line, Series, SeriesBuilder, _Samples
 from analysis.view.track_chart import draw_track
 from analysis.view.viewer import view_review
 from recorders.simulated.sensors import suite
@@ -68,7 +68,7 @@ def part_of(analysis: Analysis, start: int, stop: int) -> ReplayChunk:
 
 
 def drawn_of(analysis: Analysis) -> Drawn:
-    sketch = Sketch(analysis.findings.plan.clock, analysis.findings.plan.stats)
+    sketch = SeriesBuilder(analysis.findings.plan.clock, analysis.findings.plan.stats)
     sketch.add(analysis.as_chunk())
     return sketch.result()
 
@@ -289,7 +289,7 @@ def test_decimation_keeps_extremes_gaps_and_ends() -> None:
     second[50_000:60_000] = np.nan
     size = -(-count // (points // 4))
     for cuts in ((), (1, 12_345, 40_010, 70_000)):
-        thinning = Thinning(size * 0.1)
+        thinning = Decimator(size * 0.1)
         for part in np.split(np.column_stack((at, first, second)), cuts):
             lines = Line("first", part[:, 1], GREY), Line("second", part[:, 2], BLUE)
             thinning.add(Series("s", part[:, 0], lines))
@@ -326,7 +326,7 @@ def test_a_long_trial_is_thinned_and_in_full_it_is_not(
 
 def test_a_review_drawn_in_chunks_is_the_same(analysis: Analysis) -> None:
     whole = drawn_of(analysis)
-    sketch = Sketch(analysis.findings.plan.clock, analysis.findings.plan.stats)
+    sketch = SeriesBuilder(analysis.findings.plan.clock, analysis.findings.plan.stats)
     count = len(analysis.signals)
     for start in range(0, count, 777):
         sketch.add(part_of(analysis, start, min(start + 777, count)))
