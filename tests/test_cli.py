@@ -437,7 +437,7 @@ def test_a_contrary_rudder_is_said_when_a_table_is_converted(
         layout += f'[{name}]\ncolumn = {i}\nunit = "{unit}"\n'
     Path("layout.toml").write_text(layout)
     assert main(["convert", "run.txt", "run.mcap", "--layout", "layout.toml"]) == FINE
-    assert "its sign is contrary" in capsys.readouterr().err
+    assert "its sign is reversed" in capsys.readouterr().err
 
 
 def test_without_a_verb_the_help_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
