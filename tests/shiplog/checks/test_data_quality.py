@@ -154,8 +154,8 @@ def test_a_latitude_beyond_the_pole_is_impossible() -> None:
     gps = Channel("position", "gps", "deg", stamps, stamps, fixes, fields)
     assert warnings_of(gps) == [
         (
-            "/position/gps: 2 impossible positions, beyond 90 deg of latitude or 180 deg of longitude; "
-            "check the receiver and the columns of the layout"
+            "/position/gps: 2 impossible positions, beyond 90 deg of latitude or 180 deg of "
+            "longitude; check the receiver and the columns of the layout"
         )
     ]
 
