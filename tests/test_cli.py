@@ -399,7 +399,7 @@ def test_a_recording_that_was_killed_is_not_recorded_over(
 ) -> None:
     Path("k.mcap.part").write_bytes(b"hours of trial")
     simulate = "record simulate spiral --duration 20 -o k.mcap"
-    assert "not finished lies there" in refusal(capsys, FAILURE, *simulate.split())
+    assert "an unfinished recording lies there" in refusal(capsys, FAILURE, *simulate.split())
     assert Path("k.mcap.part").read_bytes() == b"hours of trial"
 
 
