@@ -13,6 +13,8 @@ import numba
 from numba import types
 from numba.extending import overload
 
+from .extensions import extension_sources
+
 F = TypeVar("F", bound=Callable[..., object])
 
 HOME = Path(__file__).parents[1]
@@ -21,16 +23,17 @@ OUTDATED_SECS = 86_400.0  # machine code of other sources may still be another p
 
 
 def _cache_folder() -> Path:
-    """The folder of the machine code, named after all our sources.
+    """Return the folder of the machine code, named by a digest of all sources it depends on.
 
     Numba checks the file of a compiled function alone. Its machine code also holds the functions
     it calls, the constants it reads and the layout of the NamedTuples it takes; a change in
-    another file would leave outdated machine code running.
+    another file would leave outdated machine code running. The equations of a ship model of
+    another package become a part of our loops, too.
     """
     digest = sha256()
-    for package in PACKAGES:
-        for path in sorted((HOME / package).rglob("*.py")):
-            digest.update(path.read_bytes())
+    own = (file for package in PACKAGES for file in (HOME / package).rglob("*.py"))
+    for path in sorted({*own, *extension_sources("shiplog.ship_models")}):
+        digest.update(path.read_bytes())
     where = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _default_folder()
     return where / f"shiplog-{digest.hexdigest()[:16]}"
 

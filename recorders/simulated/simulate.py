@@ -54,7 +54,7 @@ class SimulatedTrial:
         ]
         for i in range(len(ends) + 1):
             yield tuple(
-                _part(channel, cut[i], cut[i + 1])
+                channel.part(cut[i], cut[i + 1])
                 for channel, cut in zip(self.channels, cuts, strict=True)
             )
 
@@ -196,17 +196,3 @@ def _channel(
     components = ("north", "east") if name == "position" else ()
     unit = unit or CATALOGUE[name].unit
     return Channel(name, source, unit, measured, received, values, components)
-
-
-def _part(channel: Channel, start: int, stop: int) -> Channel:
-    cut = slice(start, stop)
-    return Channel(
-        channel.name,
-        channel.source,
-        channel.unit,
-        channel.measured_ns[cut],
-        channel.received_ns[cut],
-        channel.values[cut],
-        channel.fields,
-        channel.metadata,
-    )

@@ -231,7 +231,7 @@ def _interpolate(
         )
 
 
-@compiled_within
+@compiled_in_caller
 def _store(out: ComplexArray, k: int, values: tuple[complex, complex, complex, complex]) -> None:
     for i in range(4):
         out[k, i] = values[i]

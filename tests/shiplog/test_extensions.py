@@ -6,7 +6,7 @@ import pytest
 from extensions import declare
 
 from shiplog import ShiplogError, UsageError
-from shiplog.extensions import extension_names, load_extension
+from shiplog.extensions import extension_names, extension_sources, load_extension
 
 GROUP = "shiplog.for_tests"
 
@@ -80,3 +80,12 @@ def test_a_name_of_two_packages_is_reported(packages: Path) -> None:
     declare(packages, "other", GROUP, place="sound_module:PLACE")
     with pytest.raises(ShiplogError, match="'place' is declared by one and other; remove one"):
         load("place")
+
+
+def test_the_sources_of_a_package_are_listed_without_importing_it(packages: Path) -> None:
+    (packages / "folder").mkdir()
+    for file in ("folder/__init__.py", "folder/part.py"):
+        (packages / file).write_text("raise RuntimeError\n", encoding="utf-8")
+    declare(packages, "broken", GROUP, one="broken_module:A", two="folder.part:B", three="absent:C")
+    found = [file.relative_to(packages).as_posix() for file in extension_sources(GROUP)]
+    assert found == ["broken_module.py", "folder/__init__.py", "folder/part.py"]
