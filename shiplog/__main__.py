@@ -1,4 +1,4 @@
-"""`python -m shiplog`."""
+"""Entry point of ``python -m shiplog``."""
 
 from shiplog.cli.main import main
 

@@ -1,4 +1,8 @@
-"""numba's `njit` with a type: the compiled functions read like the equations they are."""
+"""Compilation of numerical loops by numba, with a cache of machine code on disk.
+
+`compiled` is numba's `njit` with a type. Its cache folder is named after all sources of the three
+packages, so that a change in any of them compiles everything anew.
+"""
 
 import os
 import shutil
@@ -13,35 +17,32 @@ import numba
 from numba import types
 from numba.extending import overload
 
-from .extensions import extension_sources
-
 F = TypeVar("F", bound=Callable[..., object])
 
-HOME = Path(__file__).parents[1]
+PROJECT_FOLDER = Path(__file__).parents[1]
 PACKAGES = ("shiplog", "recorders", "analysis")
-OUTDATED_SECS = 86_400.0  # machine code of other sources may still be another process's
+MIN_AGE_TO_DELETE_SECS = 86_400.0  # a younger cache may belong to a running process
 
 
 def _cache_folder() -> Path:
-    """Return the folder of the machine code, named by a digest of all sources it depends on.
+    """Return the folder of the machine code, named after a hash of all sources.
 
-    Numba checks the file of a compiled function alone. Its machine code also holds the functions
-    it calls, the constants it reads and the layout of the NamedTuples it takes; a change in
-    another file would leave outdated machine code running. The equations of a ship model of
-    another package become a part of our loops, too.
+    Numba's own cache checks only the file of a compiled function. The machine code also contains
+    the functions it calls, the constants it reads and the layout of the NamedTuples it takes;
+    after a change in another file, outdated machine code would run.
     """
     digest = sha256()
-    own = (file for package in PACKAGES for file in (HOME / package).rglob("*.py"))
-    for path in sorted({*own, *extension_sources("shiplog.ship_models")}):
-        digest.update(path.read_bytes())
-    where = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _default_folder()
-    return where / f"shiplog-{digest.hexdigest()[:16]}"
+    for package in PACKAGES:
+        for path in sorted((PROJECT_FOLDER / package).rglob("*.py")):
+            digest.update(path.read_bytes())
+    parent = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _default_cache_parent()
+    return parent / f"shiplog-{digest.hexdigest()[:16]}"
 
 
-def _default_folder() -> Path:
-    """The folder beside the package, or the user's cache folder where that is not writable.
+def _default_cache_parent() -> Path:
+    """Return the folder beside the package, or the user's cache if that is not writable.
 
-    Never a folder in which another user could have placed files: their code would be run.
+    It is never a folder where another user could place files, since their code would be executed.
     """
     beside = Path(__file__).parent
     if os.access(beside, os.W_OK):
@@ -50,46 +51,63 @@ def _default_folder() -> Path:
     try:
         own.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError:
-        return Path(tempfile.mkdtemp(prefix="shiplog-"))  # for this run alone
+        return Path(tempfile.mkdtemp(prefix="shiplog-"))  # for this run only
     return own
 
 
-def _forget_others(kept: Path) -> None:
-    for other in kept.parent.glob("shiplog-*"):
-        if other != kept and time.time() - other.stat().st_mtime > OUTDATED_SECS:
+def _delete_outdated_caches(current: Path) -> None:
+    for other in current.parent.glob("shiplog-*"):
+        if other != current and time.time() - other.stat().st_mtime > MIN_AGE_TO_DELETE_SECS:
             shutil.rmtree(other, ignore_errors=True)
 
 
 CACHE_FOLDER = _cache_folder()
 numba.config.CACHE_DIR = str(CACHE_FOLDER)
-_forget_others(CACHE_FOLDER)
+_delete_outdated_caches(CACHE_FOLDER)
 
 
 def compiled(function: F) -> F:
-    """Compile `function` on its first call, and keep the machine code for later runs."""
+    """Compile a function on its first call and keep the machine code for later runs.
+
+    Division by zero gives infinity or NaN, as in numpy.
+    """
     return cast("F", numba.njit(cache=True, error_model="numpy")(function))
 
 
 def is_compiled(package: str) -> bool:
-    """Whether machine code of one of our packages is kept from an earlier run."""
-    folders = {path.parent.name for path in (HOME / package).rglob("*.py")}
+    """Whether the cache has machine code of one of the `PACKAGES` from an earlier run."""
+    folders = {path.parent.name for path in (PROJECT_FOLDER / package).rglob("*.py")}
     return any(next(CACHE_FOLDER.rglob(f"{folder}_*/*.nbi"), None) for folder in folders)
 
 
 def compiled_in_caller(function: F) -> F:
-    """Compile `function` as a part of the compiled function that calls it, and keep it there.
+    """Compile a function as part of each compiled function that calls it.
 
-    For what many modules share and each compiles in its own way: kept by itself, its machine code
-    would outlive a change of the module that it was compiled for.
+    For functions that several modules share and each compiles differently, by `overload_for`. With
+    a cache entry of its own, the machine code would outlive a change of the module for which it
+    was compiled.
     """
     return cast("F", numba.njit(error_model="numpy")(function))
 
 
 def overload_for(generic: Callable[..., object], kind: type) -> Callable[[F], F]:
-    """Make a function what compiled code calls as `generic` when its first argument is a `kind`.
+    """Register a function as the implementation of `generic` for one type of first argument.
 
-    `kind` is a NamedTuple, float or complex. Numba would have to compile anew in each process what
-    takes a function as an argument; a type it knows again.
+    Compiled code that calls `generic` with a first argument of type `kind` calls the registered
+    function instead. This replaces functions as arguments, which numba would compile anew in each
+    process; types it finds in its cache.
+
+    Parameters
+    ----------
+    generic
+        The function that compiled code calls. Its own body is for Python.
+    kind
+        A class of NamedTuple, float or complex.
+
+    Returns
+    -------
+    decorator
+        Registers the function it is given, and returns it unchanged.
     """
     number = {float: types.Float, complex: types.Complex}.get(kind)
 

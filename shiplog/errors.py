@@ -1,21 +1,25 @@
-"""The errors a user can meet; each message names the thing and the remedy, the path last."""
+"""Exceptions that a user's files or requests can cause.
+
+Each message is one line that names the object, the place and the remedy, the path last. Only the
+command line catches them.
+"""
 
 
 class ShiplogError(Exception):
-    """Something in the user's files or request cannot be used as it is (exit code 1)."""
+    """A file or a request that cannot be used as it is (exit code 1)."""
 
 
 class UsageError(ShiplogError):
-    """The request itself is wrong: an unknown name, a number out of range (exit code 2)."""
+    """A wrong request, such as an unknown name or a number out of range (exit code 2)."""
 
 
 class LogError(ShiplogError):
-    """A log that cannot be read, or that does not hold what was asked of it."""
+    """A log that cannot be read, or that does not hold the requested data."""
 
 
 class VesselError(ShiplogError):
-    """A vessel file with faults; the message lists all of them."""
+    """A vessel file with errors; the message lists all of them."""
 
 
 class LayoutError(ShiplogError):
-    """A table's layout file with faults, or a table that does not fit its layout."""
+    """A layout file with errors, or a table that does not match its layout."""

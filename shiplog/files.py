@@ -1,4 +1,7 @@
-"""Writing files so that a final name never holds half of anything."""
+"""Atomic writing of output files.
+
+An output appears under its final name only when it is complete.
+"""
 
 import os
 from collections.abc import Iterator
@@ -10,12 +13,32 @@ from .errors import ShiplogError
 
 @contextmanager
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a sibling name to write to; it takes the final name only when the block succeeds.
+    """Yield a temporary path to write to, and rename it to `path` when the block succeeds.
 
-    Raises `ShiplogError` where the place cannot be written to. After an error the partial file
-    is gone and whatever stood under the final name stands there still.
+    The temporary file is in the folder of the final one. After an error it is deleted, and a file
+    that existed under the final name is unchanged. A symbolic link is kept: its target is replaced.
+    A device or pipe is written to directly.
+
+    Parameters
+    ----------
+    path
+        The final name.
+
+    Raises
+    ------
+    ShiplogError
+        The file cannot be written. A folder given as `path` is rejected before the block runs.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     with atomic_write(f"{folder}/out.txt") as part:
+    ...         _ = part.write_text("complete")
+    ...     Path(f"{folder}/out.txt").read_text()
+    'complete'
     """
-    final = Path(os.path.realpath(path))  # a link stays a link
+    final = Path(os.path.realpath(path))
     if is_device(final):
         yield final
         return
@@ -36,17 +59,15 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def is_device(path: Path) -> bool:
-    """Whether it is a device or a pipe: written to as it is, for it holds nothing to be spoilt."""
+    """Whether a path is a device or a pipe, which is written to directly."""
     return path.exists() and not (path.is_file() or path.is_dir())
 
 
 def write_error(path: Path, error: OSError) -> ShiplogError:
-    """The error of an output that cannot be written, with its remedy."""
+    """Return the exception for an output that cannot be written, with its cause and remedy."""
     if path.is_dir():
         return ShiplogError(f"cannot write: it is a folder; name a file in it: {path}")
     if not path.parent.is_dir():
-        return ShiplogError(
-            f"cannot write: there is no folder {path.parent}; make it first: {path}"
-        )
+        return ShiplogError(f"cannot write: there is no folder {path.parent}; create it: {path}")
     reason = (error.strerror or str(error)).lower()
     return ShiplogError(f"cannot write: {reason}; choose another place with -o: {path}")

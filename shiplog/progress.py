@@ -1,21 +1,28 @@
-"""Progress of long work: the callback that reports it."""
+"""Progress callback of long computations."""
 
 from typing import Protocol
 
 
 class ProgressCallback(Protocol):
-    """A callable that is given each step of long work as it begins and goes on.
+    """A callable that receives each step of a long computation as it begins and advances.
 
     Parameters
     ----------
     step
         What is being done, in a few words, with counts: ``"model 3 of 7, run 2 of 6"``.
     share
-        How much of the whole work is done, 0 to 1; None where it is unknown.
+        The share of the whole work that is done, 0 to 1; None if it is unknown.
+
+    Examples
+    --------
+    >>> def print_progress(step, share=None, /):
+    ...     print(step if share is None else f"{step}: {share:.0%}")
+    >>> print_progress("replay", 0.5)
+    replay: 50%
     """
 
     def __call__(self, step: str, share: float | None = None, /) -> None: ...  # noqa: D102
 
 
 def no_progress(_step: str, _share: float | None = None, /) -> None:
-    """Report nothing."""
+    """Report nothing: the default callback."""

@@ -1,8 +1,8 @@
-"""The channel catalogue, and the units at the border.
+"""Channel catalogue and unit conversion.
 
-Inside shiplog everything is SI and radians, but for `rpm`, which is written as the field writes
-it. Units are converted here and nowhere else, when a foreign file is read or a person is shown
-a number.
+All values in shiplog are in SI units and radians, except `rpm`, which is kept in revolutions per
+minute as usual in the field. Units are converted only where a file of another program is read and
+where a number is shown to a person.
 """
 
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ from math import inf, pi
 from .errors import UsageError
 
 UNITS: dict[str, tuple[str, float]] = {
-    # name: (SI unit, factor to it)
+    # name: (SI unit, factor to convert to it)
     "1": ("1", 1.0),
     "s": ("s", 1.0),
     "ms": ("s", 1e-3),
@@ -42,16 +42,34 @@ GEOGRAPHIC = ("latitude", "longitude", "altitude")  # deg, deg, m: components of
 
 @dataclass(frozen=True)
 class ChannelKind:
-    """What a channel of one name means, whichever sensor it comes from."""
+    """The meaning of a channel name, whichever sensor the channel comes from.
+
+    Attributes
+    ----------
+    name
+        The name of the channel.
+    unit
+        The unit of its values in shiplog.
+    positive
+        The sign convention in words; for wind, what is measured.
+    display_unit
+        The unit in which it is shown to people.
+    lowest, highest
+        The physically possible range, in `unit`; values outside it are measurement errors.
+    circular
+        Whether it is an angle that wraps at a full turn.
+    commanded
+        Whether it is an input of the ship, which acts between its samples too.
+    """
 
     name: str
     unit: str
-    positive: str  # the sign convention, in words
+    positive: str
     display_unit: str
-    lowest: float = -inf  # beyond these a value is physically impossible on a ship
+    lowest: float = -inf
     highest: float = inf
-    circular: bool = False  # an angle that wraps
-    commanded: bool = False  # an input of the ship: it acts between its samples too
+    circular: bool = False
+    commanded: bool = False
 
 
 CATALOGUE: dict[str, ChannelKind] = {
@@ -80,23 +98,40 @@ CATALOGUE: dict[str, ChannelKind] = {
 }
 
 
-def kind_of(channel: str) -> ChannelKind:
-    """The catalogue's entry for a channel.
+def channel_kind(name: str) -> ChannelKind:
+    """Return the catalogue entry of a channel name.
 
-    Raises `UsageError` for a name that is not in the catalogue.
+    Raises
+    ------
+    UsageError
+        The name is not in the catalogue.
+
+    Examples
+    --------
+    >>> channel_kind("rudder").positive
+    'turns the bow to starboard'
     """
     try:
-        return CATALOGUE[channel]
+        return CATALOGUE[name]
     except KeyError:
         raise UsageError(
-            f"no channel is called {channel!r}{did_you_mean(channel, CATALOGUE)}"
+            f"no channel is called {name!r}{did_you_mean(name, CATALOGUE)}; "
+            f"the catalogue has {', '.join(CATALOGUE)}"
         ) from None
 
 
 def conversion_factor(unit: str, to: str) -> float:
-    """The number to multiply a value in `unit` by to have it in `to`.
+    """Return the number by which a value in `unit` is multiplied to have it in the unit `to`.
 
-    Raises `UsageError` for a unit nobody knows, or for two that do not measure the same thing.
+    Raises
+    ------
+    UsageError
+        One of the units is unknown, or they do not measure the same quantity.
+
+    Examples
+    --------
+    >>> conversion_factor("min", "s")
+    60.0
     """
     for name in (unit, to):
         if name not in UNITS:
@@ -105,11 +140,19 @@ def conversion_factor(unit: str, to: str) -> float:
             )
     (base, to_base), (other_base, to_other) = UNITS[unit], UNITS[to]
     if base != other_base:
-        raise UsageError(f"{unit!r} cannot be turned into {to!r}: one is in {base}, the other not")
+        raise UsageError(
+            f"cannot convert {unit!r} to {to!r}: their SI units are {base} and {other_base}"
+        )
     return to_base / to_other
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """`; did you mean 'yaw_rate'?` where a known name is near, else an empty string."""
+    """Return a hint for an error message, or an empty string where no known name is similar.
+
+    Examples
+    --------
+    >>> did_you_mean("ruder", ["rudder", "rpm"])
+    "; did you mean 'rudder'?"
+    """
     near = get_close_matches(name, list(known), n=1)
     return f"; did you mean {near[0]!r}?" if near else ""

@@ -1,3 +1,3 @@
-"""The version of shiplog."""
+"""Version number of shiplog."""
 
 __version__ = "0.1.0"

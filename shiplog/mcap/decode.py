@@ -1,16 +1,12 @@
-"""The bytes of a chunk to columns of messages.
+"""Decoding of the data of an MCAP chunk to columns of samples by channel.
 
-A chunk whose messages are all of one length needs neither loop nor index, one of several lengths
-needs the message index to do without a loop. Where the index does not account for every byte the
-chunk is walked. Either way one gather takes all messages of a channel; those that are not laid
-out as ours are kept one by one, to be decoded.
+All messages of a channel are taken at once if they have the fixed layout of shiplog's schemas.
+Others are kept as bytes, to be decoded one by one.
 """
 
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
-from typing import Any
 
 import numpy as np
 import zstandard
@@ -18,98 +14,170 @@ from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from numpy.typing import NDArray
 
 from shiplog.types import FloatArray, TimeArray
 
-from .records import INDEX_ENTRY, MESSAGE_HEAD, RECORD_HEAD
+from .locate import (
+    Offsets,
+    complete_records,
+    gather,
+    locate_by_index,
+    locate_by_size,
+    record_sizes,
+)
+from .records import MESSAGE_HEAD, RECORD_HEAD
 from .schema import METADATA_NAME, VESSEL_ATTACHMENT, Schema, schema_named
 
-MALFORMED = (  # what decoders raise on damaged bytes: no one family
+MALFORMED = (  # what the decoders raise on damaged bytes; the exceptions have no common base
     McapError, zstandard.ZstdError, struct.error,
     ValueError, OverflowError, RuntimeError, MemoryError,
 )  # fmt: skip
 
-Offsets = NDArray[np.intp]
-
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """Samples of one channel as they stood in one chunk: (n,) times and (n, k) values."""
+class SampleBlock:
+    """The samples of one channel in one MCAP chunk.
+
+    Attributes
+    ----------
+    received, measured
+        (n,) times, ns.
+    values
+        (n, k), or n messages that are still to be decoded since their layout is not fixed.
+    """
 
     received: TimeArray
     measured: TimeArray
-    values: FloatArray | list[bytes]  # messages still to be decoded, where not laid out as ours
+    values: FloatArray | list[bytes]
 
 
 @dataclass
-class Contents:
-    """What the scan of a file gathers."""
+class McapContents:
+    """What the scan of a file has collected so far.
+
+    Attributes
+    ----------
+    schemas, channels
+        The schema and channel records, by id.
+    selected
+        The ids of the channels whose messages are kept; None for all.
+    blocks
+        The samples not yet taken by `drain`, by channel id, in the order of the file.
+    pending_samples
+        The number of samples in `blocks`.
+    total_samples
+        The number of samples read so far.
+    undescribed
+        Messages whose channel is not described yet: the data, the channel id, the offsets.
+    undescribed_counts
+        The number of such messages, by channel id.
+    keep_undescribed
+        Whether to keep them, because a later record may describe their channel.
+    metadata
+        Text about the trial, by key.
+    vessel_toml
+        The attached vessel file, or None.
+    in_order
+        Whether each MCAP chunk was received after the one before, by its own times.
+    latest_ns
+        The last time of reception in the MCAP chunks so far, ns.
+    finished
+        Whether the file has its footer.
+    truncated
+        Whether an unfinished file ends within a record.
+    damage
+        One warning for each damaged part.
+    """
 
     schemas: dict[int, records.Schema] = field(default_factory=dict)
     channels: dict[int, records.Channel] = field(default_factory=dict)
-    wanted: frozenset[int] | None = None  # the channels whose messages are kept; None: all
-    pieces: dict[int, list[Piece]] = field(default_factory=dict)  # by channel, as in the file
-    held: int = 0  # samples in the pieces
-    taken: int = 0  # samples that ever were
-    orphans: list[tuple[bytes, int, Offsets]] = field(default_factory=list)
-    orphaned: dict[int, int] = field(default_factory=dict)  # how many, by channel
-    keeps_orphans: bool = True  # messages whose channel is not described yet, but may be later
+    selected: frozenset[int] | None = None
+    blocks: dict[int, list[SampleBlock]] = field(default_factory=dict)
+    pending_samples: int = 0
+    total_samples: int = 0
+    undescribed: list[tuple[bytes, int, Offsets]] = field(default_factory=list)
+    undescribed_counts: dict[int, int] = field(default_factory=dict)
+    keep_undescribed: bool = True
     metadata: dict[str, str] = field(default_factory=dict)
     vessel_toml: str | None = None
-    in_order: bool = True  # each chunk says that it was received after the one before
-    latest_ns: int = 0  # when the last of those was
+    in_order: bool = True
+    latest_ns: int = 0
     finished: bool = False
-    cut: bool = False  # unfinished, and what it ends with is no whole record
+    truncated: bool = False
     damage: list[str] = field(default_factory=list)
 
-    def drain(self) -> dict[int, list[Piece]]:
-        """Hand out the pieces gathered so far and hold them no more."""
-        pieces, self.pieces, self.held = self.pieces, {}, 0
-        return pieces
+    def drain(self) -> dict[int, list[SampleBlock]]:
+        """Return the blocks collected so far, by channel id, and release them."""
+        blocks, self.blocks, self.pending_samples = self.blocks, {}, 0
+        return blocks
 
 
-def take(raw: bytes, index: list[bytes], contents: Contents) -> bool:
-    """Sort messages that follow one another into the channels' pieces; whether there were any."""
-    start = _described(raw, contents)
-    located = _even(raw, start) or _indexed(raw, start, index) or _walked(raw, start, contents)
+def collect_messages(data: bytes, indexes: list[bytes], contents: McapContents) -> bool:
+    """Add the messages in some data to the contents, by channel.
+
+    Parameters
+    ----------
+    data
+        Consecutive records: the data of an MCAP chunk, or messages outside of MCAP chunks.
+    indexes
+        The content of the message index records of the MCAP chunk.
+    contents
+        Receives the samples, and the schemas and channels that the data describe.
+
+    Returns
+    -------
+    found
+        Whether there were any messages.
+    """
+    start = _read_descriptions(data, contents)
+    located = (
+        locate_by_size(data, start)
+        or locate_by_index(data, start, indexes)
+        or _locate_by_walk(data, start, contents)
+    )
     for channel_id, offsets in located.items():
-        _take_channel(raw, channel_id, offsets, contents)
+        _collect_channel(data, channel_id, offsets, contents)
     return bool(located)
 
 
-def take_orphans(contents: Contents) -> None:
-    """Messages that came before what describes them, the chunk with that being damaged."""
-    orphans, contents.orphans = contents.orphans, []
-    counts, contents.orphaned = contents.orphaned, {}
-    later, contents.pieces = contents.pieces, {}
-    for orphan in orphans:
-        _take_channel(*orphan, contents)
-    for channel_id, pieces in later.items():
-        contents.pieces.setdefault(channel_id, []).extend(pieces)
-    contents.orphans = []
-    lost = sum(count for channel_id, count in counts.items() if _unknown(channel_id, contents))
+def collect_undescribed(contents: McapContents) -> None:
+    """Add the messages whose channel was described only later, and report those never described.
+
+    A channel is described after its messages when the MCAP chunk that describes it first is
+    damaged. The messages come before those that were added already.
+    """
+    undescribed, contents.undescribed = contents.undescribed, []
+    counts, contents.undescribed_counts = contents.undescribed_counts, {}
+    later, contents.blocks = contents.blocks, {}
+    for messages in undescribed:
+        _collect_channel(*messages, contents)
+    for channel_id, blocks in later.items():
+        contents.blocks.setdefault(channel_id, []).extend(blocks)
+    contents.undescribed = []
+    lost = sum(
+        count for channel_id, count in counts.items() if not _is_described(channel_id, contents)
+    )
     if lost:
-        contents.damage.append(f"lost {lost} samples: nothing describes their channel any more")
+        contents.damage.append(f"lost {lost} samples: the description of their channel is damaged")
 
 
-def keep_record(opcode: int, content: bytes, contents: Contents) -> None:
-    """Keep what a record other than a message says, if it concerns us."""
+def read_record(opcode: int, content: bytes, contents: McapContents) -> None:
+    """Add a record other than a message to the contents; report it if it is damaged."""
     try:
-        _keep(opcode, ReadDataStream(BytesIO(content)), contents)
+        _read_record(opcode, ReadDataStream(BytesIO(content)), contents)
     except MALFORMED as error:
-        contents.damage.append(f"left out a damaged record: {error}")
+        contents.damage.append(f"skipped a damaged record: {error}")
 
 
 def schema_of(channel: records.Channel, schemas: dict[int, records.Schema]) -> Schema | None:
-    """Ours, by which a channel's messages are read; None for what others wrote."""
+    """Return shiplog's schema for a channel's messages; None for messages of other programs."""
     if channel.message_encoding != "protobuf":
         return None
     schema = schemas.get(channel.schema_id)
     return schema_named(schema.name) if schema else None
 
 
-def _keep(opcode: int, stream: ReadDataStream, contents: Contents) -> None:
+def _read_record(opcode: int, stream: ReadDataStream, contents: McapContents) -> None:
     if opcode == Opcode.SCHEMA:
         schema = records.Schema.read(stream)
         contents.schemas.setdefault(schema.id, schema)
@@ -126,142 +194,73 @@ def _keep(opcode: int, stream: ReadDataStream, contents: Contents) -> None:
             contents.vessel_toml = attachment.data.decode()
 
 
-def _records(raw: bytes, at: int) -> Iterator[tuple[int, int, int]]:
-    """The records from `at` on that are whole: opcode, where the record starts, where it ends."""
-    while at + RECORD_HEAD.size <= len(raw):
-        opcode, length = RECORD_HEAD.unpack_from(raw, at)
-        end = at + RECORD_HEAD.size + length
-        if opcode == 0 or end > len(raw):
-            return
-        yield opcode, at, end
-        at = end
-
-
-def _described(raw: bytes, contents: Contents) -> int:
-    """Keep the schemas and channels that stand before the first message; where that stands."""
+def _read_descriptions(data: bytes, contents: McapContents) -> int:
+    """Read the schemas and channels before the first message, and return its offset."""
     end = 0
-    for opcode, start, end in _records(raw, 0):
+    for opcode, start, end in complete_records(data, 0):
         if opcode == Opcode.MESSAGE:
             return start
-        keep_record(opcode, raw[start + RECORD_HEAD.size : end], contents)
+        read_record(opcode, data[start + RECORD_HEAD.size : end], contents)
     return end
 
 
-def _even(raw: bytes, start: int) -> dict[int, Offsets]:
-    """Where each channel's messages stand, if from `start` on there are but messages of one size.
-
-    The lengths are those a walk would go by, so nothing has to be believed.
-    """
-    if len(raw) - start < MESSAGE_HEAD.itemsize:
-        return {}
-    size = RECORD_HEAD.size + RECORD_HEAD.unpack_from(raw, start)[1]
-    count, rest = divmod(len(raw) - start, size)
-    if rest or size < MESSAGE_HEAD.itemsize:
-        return {}
-    heads = np.ndarray((count,), MESSAGE_HEAD, raw, start, (size,))
-    if np.any(heads["opcode"] != Opcode.MESSAGE) or np.any(
-        heads["length"] != size - RECORD_HEAD.size
-    ):
-        return {}
-    channels = heads["channel"]
-    offsets = start + size * np.argsort(channels, kind="stable")
-    counts = np.bincount(channels)
-    here = np.flatnonzero(counts)
-    parts = np.split(offsets, np.cumsum(counts[here])[:-1])
-    return dict(zip(here.tolist(), parts, strict=True))
-
-
-def _indexed(raw: bytes, start: int, index: list[bytes]) -> dict[int, Offsets]:
-    """Where each channel's messages stand by the index, which no checksum protects.
-
-    Nothing where it does not account for every byte from the first message on: it is damaged, or
-    schemas and channels stand among the messages.
-    """
-    located: dict[int, Offsets] = {}
-    covered = start
-    for entry in index:
-        if len(entry) == 6:  # the channel's id, the length of the array; the rest is entries
-            continue
-        if len(entry) % INDEX_ENTRY.itemsize != 6:
-            return {}
-        channel_id = int.from_bytes(entry[:2], "little")
-        offsets = np.frombuffer(entry, INDEX_ENTRY, offset=6)["offset"].astype(np.intp)
-        ascending = offsets[0] >= start and bool(np.all(offsets[1:] > offsets[:-1]))
-        too_far = offsets[-1] > len(raw) - MESSAGE_HEAD.itemsize
-        if channel_id in located or not ascending or too_far:
-            return {}
-        heads = _gather(raw, offsets, MESSAGE_HEAD)
-        if np.any(heads["opcode"] != Opcode.MESSAGE) or np.any(heads["channel"] != channel_id):
-            return {}
-        located[channel_id] = offsets
-        covered += int(_sizes(heads).sum())
-    return located if covered == len(raw) else {}
-
-
-def _walked(raw: bytes, start: int, contents: Contents) -> dict[int, Offsets]:
-    """Go through a chunk record by record: where each channel's messages stand."""
-    found: dict[int, list[int]] = {}
-    for opcode, at, end in _records(raw, start):
+def _locate_by_walk(data: bytes, start: int, contents: McapContents) -> dict[int, Offsets]:
+    """Locate each channel's messages record by record, and read the other records."""
+    located: dict[int, list[int]] = {}
+    for opcode, at, end in complete_records(data, start):
         if opcode != Opcode.MESSAGE:
-            keep_record(opcode, raw[at + RECORD_HEAD.size : end], contents)
+            read_record(opcode, data[at + RECORD_HEAD.size : end], contents)
         elif end - at >= MESSAGE_HEAD.itemsize:
-            (channel_id,) = struct.unpack_from("<H", raw, at + RECORD_HEAD.size)
-            found.setdefault(channel_id, []).append(at)
-    return {channel_id: np.array(offsets, np.intp) for channel_id, offsets in found.items()}
+            (channel_id,) = struct.unpack_from("<H", data, at + RECORD_HEAD.size)
+            located.setdefault(channel_id, []).append(at)
+    return {channel_id: np.array(offsets, np.intp) for channel_id, offsets in located.items()}
 
 
-def _unknown(channel_id: int, contents: Contents) -> bool:
-    """Whether nothing read so far says what a channel's messages are."""
+def _is_described(channel_id: int, contents: McapContents) -> bool:
+    """Whether the channel, and the schema it refers to, have been read."""
     channel = contents.channels.get(channel_id)
-    return channel is None or bool(channel.schema_id and channel.schema_id not in contents.schemas)
+    if channel is None:
+        return False
+    return not channel.schema_id or channel.schema_id in contents.schemas
 
 
-def _take_channel(raw: bytes, channel_id: int, offsets: Offsets, contents: Contents) -> None:
-    if _unknown(channel_id, contents):
-        contents.orphaned[channel_id] = contents.orphaned.get(channel_id, 0) + len(offsets)
-        if contents.keeps_orphans:
-            contents.orphans.append((raw, channel_id, offsets))
+def _collect_channel(
+    data: bytes, channel_id: int, offsets: Offsets, contents: McapContents
+) -> None:
+    if not _is_described(channel_id, contents):
+        counts = contents.undescribed_counts
+        counts[channel_id] = counts.get(channel_id, 0) + len(offsets)
+        if contents.keep_undescribed:
+            contents.undescribed.append((data, channel_id, offsets))
         return
     schema = schema_of(contents.channels[channel_id], contents.schemas)
-    if schema is None or (contents.wanted is not None and channel_id not in contents.wanted):
+    if schema is None or (contents.selected is not None and channel_id not in contents.selected):
         return
-    piece = _fixed(raw, offsets, schema) or _ragged(raw, offsets)
-    contents.pieces.setdefault(channel_id, []).append(piece)
-    contents.held += len(offsets)
-    contents.taken += len(offsets)
+    block = _fixed_width_block(data, offsets, schema) or _undecoded_block(data, offsets)
+    contents.blocks.setdefault(channel_id, []).append(block)
+    contents.pending_samples += len(offsets)
+    contents.total_samples += len(offsets)
 
 
-def _fixed(raw: bytes, offsets: Offsets, schema: Schema) -> Piece | None:
-    """Messages laid out as ours, all by one gather; None where one of them is not."""
+def _fixed_width_block(data: bytes, offsets: Offsets, schema: Schema) -> SampleBlock | None:
+    """Decode messages of the schema's fixed layout at once; None if one of them has another."""
     if schema.dtype is None:
         return None
     dtype = np.dtype(MESSAGE_HEAD.descr + schema.dtype.descr)
-    if offsets[-1] + dtype.itemsize > len(raw):
+    if offsets[-1] + dtype.itemsize > len(data):
         return None
-    rows = _gather(raw, offsets, dtype)
+    rows = gather(data, offsets, dtype)
     expected = {"length": dtype.itemsize - RECORD_HEAD.size} | schema.tags
     if any(np.any(rows[name] != value) for name, value in expected.items()):
         return None
     values = np.stack([rows[name] for name in schema.fields], axis=1)
-    return Piece(rows["received"].astype(np.int64), rows["measured"].astype(np.int64), values)
+    return SampleBlock(rows["received"].astype(np.int64), rows["measured"].astype(np.int64), values)
 
 
-def _ragged(raw: bytes, offsets: Offsets) -> Piece:
-    heads = _gather(raw, offsets, MESSAGE_HEAD)
-    ends = offsets + _sizes(heads)
-    starts = offsets + MESSAGE_HEAD.itemsize
-    messages = [raw[a:z] for a, z in zip(starts.tolist(), ends.tolist(), strict=True)]
-    return Piece(heads["received"].astype(np.int64), heads["measured"].astype(np.int64), messages)
-
-
-def _gather(raw: bytes, offsets: Offsets, dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    """The structures that stand at these offsets, wherever that is."""
-    blank = np.dtype((np.void, dtype.itemsize))  # copied as one thing each, whatever the fields
-    anywhere: NDArray[Any] = np.ndarray((len(raw) - dtype.itemsize + 1,), blank, raw, 0, (1,))
-    rows: NDArray[np.void] = anywhere[offsets].view(dtype)
-    return rows
-
-
-def _sizes(heads: NDArray[np.void]) -> TimeArray:
-    """The size of each message record, its head included."""
-    return heads["length"].astype(np.int64) + RECORD_HEAD.size
+def _undecoded_block(data: bytes, offsets: Offsets) -> SampleBlock:
+    heads = gather(data, offsets, MESSAGE_HEAD)
+    starts = (offsets + MESSAGE_HEAD.itemsize).tolist()
+    ends = (offsets + record_sizes(heads)).tolist()
+    messages = [data[start:end] for start, end in zip(starts, ends, strict=True)]
+    received, measured = heads["received"].astype(np.int64), heads["measured"].astype(np.int64)
+    return SampleBlock(received, measured, messages)

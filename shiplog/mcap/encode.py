@@ -1,8 +1,7 @@
-"""Samples to the chunks of an MCAP file, by columns: the counterpart of `messages`.
+"""Encoding of samples to the data of MCAP chunks, by columns.
 
-The bytes of several chunks are laid out at once in numpy: the messages of all channels, each a
-head and its payload, interleaved in the order in which they were received. No loop runs over
-messages of fixed size.
+The counterpart of `shiplog.mcap.decode`. The messages of all channels, each a head and its payload,
+are interleaved in the order of reception in numpy arrays; no loop runs over messages of fixed size.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,94 +15,122 @@ from numpy.typing import NDArray
 from shiplog.types import Channel, TimeArray, is_sorted
 
 from .records import INDEX_ENTRY, MESSAGE_HEAD, RECORD_HEAD
-from .schema import encode_messages, fill_rows, schema_for
+from .schema import encode_messages, fill_message_rows, schema_for
 
 Bytes = NDArray[np.uint8]
 
-LAID_OUT_AT_ONCE = 1 << 16  # messages, about: some chunks full, which the processor's cache holds
+MESSAGES_AT_ONCE = 1 << 16  # about some MCAP chunks, so that the CPU cache holds them
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """Samples of one channel on their way into chunks."""
+class SampleBatch:
+    """Samples of one channel that are to be written.
+
+    Attributes
+    ----------
+    channel_id
+        The id of the channel in the file.
+    first_sequence
+        The sequence number of the first sample within its channel.
+    samples
+        The samples.
+    """
 
     channel_id: int
     first_sequence: int
-    chunk: Channel
+    samples: Channel
 
 
 @dataclass(frozen=True, eq=False)
 class McapChunk:
-    """The messages of a chunk, and where each channel's stand in it."""
+    """The data of an MCAP chunk, not compressed, and the index of its messages.
 
-    body: Bytes
+    Attributes
+    ----------
+    data
+        (b,) bytes: the message records one after the other.
+    first_ns, last_ns
+        The first and the last time of reception, ns.
+    index
+        The time and the offset of each message, by channel id: arrays (n,) of `INDEX_ENTRY`.
+    """
+
+    data: Bytes
     first_ns: int
     last_ns: int
-    index: dict[int, NDArray[np.void]]  # of INDEX_ENTRY
+    index: dict[int, NDArray[np.void]]
 
 
-def mcap_chunks(parts: Sequence[Part], largest: int) -> Iterator[McapChunk]:
-    """Lay parts out in even chunks of at most about `largest` bytes, in the order of reception.
+def encode_mcap_chunks(batches: Sequence[SampleBatch], max_bytes: int) -> Iterator[McapChunk]:
+    """Encode batches as MCAP chunks of similar size, in the order of reception.
 
-    A channel has one part. Parts as they were received are laid out little by little; where one
-    is in another order, all at once.
+    Parameters
+    ----------
+    batches
+        At least one batch, and no two of one channel. If the times of reception of each are
+        ascending, memory is needed for some MCAP chunks only, else for all.
+    max_bytes
+        The size that the data of an MCAP chunk exceeds by at most about one message.
     """
-    for few in _portions(parts):
-        yield from _laid_out([part for part in few if len(part.chunk)], largest)
+    for portion in _portions(batches):
+        yield from _encode_portion([batch for batch in portion if len(batch.samples)], max_bytes)
 
 
-def _portions(parts: Sequence[Part]) -> Iterator[list[Part]]:
-    """The parts cut at the same times of reception, so that each portion is moderately large."""
-    total = sum(len(part.chunk) for part in parts)
-    leader = max(parts, key=lambda part: len(part.chunk)).chunk.received_ns
-    step = max(1, LAID_OUT_AT_ONCE * len(leader) // max(total, 1))
-    times = leader[step::step]
-    if not all(is_sorted(part.chunk.received_ns) for part in parts):
+def _portions(batches: Sequence[SampleBatch]) -> Iterator[list[SampleBatch]]:
+    """Cut all batches at the same times of reception, into about `MESSAGES_AT_ONCE` messages."""
+    total = sum(len(batch.samples) for batch in batches)
+    longest = max(batches, key=lambda batch: len(batch.samples)).samples.received_ns
+    step = max(1, MESSAGES_AT_ONCE * len(longest) // max(total, 1))
+    times = longest[step::step]
+    if not all(is_sorted(batch.samples.received_ns) for batch in batches):
         times = times[:0]
-    cuts = [[0, *np.searchsorted(p.chunk.received_ns, times).tolist(), len(p.chunk)] for p in parts]
+    cuts = [
+        [0, *np.searchsorted(b.samples.received_ns, times).tolist(), len(b.samples)]
+        for b in batches
+    ]
     for number in range(len(times) + 1):
         yield [
-            Part(part.channel_id, part.first_sequence + at[number],
-                 part.chunk.part(at[number], at[number + 1]))
-            for part, at in zip(parts, cuts, strict=True)
+            SampleBatch(batch.channel_id, batch.first_sequence + at[number],
+                        batch.samples.part(at[number], at[number + 1]))
+            for batch, at in zip(batches, cuts, strict=True)
         ]  # fmt: skip
 
 
-def _laid_out(parts: Sequence[Part], largest: int) -> Iterator[McapChunk]:
-    if not parts:
+def _encode_portion(batches: Sequence[SampleBatch], max_bytes: int) -> Iterator[McapChunk]:
+    if not batches:
         return
-    messages = [_messages(part) for part in parts]
-    received = np.concatenate([part.chunk.received_ns for part in parts])
+    messages = [_message_records(batch) for batch in batches]
+    received = np.concatenate([batch.samples.received_ns for batch in batches])
     order = np.argsort(received, kind="stable")
     ends = np.cumsum(np.concatenate([m.sizes for m in messages])[order])
     starts = np.concatenate(([0], ends[:-1]))
-    places = np.empty(len(order), np.int64)  # of each message, in the order of the parts
-    places[order] = starts
-    body = np.empty(int(ends[-1]), np.uint8)
+    offsets = np.empty(len(order), np.int64)  # of each message, in the order of the batches
+    offsets[order] = starts
+    data = np.empty(int(ends[-1]), np.uint8)
     index = {}
-    for part, its_messages in zip(parts, messages, strict=True):
-        its_places, places = np.split(places, [len(part.chunk)])
-        _place(body, its_places, its_messages)
-        index[part.channel_id] = _index(part, its_places)
-    even = ceil(ends[-1] / ceil(ends[-1] / largest))
-    firsts = np.flatnonzero(np.diff(starts // even, prepend=-1)).tolist()
+    for batch, batch_messages in zip(batches, messages, strict=True):
+        batch_offsets, offsets = np.split(offsets, [len(batch.samples)])
+        _scatter(data, batch_offsets, batch_messages)
+        index[batch.channel_id] = _index_entries(batch, batch_offsets)
+    even_size = ceil(ends[-1] / ceil(ends[-1] / max_bytes))
+    firsts = np.flatnonzero(np.diff(starts // even_size, prepend=-1)).tolist()
     for first, stop in zip(firsts, [*firsts[1:], len(order)], strict=True):
         start, end = int(starts[first]), int(ends[stop - 1])
         first_ns, last_ns = received[order[[first, stop - 1]]].tolist()
-        within = {channel_id: _between(index[channel_id], start, end) for channel_id in index}
-        present = {channel_id: entries for channel_id, entries in within.items() if len(entries)}
-        yield McapChunk(body[start:end], first_ns, last_ns, present)
+        within = {id_: _entries_between(entries, start, end) for id_, entries in index.items()}
+        present = {id_: entries for id_, entries in within.items() if len(entries)}
+        yield McapChunk(data[start:end], first_ns, last_ns, present)
 
 
-def _index(part: Part, places: TimeArray) -> NDArray[np.void]:
-    """Where the messages of a part stand, in the order in which they do."""
-    entries = np.empty(len(places), INDEX_ENTRY)
-    entries["received"], entries["offset"] = part.chunk.received_ns, places
-    return entries if np.all(places[1:] > places[:-1]) else np.sort(entries, order="offset")
+def _index_entries(batch: SampleBatch, offsets: TimeArray) -> NDArray[np.void]:
+    """Return the index entries of a batch, in the order of their offsets."""
+    entries = np.empty(len(offsets), INDEX_ENTRY)
+    entries["received"], entries["offset"] = batch.samples.received_ns, offsets
+    return entries if np.all(offsets[1:] > offsets[:-1]) else np.sort(entries, order="offset")
 
 
-def _between(entries: NDArray[np.void], start: int, end: int) -> NDArray[np.void]:
-    """The entries from `start` to before `end`, counted from there."""
+def _entries_between(entries: NDArray[np.void], start: int, end: int) -> NDArray[np.void]:
+    """Return the entries from `start` to before `end`, with offsets relative to `start`."""
     first, last = np.searchsorted(entries["offset"], np.array([start, end], np.uint64))
     within = entries[first:last].copy()
     within["offset"] -= np.uint64(start)
@@ -111,47 +138,48 @@ def _between(entries: NDArray[np.void], start: int, end: int) -> NDArray[np.void
 
 
 @dataclass(frozen=True, eq=False)
-class _Messages:
-    """Message records of one channel, one after the other."""
+class _MessageRecords:
+    """Message records of one channel one after the other, and the size of each, (n,)."""
 
     data: Bytes
-    sizes: TimeArray  # (n,)
+    sizes: TimeArray
 
 
-def _messages(part: Part) -> _Messages:
-    chunk, n = part.chunk, len(part.chunk)
-    fixed = schema_for(chunk.fields).dtype
+def _message_records(batch: SampleBatch) -> _MessageRecords:
+    samples, n = batch.samples, len(batch.samples)
+    fixed = schema_for(samples.fields).dtype
     rows = np.empty(n, MESSAGE_HEAD if fixed is None else MESSAGE_HEAD.descr + fixed.descr)
-    rows["opcode"], rows["channel"] = Opcode.MESSAGE, part.channel_id
-    rows["sequence"] = np.arange(part.first_sequence, part.first_sequence + n)
-    rows["received"], rows["measured"] = chunk.received_ns, chunk.measured_ns
+    rows["opcode"], rows["channel"] = Opcode.MESSAGE, batch.channel_id
+    rows["sequence"] = np.arange(batch.first_sequence, batch.first_sequence + n)
+    rows["received"], rows["measured"] = samples.received_ns, samples.measured_ns
     if fixed is None:
-        return _ragged(rows, encode_messages(chunk))
+        return _variable_width_records(rows, encode_messages(samples))
     rows["length"] = rows.dtype.itemsize - RECORD_HEAD.size
-    fill_rows(rows, chunk)
-    return _Messages(rows.view(np.uint8), np.full(n, rows.dtype.itemsize))
+    fill_message_rows(rows, samples)
+    return _MessageRecords(rows.view(np.uint8), np.full(n, rows.dtype.itemsize))
 
 
-def _ragged(heads: NDArray[np.void], messages: Sequence[bytes]) -> _Messages:
+def _variable_width_records(heads: NDArray[np.void], messages: Sequence[bytes]) -> _MessageRecords:
     sizes = np.array([MESSAGE_HEAD.itemsize + len(data) for data in messages], np.int64)
     heads["length"] = sizes - RECORD_HEAD.size
     data = b"".join(head.tobytes() + data for head, data in zip(heads, messages, strict=True))
-    return _Messages(np.frombuffer(data, np.uint8), sizes)
+    return _MessageRecords(np.frombuffer(data, np.uint8), sizes)
 
 
-def _place(body: Bytes, places: TimeArray, messages: _Messages) -> None:
-    """Copy messages to where they belong; those of one size all at once."""
-    data, sizes = messages.data, messages.sizes
+def _scatter(data: Bytes, offsets: TimeArray, messages: _MessageRecords) -> None:
+    """Copy each message to its offset, all messages of one size at once."""
+    sizes = messages.sizes
     if np.all(sizes == sizes[0]):
         size = int(sizes[0])
-        _anywhere(body, size)[places] = data.view(f"V{size}")
+        _every_window(data, size)[offsets] = messages.data.view(f"V{size}")
         return
     starts = np.cumsum(sizes) - sizes
     for size in np.unique(sizes).tolist():
         alike = np.flatnonzero(sizes == size)
-        _anywhere(body, size)[places[alike]] = _anywhere(data, size)[starts[alike]]
+        windows = _every_window(messages.data, size)
+        _every_window(data, size)[offsets[alike]] = windows[starts[alike]]
 
 
-def _anywhere(data: Bytes, size: int) -> NDArray[np.void]:
-    """The pieces of that size in some bytes, from every byte on: to be gathered or scattered."""
+def _every_window(data: Bytes, size: int) -> NDArray[np.void]:
+    """Return a view of the `size` bytes that begin at each byte, to gather or scatter them."""
     return np.ndarray((len(data) - size + 1,), f"V{size}", data, 0, (1,))

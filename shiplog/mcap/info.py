@@ -1,4 +1,4 @@
-"""What is in a log, without reading it all: `shiplog info`."""
+"""Content of a log as `shiplog info` shows it, without reading all of it."""
 
 import os
 from collections.abc import Mapping
@@ -6,15 +6,30 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from shiplog.types import TrialLog
 from shiplog.units import CATALOGUE
 
 from .reader import open_mcap, read
-from .summary import read_summary
+from .summary import McapSummary, read_summary
 
 
 @dataclass(frozen=True)
 class ChannelInfo:
-    """One topic of a file."""
+    """One topic of a file.
+
+    Attributes
+    ----------
+    topic
+        The topic, such as ``/yaw_rate/gyro``.
+    unit
+        The unit that the file states; empty if it states none.
+    positive
+        The sign convention in words.
+    schema
+        The name of the message schema; empty if the file has no summary.
+    samples
+        The number of samples.
+    """
 
     topic: str
     unit: str
@@ -25,7 +40,26 @@ class ChannelInfo:
 
 @dataclass(frozen=True)
 class LogInfo:
-    """What a file says of itself."""
+    """The content of a file.
+
+    Attributes
+    ----------
+    name
+        The name of the file.
+    start_ns, end_ns
+        Its first and last time, ns since 1970-01-01 UTC: of reception if taken from the summary, of
+        measurement if the file had to be read.
+    channels
+        Its topics.
+    metadata
+        Text about the trial, by key.
+    has_vessel
+        Whether a vessel file is attached.
+    warnings
+        Problems met in reading the file.
+    data_lost
+        Whether a part of the file could not be read.
+    """
 
     name: str
     start_ns: int
@@ -37,36 +71,48 @@ class LogInfo:
     data_lost: bool = False
 
     def to_dict(self) -> dict[str, Any]:
-        """The same as plain values."""
+        """Return the content as plain values for JSON, with ``duration_secs`` in s."""
         return asdict(self) | {"duration_secs": (self.end_ns - self.start_ns) * 1e-9}
 
 
 def read_log_info(path: str | os.PathLike[str]) -> LogInfo:
-    """What is in a log; only its summary is read, if it has one that its checksum vouches for.
+    """Return the content of a log.
 
-    Raises `LogError` where the file is missing or is not MCAP.
+    Only the summary of the file is read; the whole file if it has no valid summary.
+
+    Raises
+    ------
+    LogError
+        The file is missing or is not MCAP.
+
+    Examples
+    --------
+    >>> info = read_log_info("sample_data/zigzag_20_20.mcap")
+    >>> info.channels[0].topic, info.channels[0].samples
+    ('/yaw_rate/simulated', 6001)
     """
     path = Path(path)
     with open_mcap(path) as stream:
         summary = read_summary(stream)
-    if summary is None:
-        return _by_reading(path)
+    return _info_of_log(read(path)) if summary is None else _info_of_summary(path.name, summary)
+
+
+def _info_of_summary(name: str, summary: McapSummary) -> LogInfo:
     counts = summary.statistics.channel_message_counts
     channels = []
     for channel_id, channel in sorted(summary.channels.items()):
         schema = summary.schemas.get(channel.schema_id)
-        said = channel.metadata
         channels.append(
             ChannelInfo(
                 channel.topic,
-                said.get("unit", ""),
-                said.get("positive", ""),
+                channel.metadata.get("unit", ""),
+                channel.metadata.get("positive", ""),
                 schema.name if schema else "",
                 counts.get(channel_id, 0),
             )
         )
     return LogInfo(
-        path.name,
+        name,
         summary.statistics.message_start_time,
         summary.statistics.message_end_time,
         tuple(channels),
@@ -75,10 +121,7 @@ def read_log_info(path: str | os.PathLike[str]) -> LogInfo:
     )
 
 
-def _by_reading(path: Path) -> LogInfo:
-    """Of a file without a summary: one that was not finished."""
-    log = read(path)
-    start, end = log.span_ns
+def _info_of_log(log: TrialLog) -> LogInfo:
     channels = tuple(
         ChannelInfo(
             channel.topic,
@@ -89,6 +132,12 @@ def _by_reading(path: Path) -> LogInfo:
         )
         for channel in log
     )
-    has_vessel = log.vessel_toml is not None
-    said = dict(log.metadata)
-    return LogInfo(path.name, start, end, channels, said, has_vessel, log.warnings, log.data_lost)
+    return LogInfo(
+        log.name,
+        *log.span_ns,
+        channels,
+        dict(log.metadata),
+        log.vessel_toml is not None,
+        log.warnings,
+        log.data_lost,
+    )

@@ -1,7 +1,7 @@
-"""The bytes of an MCAP file, front to back, to columns of messages.
+"""Sequential scan of an MCAP file, record by record.
 
-The file is read record by record, so that no more of it is held than was asked for. Every
-checksum is verified, and what is damaged is left out and said.
+The file is read from front to back in bounded memory, up to the contents that the caller does not
+drain. All checksums are verified; damaged parts are skipped and reported.
 """
 
 import os
@@ -12,59 +12,86 @@ from dataclasses import dataclass
 from typing import IO
 
 import numpy as np
-import zstandard
 from mcap.opcode import Opcode
 
-from .decode import MALFORMED, Contents, keep_record, take, take_orphans
-from .records import CHUNK_HEAD, MAGIC, RECORD_HEAD, crc_of
+from .decode import (
+    MALFORMED,
+    McapContents,
+    collect_messages,
+    collect_undescribed,
+    read_record,
+)
+from .decompress import mcap_chunk_data, truncated_mcap_chunk_data
+from .records import MAGIC, MCAP_CHUNK_HEAD, RECORD_HEAD, crc32_of_range
 
-_BLOCK = 1 << 20  # bytes that are read, and messages outside chunks that are taken, at a time
-_LONGEST = 1 << 28  # bytes: no attachment of ours is longer, and no chunk that a crash cut
+_MAX_LOOSE_BYTES = 1 << 20  # of messages outside of MCAP chunks that are collected at once
+# Longer records other than MCAP chunks are skipped: no attachment of shiplog is as long. Of an
+# MCAP chunk cut off by a crash no more is decompressed.
+_MAX_RECORD_BYTES = 1 << 28
 
 
-def scan(stream: IO[bytes], contents: Contents, skip: Collection[int] = ()) -> Iterator[None]:
-    """Go through a file once; control comes back after each chunk, taken into `contents`.
+def scan(stream: IO[bytes], contents: McapContents, skip: Collection[int] = ()) -> Iterator[None]:
+    """Go through a file once, and yield after each MCAP chunk that was added to `contents`.
 
-    Chunks that start at an offset in `skip` are passed over unread; the checksum of the data as
-    a whole is then not verified.
+    Parameters
+    ----------
+    stream
+        The file, opened in binary mode.
+    contents
+        Receives what the file contains. The caller may drain it at each yield.
+    skip
+        The offsets of MCAP chunks not to read. With any, the checksum of the data section as a
+        whole is not verified.
     """
-    tape = _Tape(stream, stream.seek(0, os.SEEK_END), skip)
-    for opcode, content, index in _gathered(tape):
+    reader = _RecordReader(stream, stream.seek(0, os.SEEK_END), skip)
+    for opcode, content, indexes in _grouped_records(reader):
         if opcode == Opcode.CHUNK:
-            _read_chunk(content, index, contents)
+            _read_mcap_chunk(content, indexes, contents)
             yield
         elif opcode == Opcode.MESSAGE:
-            contents.in_order &= not take(content, [], contents)
+            contents.in_order &= not collect_messages(content, [], contents)
             yield
         elif opcode == Opcode.DATA_END:
             if not skip:
-                _check(tape.crc_before, content, "data", contents)
-        elif opcode == Opcode.FOOTER and _ends_here(tape):
-            crc = _summary_crc(stream, tape.end, content)
-            _check(crc, content[-4:], "summary", contents)
+                _verify_checksum(reader.crc_before, content, "data section", contents)
+        elif opcode == Opcode.FOOTER and _is_at_end(reader):
+            crc = _summary_crc(stream, reader.end, content)
+            _verify_checksum(crc, content[-4:], "summary", contents)
             contents.finished = True
             break
         else:
-            keep_record(opcode, content, contents)
+            read_record(opcode, content, contents)
     if not contents.finished:
-        _read_tail(tape, contents)
-    take_orphans(contents)
+        _read_truncated_end(reader, contents)
+    collect_undescribed(contents)
     yield
 
 
 @dataclass
-class _Tape:
-    """A file's records, one after the other."""
+class _RecordReader:
+    """An iterator over the complete records of a file, with a running checksum.
+
+    Attributes
+    ----------
+    stream, size
+        The file and its size in bytes.
+    skip
+        The offsets of MCAP chunks not to read.
+    end
+        The offset after the last complete record.
+    crc, crc_before
+        The checksums of the file up to `end`, and up to the start of that record.
+    """
 
     stream: IO[bytes]
     size: int
     skip: Collection[int]
-    end: int = len(MAGIC)  # of the last record that was whole
-    crc: int = zlib.crc32(MAGIC)  # of all up to there
-    crc_before: int = 0  # of all before that record
+    end: int = len(MAGIC)
+    crc: int = zlib.crc32(MAGIC)
+    crc_before: int = 0
 
     def __iter__(self) -> Iterator[tuple[int, bytes, bytes]]:
-        """The records that are whole: opcode, head, content."""
+        """Yield the opcode, the head and the content of each record."""
         self.stream.seek(self.end)
         skipping = False
         while len(head := self.stream.read(RECORD_HEAD.size)) == RECORD_HEAD.size:
@@ -72,13 +99,13 @@ class _Tape:
             end = self.end + RECORD_HEAD.size + length
             if opcode == 0 or end > self.size:
                 return
-            # a chunk's indexes go with it
+            # the message indexes of a skipped MCAP chunk are skipped with it
             skipping = self.end in self.skip or (skipping and opcode == Opcode.MESSAGE_INDEX)
             if skipping:
                 self.end = self.stream.seek(end)
                 continue
-            if opcode != Opcode.CHUNK and length > _LONGEST:
-                self.crc = crc_of(self.stream, self.end, end, self.crc)
+            if opcode != Opcode.CHUNK and length > _MAX_RECORD_BYTES:
+                self.crc = crc32_of_range(self.stream, self.end, end, self.crc)
                 self.end = end
                 continue
             content = self.stream.read(length)
@@ -90,122 +117,87 @@ class _Tape:
             yield opcode, head, content
 
 
-def _gathered(tape: _Tape) -> Iterator[tuple[int, bytes, list[bytes]]]:
-    """Chunks with the message indexes that follow them, messages outside chunks in runs, others."""
-    chunk: bytes | None = None
-    index: list[bytes] = []
+def _grouped_records(reader: _RecordReader) -> Iterator[tuple[int, bytes, list[bytes]]]:
+    """Yield MCAP chunks with their message indexes, runs of loose messages, and other records."""
+    mcap_chunk: bytes | None = None
+    indexes: list[bytes] = []
     loose = bytearray()
-    for opcode, head, content in tape:
+    for opcode, head, content in reader:
         if opcode == Opcode.MESSAGE_INDEX:
-            index.append(content)
+            indexes.append(content)
             continue
-        if chunk is not None:
-            yield Opcode.CHUNK, chunk, index
-        chunk, index = (content if opcode == Opcode.CHUNK else None), []
-        if loose and (opcode != Opcode.MESSAGE or len(loose) >= _BLOCK):
+        if mcap_chunk is not None:
+            yield Opcode.CHUNK, mcap_chunk, indexes
+        mcap_chunk, indexes = (content if opcode == Opcode.CHUNK else None), []
+        if loose and (opcode != Opcode.MESSAGE or len(loose) >= _MAX_LOOSE_BYTES):
             yield Opcode.MESSAGE, bytes(loose), []
             loose.clear()
         if opcode == Opcode.MESSAGE:
             loose += head + content
-        elif chunk is None:
+        elif mcap_chunk is None:
             yield opcode, content, []
-    if chunk is not None:
-        yield Opcode.CHUNK, chunk, index
+    if mcap_chunk is not None:
+        yield Opcode.CHUNK, mcap_chunk, indexes
     if loose:
         yield Opcode.MESSAGE, bytes(loose), []
 
 
 def _summary_crc(stream: IO[bytes], end: int, footer: bytes) -> int:
-    """The checksum of the summary that a footer, which ends at `end`, speaks of."""
+    """Return the checksum of the summary to which the footer refers; the footer ends at `end`."""
     start = int.from_bytes(footer[:8], "little")
-    return crc_of(stream, start or end - len(footer) - RECORD_HEAD.size, end - 4)
+    return crc32_of_range(stream, start or end - len(footer) - RECORD_HEAD.size, end - 4)
 
 
-def _ends_here(tape: _Tape) -> bool:
-    ends = tape.stream.read(len(MAGIC)) == MAGIC
-    tape.stream.seek(tape.end)
-    return ends
+def _is_at_end(reader: _RecordReader) -> bool:
+    is_magic = reader.stream.read(len(MAGIC)) == MAGIC
+    reader.stream.seek(reader.end)
+    return is_magic
 
 
-def _check(crc: int, checksum: bytes, name: str, contents: Contents) -> None:
-    """Whether a section of the file holds the bytes once written, where nothing yet says no."""
-    said = int.from_bytes(checksum, "little")
-    if said and not contents.damage and said != crc:
-        contents.damage.append(f"damaged: the checksum of its {name} is wrong, some may be missing")
+def _verify_checksum(crc: int, recorded: bytes, section: str, contents: McapContents) -> None:
+    """Report a wrong checksum of a section, unless damage in it was reported already."""
+    expected = int.from_bytes(recorded, "little")
+    if expected and not contents.damage and expected != crc:
+        contents.damage.append(
+            f"damaged: the checksum of the {section} is wrong; samples may be missing"
+        )
 
 
-def _read_chunk(content: bytes, index: list[bytes], contents: Contents) -> None:
+def _read_mcap_chunk(content: bytes, indexes: list[bytes], contents: McapContents) -> None:
     try:
-        *_, size, crc, name_length = CHUNK_HEAD.unpack_from(content, 0)
-        raw = _inflate(*_compression_and_body(content, name_length), size)
-        if len(raw) != size or (crc and zlib.crc32(raw) != crc):
-            raise ValueError("its checksum is wrong")
+        data = mcap_chunk_data(content)
     except MALFORMED as error:
         span = np.frombuffer(content[:16].ljust(16, b"\0"), "<M8[ns]").astype("M8[ms]")
         contents.damage.append(
-            f"lost what was received {span[0]} to {span[1]}: damaged chunk, {error}"
+            f"lost the samples received from {span[0]} to {span[1]}: damaged MCAP chunk, {error}"
         )
     else:
-        _take_chunk(raw, content, index, contents)
+        _collect_mcap_chunk(data, content, indexes, contents)
 
 
-def _take_chunk(raw: bytes, head: bytes, index: list[bytes], contents: Contents) -> None:
-    if take(raw, index, contents):
-        first, last = struct.unpack_from("<qq", head)  # signed, as we read all times
+def _collect_mcap_chunk(
+    data: bytes, content: bytes, indexes: list[bytes], contents: McapContents
+) -> None:
+    if collect_messages(data, indexes, contents):
+        first, last = struct.unpack_from("<qq", content)  # signed, as all times in shiplog
         contents.in_order &= contents.latest_ns <= first <= last
         contents.latest_ns = last
 
 
-def _read_tail(tape: _Tape, contents: Contents) -> None:
-    """What an unfinished file ends with after its last whole record."""
-    contents.cut = tape.end < tape.size
-    tape.stream.seek(tape.end)
-    _read_cut_chunk(tape.stream.read(_LONGEST), contents)
-    tape.stream.seek(max(tape.end, tape.size - len(MAGIC)))
-    if tape.stream.read(len(MAGIC)) == MAGIC:
-        contents.damage.append(f"damaged at byte {tape.end}: what follows was not read")
+def _read_truncated_end(reader: _RecordReader, contents: McapContents) -> None:
+    """Read what follows the last complete record of an unfinished file."""
+    contents.truncated = reader.end < reader.size
+    reader.stream.seek(reader.end)
+    _read_truncated_mcap_chunk(reader.stream.read(_MAX_RECORD_BYTES), contents)
+    reader.stream.seek(max(reader.end, reader.size - len(MAGIC)))
+    if reader.stream.read(len(MAGIC)) == MAGIC:
+        contents.damage.append(f"damaged at byte {reader.end}: the rest of the file was not read")
 
 
-def _read_cut_chunk(content: bytes, contents: Contents) -> None:
-    """The whole messages of a chunk that the file ends in the middle of, if it does."""
-    head = RECORD_HEAD.size + CHUNK_HEAD.size
-    if len(content) <= head or content[0] != Opcode.CHUNK:
+def _read_truncated_mcap_chunk(record: bytes, contents: McapContents) -> None:
+    """Collect the complete messages of an MCAP chunk that is cut off by the end of the file."""
+    head = RECORD_HEAD.size + MCAP_CHUNK_HEAD.size
+    if len(record) <= head or record[0] != Opcode.CHUNK:
         return
-    content = content[RECORD_HEAD.size :]
-    *_, name_length = CHUNK_HEAD.unpack_from(content, 0)
-    raw = _inflate_cut(*_compression_and_body(content, name_length))
-    _take_chunk(raw, content, [], contents)
-
-
-def _compression_and_body(content: bytes, name_length: int) -> tuple[str, memoryview]:
-    at = CHUNK_HEAD.size
-    compression = content[at : at + name_length].decode(errors="replace")
-    return compression, memoryview(content)[at + name_length + 8 :]
-
-
-def _inflate(compression: str, body: memoryview, size: int) -> bytes:
-    if compression == "zstd":
-        return zstandard.ZstdDecompressor().decompress(body, max_output_size=size)
-    if compression == "lz4":
-        import lz4.frame  # noqa: PLC0415 - mcap brings it; only files of others need it
-
-        return bytes(lz4.frame.decompress(bytes(body)))
-    if compression == "":
-        return bytes(body)
-    raise ValueError(f"compression {compression!r} is not known")
-
-
-def _inflate_cut(compression: str, body: memoryview) -> bytes:
-    """As much as the beginning of a compressed text tells."""
-    written = bytes(body).rstrip(b"\0")  # a crash of the machine leaves zeros for what was not
-    if compression == "":
-        return written
-    if compression != "zstd":
-        return b""
-    inflater, raw = zstandard.ZstdDecompressor().decompressobj(), bytearray()
-    try:
-        for at in range(0, len(written), 1 << 10):
-            raw += inflater.decompress(written[at : at + (1 << 10)])
-    except zstandard.ZstdError:
-        pass  # what came before is whole
-    return bytes(raw)
+    content = record[RECORD_HEAD.size :]
+    _collect_mcap_chunk(truncated_mcap_chunk_data(content), content, [], contents)

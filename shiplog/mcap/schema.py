@@ -1,8 +1,8 @@
-"""How a sample is written: topics, message schemas, metadata keys and the format version.
+"""Message schemas of a log, its topics' metadata keys, and the format version.
 
-Every field is fixed-width and `optional`, so that a message has the same length whatever it says
-and a column of messages is one numpy array. The descriptors travel in the file: Rerun, Foxglove
-and PlotJuggler read it without knowing shiplog.
+Every field is fixed-width and `optional`, so that all messages of a schema have the same length
+whatever their values, and a column of messages is one numpy array. The protobuf descriptors are in
+the file: Rerun, Foxglove and PlotJuggler read it without knowing shiplog.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from shiplog.types import Channel, FloatArray
 from shiplog.units import GEOGRAPHIC
 
 FORMAT_VERSION = "1"
-METADATA_NAME = "shiplog"  # of the file's metadata record
+METADATA_NAME = "shiplog"  # of the metadata record
 VESSEL_ATTACHMENT = "vessel.toml"
 ENCODING = "protobuf"
 
@@ -25,7 +25,7 @@ LOCATION_FIX = "foxglove.LocationFix"
 
 _DOUBLE = descriptor_pb2.FieldDescriptorProto.TYPE_DOUBLE
 _FIXED_WIDTH = {
-    # schema's name: its fields
+    # name of the schema: its fields
     "shiplog.Scalar": ("value",),
     "shiplog.Position": ("north", "east"),
 }
@@ -33,7 +33,17 @@ _FIXED_WIDTH = {
 
 @dataclass(frozen=True)
 class Schema:
-    """A message type: its name, its fields, its serialised FileDescriptorSet."""
+    """A message type.
+
+    Attributes
+    ----------
+    name
+        The full name of the protobuf message.
+    fields
+        The names of the fields that hold a sample's components.
+    descriptor_set
+        The serialised ``google.protobuf.FileDescriptorSet``, as MCAP files carry it.
+    """
 
     name: str
     fields: tuple[str, ...]
@@ -41,46 +51,70 @@ class Schema:
 
     @property
     def dtype(self) -> np.dtype[np.void] | None:
-        """The layout of one message where it is fixed: a tag byte before each double."""
+        """The layout of a fixed-width message: a tag byte before each double; else None."""
         if self.name not in _FIXED_WIDTH:
             return None
         return np.dtype([part for f in self.fields for part in ((f"tag_{f}", "u1"), (f, "<f8"))])
 
     @property
     def tags(self) -> dict[str, int]:
-        """The tag bytes of that layout; a message with others is not laid out so."""
-        fixed64 = 1  # the wire type
+        """The tag byte of each field in that layout; other bytes mean another layout."""
+        fixed64 = 1  # the protobuf wire type of a double
         return {f"tag_{f}": number << 3 | fixed64 for number, f in enumerate(self.fields, start=1)}
 
 
 def schema_for(fields: tuple[str, ...]) -> Schema:
-    """The schema that carries these components (none: a scalar)."""
+    """Return the schema for a channel's fields.
+
+    Parameters
+    ----------
+    fields
+        The names of the components: none for a scalar, ``("north", "east")`` or `GEOGRAPHIC`.
+
+    Raises
+    ------
+    ValueError
+        No schema has these fields.
+
+    Examples
+    --------
+    >>> schema_for(("north", "east")).name
+    'shiplog.Position'
+    """
     if fields == GEOGRAPHIC:
         return _location_fix()
-    for name, its_fields in _FIXED_WIDTH.items():
-        if its_fields == (fields or ("value",)):
+    for name, schema_fields in _FIXED_WIDTH.items():
+        if schema_fields == (fields or ("value",)):
             return _fixed_width(name)
-    raise ValueError(f"no message carries the fields {fields}")
+    raise ValueError(f"no message schema has the fields {fields}")
 
 
 def schema_named(name: str) -> Schema | None:
-    """The schema of that name, or None where it is not one of ours."""
+    """Return the schema of a name, or None if shiplog does not define it."""
     if name == LOCATION_FIX:
         return _location_fix()
     return _fixed_width(name) if name in _FIXED_WIDTH else None
 
 
 def encode_messages(channel: Channel) -> list[bytes]:
-    """The samples of a channel as messages."""
+    """Return the samples of a channel as serialised messages, one per sample."""
     if schema_for(channel.fields).dtype is None:
-        return _encode_fixes(channel)
+        return _encode_location_fixes(channel)
     rows = np.empty(len(channel), schema_for(channel.fields).dtype)
-    fill_rows(rows, channel)
+    fill_message_rows(rows, channel)
     return [row.tobytes() for row in rows]
 
 
-def fill_rows(rows: NDArray[np.void], channel: Channel) -> None:
-    """Lay out a channel's samples in rows (n,) that have the fields of its schema's dtype."""
+def fill_message_rows(rows: NDArray[np.void], channel: Channel) -> None:
+    """Write a channel's samples into message rows.
+
+    Parameters
+    ----------
+    rows
+        (n,) structures that have the fields of the schema's `dtype`, and perhaps others.
+    channel
+        n samples.
+    """
     schema = schema_for(channel.fields)
     for tag, value in schema.tags.items():
         rows[tag] = value
@@ -90,7 +124,30 @@ def fill_rows(rows: NDArray[np.void], channel: Channel) -> None:
 
 
 def decode_messages(schema: Schema, messages: list[bytes]) -> FloatArray:
-    """Messages, of whatever length, as values (n, k); a field left out is NaN."""
+    """Decode messages of any length, one by one.
+
+    Parameters
+    ----------
+    schema
+        The schema of the messages, with k fields.
+    messages
+        n serialised messages.
+
+    Returns
+    -------
+    values
+        (n, k); NaN for a field that is absent.
+
+    Raises
+    ------
+    google.protobuf.message.DecodeError
+        A message is not of the schema.
+
+    Examples
+    --------
+    >>> decode_messages(schema_for(()), [b""])
+    array([[nan]])
+    """
     message_type = _message_type(schema)
     values = np.full((len(messages), len(schema.fields)), np.nan)
     for row, data in enumerate(messages):
@@ -108,7 +165,7 @@ def _fixed_width(name: str) -> Schema:
     )
     message = file.message_type.add(name=name.removeprefix("shiplog."))
     for number, field in enumerate(_FIXED_WIDTH[name], start=1):
-        message.oneof_decl.add(name=f"_{field}")  # how proto3 spells `optional`
+        message.oneof_decl.add(name=f"_{field}")  # the proto3 encoding of `optional`
         message.field.add(
             name=field,
             number=number,
@@ -123,7 +180,7 @@ def _fixed_width(name: str) -> Schema:
 
 @cache
 def _location_fix() -> Schema:
-    """Foxglove's schema for a position on the globe, which viewers draw on a map."""
+    """Return Foxglove's schema for a geographic position, which viewers draw on a map."""
     proto = descriptor_pb2.FieldDescriptorProto
     file = descriptor_pb2.FileDescriptorProto(
         name="foxglove/LocationFix.proto",
@@ -161,7 +218,7 @@ def _message_type(schema: Schema) -> type[Message]:
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
 
 
-def _encode_fixes(channel: Channel) -> list[bytes]:
+def _encode_location_fixes(channel: Channel) -> list[bytes]:
     message_type = _message_type(_location_fix())
     messages = []
     for stamp, (latitude, longitude, altitude) in zip(

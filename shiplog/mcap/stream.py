@@ -1,4 +1,4 @@
-"""A log too long to be held whole, which is gone through chunk by chunk."""
+"""Logs longer than memory: a file whose samples come chunk by chunk."""
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
@@ -10,133 +10,180 @@ from mcap import records
 
 from shiplog.types import Channel, TrialLog
 
-from .decode import Contents
-from .reader import described, open_mcap, read, trial_log
+from .decode import McapContents
+from .reader import contents_described_by, open_mcap, read
 from .scan import scan
-from .summary import ChunkPlace, read_summary
+from .summary import McapChunkLocation, read_summary
+from .trial_log import build_trial_log
 
-HELD_SAMPLES = 16_000_000  # a log of more is not held: they would take 400 MB, their filter more
-CHUNK_SAMPLES = 1 << 20
+MAX_SAMPLES_IN_MEMORY = 16_000_000  # 400 MB of samples; a filter of them needs more
+FILE_CHUNK_SAMPLES = 1 << 20  # of all channels together, about
 
 
 @dataclass(eq=False, repr=False)
 class LogFile:
-    """A log in its file. Each call of `chunks` is one pass over it, in bounded memory.
+    """A log in its file; each call of `chunks` is one pass over it in bounded memory.
 
-    What it says of itself is complete, and what `read` would say, after the first pass.
+    It is made by `open_log`. After the first pass, `metadata`, `warnings` and `data_lost` are those
+    of `read`; before, they are what the summary of the file shows.
+
+    Attributes
+    ----------
+    path
+        The MCAP file.
+    outline
+        The log without its samples: its channels in their order, and what is known of the file.
+    schemas, channel_records
+        The schema and channel records, by id.
     """
 
     path: Path
-    known: TrialLog  # its channels in their order, without samples, and what is known of the file
+    outline: TrialLog
     schemas: Mapping[int, records.Schema]
     channel_records: Mapping[int, records.Channel]
 
     def __repr__(self) -> str:
-        """What it is, not all that it holds."""
-        return f"LogFile({self.path}), to be gone through by its chunks"
+        return f"LogFile({self.path}), read by its chunks"
 
     @property
     def name(self) -> str:
-        """The file's name."""
-        return self.known.name
+        """The name of the file."""
+        return self.outline.name
 
     @property
     def metadata(self) -> Mapping[str, str]:
-        """What the file says of the trial."""
-        return self.known.metadata
+        """Text about the trial, by key."""
+        return self.outline.metadata
 
     @property
     def vessel_toml(self) -> str | None:
-        """The vessel attached to it."""
-        return self.known.vessel_toml
+        """The attached vessel file."""
+        return self.outline.vessel_toml
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What reading it met, as far as it was read."""
-        return self.known.warnings
+        """Problems met in reading the file so far."""
+        return self.outline.warnings
 
     @property
     def data_lost(self) -> bool:
-        """Whether a part of the file could not be read, as far as it was."""
-        return self.known.data_lost
+        """Whether a part of the file could not be read so far."""
+        return self.outline.data_lost
 
     def select_sources(self, sources: Mapping[str, str]) -> "LogFile":
-        """The same log with one source only for each name given, the one given.
+        """Return the log with a single source for each of the names given.
 
-        Raises `LogError` where there is no such channel.
+        Parameters
+        ----------
+        sources
+            The source to keep, by channel name.
+
+        Raises
+        ------
+        LogError
+            The log has no such channel.
         """
-        return replace(self, known=self.known.select_sources(sources))
+        return replace(self, outline=self.outline.select_sources(sources))
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
-        """The samples in the order of the file, about `CHUNK_SAMPLES` at a time.
+        """Iterate over the samples in the order of the file, about a million at a time.
 
-        Each chunk has every channel, though some may have no samples in it; those of a channel,
-        one chunk after the other, are what `read` gives.
+        Yields
+        ------
+        channels
+            All channels of the log; some may be empty in a chunk. The parts of a channel, one after
+            the other, are the channel that `read` returns.
 
-        Raises `LogError` as `read` does.
+        Raises
+        ------
+        LogError
+            Reading fails, as in `read`.
         """
-        contents = Contents(dict(self.schemas), dict(self.channel_records), keeps_orphans=False)
+        contents = McapContents(
+            dict(self.schemas), dict(self.channel_records), keep_undescribed=False
+        )
         with open_mcap(self.path) as stream:
             for _ in scan(stream, contents):
-                if contents.held >= CHUNK_SAMPLES:
-                    yield self._chosen(trial_log(self.path, contents))
-        rest = trial_log(self.path, contents)
-        yield self._chosen(rest)
-        self.known = replace(rest, channels=self.known.channels)
+                if contents.pending_samples >= FILE_CHUNK_SAMPLES:
+                    yield self._selected(build_trial_log(self.path, contents))
+        rest = build_trial_log(self.path, contents)
+        yield self._selected(rest)
+        self.outline = replace(rest, channels=self.outline.channels)
 
-    def _chosen(self, chunk: TrialLog) -> tuple[Channel, ...]:
-        """A chunk's channels, in the order of those asked for."""
-        found = {channel.key: channel for channel in chunk}
-        return tuple(found.get(channel.key, channel) for channel in self.known)
+    def _selected(self, chunk: TrialLog) -> tuple[Channel, ...]:
+        """Return the channels of a chunk in the order of the log."""
+        by_key = {channel.key: channel for channel in chunk}
+        return tuple(by_key.get(channel.key, channel) for channel in self.outline)
 
 
 def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:
-    """A log, whole if memory holds it easily, else in its file, to be gone through in chunks.
+    """Open a log: in memory if it has at most 16 million samples, else in its file.
 
-    A file that has no trustworthy summary is gone through once to learn what is in it. One whose
-    messages are not in the order of reception from chunk to chunk is read whole.
+    A file without a valid summary is scanned once to learn its content. A file whose MCAP chunks
+    are not in the order of reception is read into memory whatever its size.
 
-    Raises `LogError` as `read` does.
+    Parameters
+    ----------
+    path
+        The MCAP file.
+
+    Returns
+    -------
+    log
+        A `TrialLog`, or a `LogFile` that has only `chunks`; both are a `shiplog.Log`.
+
+    Raises
+    ------
+    LogError
+        Reading fails, as in `read`.
+
+    Examples
+    --------
+    >>> log = open_log("sample_data/zigzag_20_20.mcap")
+    >>> sum(len(channel) for chunk in log.chunks() for channel in chunk) > 20_000
+    True
     """
     path = Path(path)
     with open_mcap(path) as stream:
         summary = read_summary(stream)
         if summary is None:
-            return _learned(path, stream)
-        if summary.statistics.message_count <= HELD_SAMPLES:
+            return _open_by_scan(path, stream)
+        if summary.statistics.message_count <= MAX_SAMPLES_IN_MEMORY:
             return read(path)
-        chunks = summary.chunk_places()
-        if chunks is None:
-            return _learned(path, stream)
-    if not _are_in_order(chunks):
+        mcap_chunks = summary.mcap_chunk_locations()
+        if mcap_chunks is None:
+            return _open_by_scan(path, stream)
+    if not _are_in_order(mcap_chunks):
         return read(path)
-    contents = described(summary)
+    contents = contents_described_by(summary)
     contents.finished = True
     contents.metadata, contents.vessel_toml = dict(summary.metadata), summary.vessel_toml
     return _log_file(path, contents)
 
 
-def _log_file(path: Path, contents: Contents) -> LogFile:
-    return LogFile(path, trial_log(path, contents), contents.schemas, contents.channels)
+def _log_file(path: Path, contents: McapContents) -> LogFile:
+    return LogFile(path, build_trial_log(path, contents), contents.schemas, contents.channels)
 
 
-def _are_in_order(chunks: Iterable[ChunkPlace]) -> bool:
+def _are_in_order(mcap_chunks: Iterable[McapChunkLocation]) -> bool:
+    """Whether each MCAP chunk with messages was received after the ones before it."""
     latest = 0
-    for chunk in chunks:
-        if chunk.channel_ids and not latest <= chunk.first_ns <= chunk.last_ns:
+    for mcap_chunk in mcap_chunks:
+        if mcap_chunk.channel_ids and not latest <= mcap_chunk.first_ns <= mcap_chunk.last_ns:
             return False
-        latest = max(latest, chunk.last_ns)
+        latest = max(latest, mcap_chunk.last_ns)
     return True
 
 
-def _learned(path: Path, stream: IO[bytes]) -> TrialLog | LogFile:
-    """The log by going through its file, holding its samples only while they are few."""
-    contents = Contents()
+def _open_by_scan(path: Path, stream: IO[bytes]) -> TrialLog | LogFile:
+    """Open a log by a scan of its file that keeps the samples only while they are few."""
+    contents = McapContents()
     for _ in scan(stream, contents):
-        if contents.taken + sum(contents.orphaned.values()) > HELD_SAMPLES:
+        samples = contents.total_samples + sum(contents.undescribed_counts.values())
+        if samples > MAX_SAMPLES_IN_MEMORY:
             contents.drain()
-            contents.orphans.clear()
-            contents.keeps_orphans = False
-    if contents.keeps_orphans:
-        return trial_log(path, contents)
+            contents.undescribed.clear()
+            contents.keep_undescribed = False
+    if contents.keep_undescribed:
+        return build_trial_log(path, contents)
     return _log_file(path, contents) if contents.in_order else read(path)

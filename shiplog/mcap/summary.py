@@ -1,4 +1,4 @@
-"""What an MCAP file says of itself at its end, without reading what it holds."""
+"""Summary section of an MCAP file: its content as recorded at its end."""
 
 import os
 import struct
@@ -12,64 +12,91 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
-from .records import FOOTER_BYTES, MAGIC, RECORD_HEAD, crc_of
+from .records import FOOTER_BYTES, INDEX_ENTRY, INDEX_HEAD, MAGIC, RECORD_HEAD, crc32_of_range
 from .schema import METADATA_NAME, VESSEL_ATTACHMENT
-
-_INDEX_HEAD = RECORD_HEAD.size + 6  # of a message index: the channel, the length of its entries
-_ENTRY = 16  # bytes of one message in a message index
 
 
 @dataclass(frozen=True)
-class ChunkPlace:
-    """Where a chunk stands in the file, and what it holds."""
+class McapChunkLocation:
+    """Where an MCAP chunk is in the file, and what it contains.
+
+    Attributes
+    ----------
+    offset
+        The offset of the MCAP chunk record in the file.
+    first_ns, last_ns
+        The first and the last time of reception, ns. In a corrupt index the first may be later.
+    channel_ids
+        The channels with messages in the MCAP chunk.
+    """
 
     offset: int
-    first_ns: int  # of reception; later than `last_ns` where the file says nonsense
+    first_ns: int
     last_ns: int
     channel_ids: frozenset[int]
 
 
 @dataclass(frozen=True)
-class Summary:
-    """A summary that its checksum vouches for."""
+class McapSummary:
+    """The summary of a finished file, whose checksum is correct.
+
+    Attributes
+    ----------
+    schemas, channels
+        The schema and channel records, by id.
+    statistics
+        The statistics record: the number of messages of each channel, first and last time.
+    metadata
+        Text about the trial, by key.
+    vessel_toml
+        The attached vessel file, or None.
+    mcap_chunk_indexes
+        The content of the chunk index records, not parsed: a long file has thousands.
+    """
 
     schemas: dict[int, records.Schema]
     channels: dict[int, records.Channel]
     statistics: records.Statistics
     metadata: dict[str, str]
     vessel_toml: str | None
-    chunk_indexes: tuple[bytes, ...]  # unread: there are thousands in a long file
+    mcap_chunk_indexes: tuple[bytes, ...]
 
-    def chunk_places(self) -> tuple[ChunkPlace, ...] | None:
-        """The chunks in the order of the file; None if some messages are in none of them.
+    def mcap_chunk_locations(self) -> tuple[McapChunkLocation, ...] | None:
+        """Return the locations of the MCAP chunks in the order of the file.
 
-        Only where every message is accounted for can one know where a channel's messages are not.
+        None if some messages are in no indexed MCAP chunk: then the index does not show in which
+        parts of the file a channel has no messages.
         """
-        places, messages = [], 0
-        for content in self.chunk_indexes:
+        locations, messages = [], 0
+        for content in self.mcap_chunk_indexes:
             index = records.ChunkIndex.read(ReadDataStream(BytesIO(content)))
             ids = index.message_index_offsets
-            messages += (index.message_index_length - _INDEX_HEAD * len(ids)) // _ENTRY
-            first, last = struct.unpack_from("<qq", content)  # signed, as we read all times
-            places.append(ChunkPlace(index.chunk_start_offset, first, last, frozenset(ids)))
+            head = RECORD_HEAD.size + INDEX_HEAD.size
+            messages += (index.message_index_length - head * len(ids)) // INDEX_ENTRY.itemsize
+            first, last = struct.unpack_from("<qq", content)  # signed, as all times in shiplog
+            location = McapChunkLocation(index.chunk_start_offset, first, last, frozenset(ids))
+            locations.append(location)
         if messages != self.statistics.message_count:
             return None
-        return tuple(sorted(places, key=lambda place: place.offset))
+        return tuple(sorted(locations, key=lambda location: location.offset))
 
 
-def read_summary(stream: IO[bytes]) -> Summary | None:
-    """The summary of a finished file.
+def read_summary(stream: IO[bytes]) -> McapSummary | None:
+    """Read the summary at the end of a file.
 
-    None where there is none, where it is damaged, or where it does not describe every channel
-    that has messages: then only reading the file tells.
+    Returns
+    -------
+    summary
+        None if the file has no summary, if it is damaged, or if it does not describe every channel
+        that has messages. In these cases the whole file has to be read.
     """
     try:
-        return _summary(stream)
+        return _read_summary(stream)
     except (McapError, struct.error, ValueError, KeyError, OverflowError, OSError, MemoryError):
         return None
 
 
-def _summary(stream: IO[bytes]) -> Summary | None:
+def _read_summary(stream: IO[bytes]) -> McapSummary | None:
     size = stream.seek(0, os.SEEK_END)
     stream.seek(max(0, size - len(MAGIC) - FOOTER_BYTES))
     footer = stream.read()
@@ -77,30 +104,31 @@ def _summary(stream: IO[bytes]) -> Summary | None:
     if footer[0] != Opcode.FOOTER or not footer.endswith(MAGIC) or not 0 < start < size:
         return None
     end = size - len(MAGIC) - 4
-    if crc and crc_of(stream, start, end) != crc:
+    if crc and crc32_of_range(stream, start, end) != crc:
         return None
-    found: dict[int, list[bytes]] = {}
-    for opcode, content in _records(stream, start, size - len(MAGIC) - FOOTER_BYTES):
-        found.setdefault(opcode, []).append(content)
-    schemas = [records.Schema.read(s) for s in _streams(found, Opcode.SCHEMA)]
-    channels = [records.Channel.read(s) for s in _streams(found, Opcode.CHANNEL)]
-    statistics = [records.Statistics.read(s) for s in _streams(found, Opcode.STATISTICS)]
+    by_opcode: dict[int, list[bytes]] = {}
+    for opcode, content in _section_records(stream, start, size - len(MAGIC) - FOOTER_BYTES):
+        by_opcode.setdefault(opcode, []).append(content)
+    schemas = [records.Schema.read(s) for s in _streams(by_opcode, Opcode.SCHEMA)]
+    channels = [records.Channel.read(s) for s in _streams(by_opcode, Opcode.CHANNEL)]
+    statistics = [records.Statistics.read(s) for s in _streams(by_opcode, Opcode.STATISTICS)]
     by_id = {channel.id: channel for channel in channels}
     schema_ids = {0, *(schema.id for schema in schemas)}
     described = {id_ for id_, channel in by_id.items() if channel.schema_id in schema_ids}
     if len(statistics) != 1 or not described.issuperset(statistics[0].channel_message_counts):
         return None
-    return Summary(
+    return McapSummary(
         {schema.id: schema for schema in schemas},
         by_id,
         statistics[0],
-        _metadata(stream, found),
-        _vessel(stream, found),
-        tuple(found.get(Opcode.CHUNK_INDEX, [])),
+        _metadata(stream, by_opcode),
+        _vessel_toml(stream, by_opcode),
+        tuple(by_opcode.get(Opcode.CHUNK_INDEX, [])),
     )
 
 
-def _records(stream: IO[bytes], start: int, end: int) -> Iterator[tuple[int, bytes]]:
+def _section_records(stream: IO[bytes], start: int, end: int) -> Iterator[tuple[int, bytes]]:
+    """Yield the opcode and the content of each record from `start` to before `end`."""
     stream.seek(start)
     data, at = stream.read(end - start), 0
     while at < len(data):
@@ -111,34 +139,34 @@ def _records(stream: IO[bytes], start: int, end: int) -> Iterator[tuple[int, byt
         yield opcode, data[at - length : at]
 
 
-def _streams(found: dict[int, list[bytes]], opcode: Opcode) -> Iterator[ReadDataStream]:
-    return (ReadDataStream(BytesIO(content)) for content in found.get(opcode, []))
+def _streams(by_opcode: dict[int, list[bytes]], opcode: Opcode) -> Iterator[ReadDataStream]:
+    return (ReadDataStream(BytesIO(content)) for content in by_opcode.get(opcode, []))
 
 
-def _metadata(stream: IO[bytes], found: dict[int, list[bytes]]) -> dict[str, str]:
-    said: dict[str, str] = {}
-    for place in _streams(found, Opcode.METADATA_INDEX):
-        index = records.MetadataIndex.read(place)
+def _metadata(stream: IO[bytes], by_opcode: dict[int, list[bytes]]) -> dict[str, str]:
+    metadata: dict[str, str] = {}
+    for entry in _streams(by_opcode, Opcode.METADATA_INDEX):
+        index = records.MetadataIndex.read(entry)
         if index.name == METADATA_NAME:
-            content = _at(stream, index.offset, index.length, Opcode.METADATA)
-            said |= records.Metadata.read(content).metadata
-    return said
+            content = _indexed_record(stream, index.offset, index.length, Opcode.METADATA)
+            metadata |= records.Metadata.read(content).metadata
+    return metadata
 
 
-def _vessel(stream: IO[bytes], found: dict[int, list[bytes]]) -> str | None:
+def _vessel_toml(stream: IO[bytes], by_opcode: dict[int, list[bytes]]) -> str | None:
     text = None
-    for place in _streams(found, Opcode.ATTACHMENT_INDEX):
-        index = records.AttachmentIndex.read(place)
+    for entry in _streams(by_opcode, Opcode.ATTACHMENT_INDEX):
+        index = records.AttachmentIndex.read(entry)
         if index.name == VESSEL_ATTACHMENT:
-            content = _at(stream, index.offset, index.length, Opcode.ATTACHMENT)
+            content = _indexed_record(stream, index.offset, index.length, Opcode.ATTACHMENT)
             text = records.Attachment.read(content).data.decode()
     return text
 
 
-def _at(stream: IO[bytes], offset: int, length: int, opcode: Opcode) -> ReadDataStream:
-    """The content of the record that an index points to."""
+def _indexed_record(stream: IO[bytes], offset: int, length: int, opcode: Opcode) -> ReadDataStream:
+    """Return the content of the record that an index points to."""
     stream.seek(offset)
     data = stream.read(length)
     if RECORD_HEAD.unpack_from(data)[0] != opcode:
-        raise ValueError("an index that points to something else")
+        raise ValueError("an index that points to a record of another kind")
     return ReadDataStream(BytesIO(data[RECORD_HEAD.size :]))

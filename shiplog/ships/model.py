@@ -1,12 +1,9 @@
-"""What a ship model is: parameters with limits and priors, a state, equations, and a scale."""
+"""What a model of a ship is: parameters with their limits, a state, equations, and its scale."""
 
-import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from importlib import import_module
 from math import inf
-from pickle import PicklingError
 from typing import Any
 
 import numpy as np
@@ -22,95 +19,53 @@ STEP = 1e-30  # along the imaginary axis: nothing is lost to rounding, however s
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of a model, in its own unit.
-
-    Attributes
-    ----------
-    name, unit
-        Such as ``T3`` and ``s``.
-    start
-        Where a fit starts without other information, and the mean of the prior.
-    lowest, highest
-        The limits of its estimate.
-    prior_std
-        The standard deviation of the prior about `start`; infinite for none.
-    fixed
-        Whether it keeps the value `start` unless it is freed explicitly.
-    typical
-        Its magnitude for ships in general, where `start` is zero.
-    """
+    """One number of a model, in its own unit."""
 
     name: str
     unit: str
-    start: float
-    lowest: float = -inf
+    start: float  # where a search begins that knows nothing,
+    lowest: float = -inf  # and between which it stays
     highest: float = inf
-    prior_std: float = inf
-    fixed: bool = False
-    typical: float = 0.0
+    prior_std: float = inf  # how far from `start` it is believed to be, before any data
+    fixed: bool = False  # kept at `start` unless it is asked for
+    typical: float = 0.0  # its size of ships in general, where `start` is none
 
     @property
     def size(self) -> float:
-        """The parameter's magnitude for ships in general, to scale it with."""
+        """What its size is of ships in general."""
         return self.typical or abs(self.start) or self.prior_std
 
 
 @dataclass(frozen=True)
 class StateValue:
-    """One value of a model's state, and what is known of it at the start of a run.
-
-    Attributes
-    ----------
-    name
-        Its symbol in the equations.
-    channel
-        The one of `MODEL_OUTPUTS` that measures it; None where nothing does.
-    prior_std
-        The standard deviation about zero of its initial value where nothing measures it.
-    """
+    """One number of a model's state, and what is known of it as a run begins."""
 
     name: str
-    channel: str | None = None
-    prior_std: float = inf
+    channel: str | None = None  # that measures it
+    prior_std: float = inf  # of what it is when nothing measures it, from zero
 
 
 @dataclass(frozen=True)
 class Scale:
-    """The units of a model's equations: one of time, of speed and of revolutions each.
-
-    Attributes
-    ----------
-    secs
-        The unit of time, s.
-    speed
-        The unit of speed, m/s.
-    rpm
-        The unit of the propeller's revolutions, rpm.
-    """
+    """The units in which a model's equations are written: one each of time, speed, revolutions."""
 
     secs: float = 1.0
-    speed: float = 1.0
+    speed: float = 1.0  # m/s
     rpm: float = 1.0
 
     @property
     def outputs(self) -> FloatArray:
-        """(4,) the factors from the units of the equations to SI, in the order of `MODEL_OUTPUTS`.
-
-        Examples
-        --------
-        >>> Scale(secs=20.0, speed=8.0, rpm=90.0).outputs.tolist()
-        [0.05, 8.0, 8.0, 1.0]
-        """
+        """(4,) what one of each of `MODEL_OUTPUTS` is in SI."""
         return np.array([1 / self.secs, self.speed, self.speed, 1.0])
 
     def of_channel(self, channel: str | None) -> float:
-        """Return the factor to SI of one channel; 1 for None."""
+        """What one of a channel's is in SI; 1 for what no channel measures."""
         return (
             float(self.outputs[MODEL_OUTPUTS.index(channel)]) if channel in MODEL_OUTPUTS else 1.0
         )
 
     def scaled(self, path: InputPath) -> InputPath:
-        """Return the inputs of a run in these units."""
+        """A path in these units."""
         return path._replace(
             secs=path.secs / self.secs,
             delta_dot=path.delta_dot * self.secs,
@@ -121,77 +76,49 @@ class Scale:
 SI = Scale()
 
 
-def _unchanged(values: ComplexArray) -> Sequence[complex]:
+def _as_they_are(values: ComplexArray) -> Sequence[complex]:
     return tuple(values)
 
 
 @dataclass(frozen=True, eq=False)
 class Propagation:
-    """A simulated run of `count` samples and its derivatives along k directions.
+    """A run of `count` samples, and how it changes along k directions."""
 
-    Attributes
-    ----------
-    outputs
-        (count, 4) the outputs in SI, in the order of `MODEL_OUTPUTS`.
-    end
-        (s,) the state at the last sample, in the units of the equations.
-    outputs_by, end_by
-        (k, count, 4) and (k, s) their derivatives along each direction.
-    """
-
-    outputs: FloatArray
-    end: FloatArray
-    outputs_by: FloatArray
-    end_by: FloatArray
+    outputs: FloatArray  # (count, 4) SI, in the order of MODEL_OUTPUTS
+    end: FloatArray  # (s,) the state at the last sample, in the units of the equations
+    outputs_by: FloatArray  # (k, count, 4)
+    end_by: FloatArray  # (k, s)
 
 
 @dataclass(frozen=True)
 class Model:
-    """A ship model, for simulation and for estimation.
+    """A ship's equations, for simulation and for estimation.
 
-    A model can be pickled and copied, as long as its functions stand in a module by their names.
-
-    Attributes
-    ----------
-    name
-        The name by which `ship_model` finds it.
-    title
-        A few words for tables.
-    kind
-        The NamedTuple of the equations' coefficients. Compiled code chooses the equations by it.
-    parameters
-        The parameters, in the order in which arrays hold them.
-    state
-        The state, in the order of the equations. One value each is measured by ``yaw_rate`` and
-        ``speed``.
-    compiled
-        `shiplog.ships.motion.integrate` compiled for this kind, in the model's own module.
-    outputs
-        Those of `MODEL_OUTPUTS` that the model predicts.
-    dimensionless
-        Whether the equations are dimensionless, in ship lengths and approach speeds; else in SI.
-    expand
-        Makes the coefficients, in the order of `kind`, of the parameters. Where coefficients are
-        tied to each other there are fewer parameters than coefficients.
+    `expand` makes of the parameters the equations' coefficients, which are a `kind`: where some
+    are tied to others there are fewer parameters than coefficients.
     """
 
     name: str
     title: str
-    kind: Callable[..., Any]
+    kind: Callable[..., Any]  # a NamedTuple, whose type the compiled equations are chosen by
     parameters: tuple[Parameter, ...]
     state: tuple[StateValue, ...]
-    compiled: Callable[..., ComplexArray]
-    outputs: tuple[str, ...] = ("yaw_rate", "speed", "heading")
-    dimensionless: bool = True
-    expand: Callable[[ComplexArray], Sequence[complex]] = field(default=_unchanged)
+    compiled: Callable[..., ComplexArray]  # `sail` for this kind, kept in the model's own file
+    outputs: tuple[str, ...] = (
+        "yaw_rate",
+        "speed",
+        "heading",
+    )  # of MODEL_OUTPUTS: what it predicts
+    dimensionless: bool = True  # else its equations are in SI
+    expand: Callable[[ComplexArray], Sequence[complex]] = field(default=_as_they_are)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The names of the parameters."""
+        """Of the parameters."""
         return tuple(p.name for p in self.parameters)
 
     def parameter(self, name: str) -> Parameter:
-        """Return the parameter of a name; raises `UsageError` where there is none."""
+        """The parameter of that name; `UsageError` where there is none."""
         for parameter in self.parameters:
             if parameter.name == name:
                 return parameter
@@ -201,30 +128,15 @@ class Model:
         )
 
     def start_values(self) -> FloatArray:
-        """(p,) where a fit starts without other information."""
+        """(p,) where a search begins that knows nothing."""
         return np.array([p.start for p in self.parameters])
 
     def scale(self, length: float, speed: float, rpm: float) -> Scale:
-        """Return the units of the equations for one ship.
-
-        Parameters
-        ----------
-        length
-            The length between perpendiculars, m.
-        speed, rpm
-            Those of the straight approach, m/s and rpm.
-        """
+        """The units of its equations for a ship of that length, in m, at that speed and rpm."""
         return Scale(length / speed, speed, rpm) if self.dimensionless else SI
 
     def coefficients(self, parameters: Sequence[float] | FloatArray) -> Any:  # noqa: ANN401 - a `kind`
-        """Return the equations' coefficients as a `kind` of real numbers.
-
-        Examples
-        --------
-        >>> from shiplog.ships import ship_model
-        >>> ship_model("nomoto").coefficients([-0.6, 0.5, -0.5, -0.05, 0.05])
-        Norrbin(a=-0.6, a3=0.0, k=0.5, f=-0.5, g=-0.05, h=0.05)
-        """
+        """The equations' coefficients, real, of the parameters."""
         values = self.expand(np.array(parameters, np.complex128))
         return self.kind(*(float(np.real(value)) for value in values))
 
@@ -232,29 +144,13 @@ class Model:
         self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
         *, offset: float = 0.0, scale: Scale = SI,
     ) -> FloatArray:  # fmt: skip
-        """Simulate a run under given inputs.
+        """What would be measured, (count, 4), SI, in the order of `MODEL_OUTPUTS`.
 
-        Parameters
-        ----------
-        parameters
-            (p,) the model's parameters.
-        initial
-            (s,) the state at the first sample, in the units of the equations.
-        path
-            The rudder and the revolutions, from `shiplog.ships.path.input_path`.
-        count
-            The number of samples.
-        offset
-            Rudder added to that of the path, rad.
-        scale
-            The units of the equations.
-
-        Returns
-        -------
-        (count, 4) array
-            The outputs in SI, in the order of `MODEL_OUTPUTS`; NaN from where the run diverges.
+        `parameters` are (p,), `initial` is the state at the first sample in the units of the
+        equations, `offset` a rudder added to that of the path, in rad. NaN from where the
+        ship runs away.
         """
-        out = self._integrate(
+        out = self._sail(
             parameters.astype(np.complex128),
             initial.astype(np.complex128),
             complex(offset),
@@ -267,10 +163,10 @@ class Model:
         self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
         directions: FloatArray, *, offset: float = 0.0, scale: Scale = SI,
     ) -> FloatArray:  # fmt: skip
-        """Compute the derivatives of the outputs along given directions, (k, count, 4).
+        """How the outputs change along each direction, (k, count, 4).
 
-        A direction is a row of `directions`, (k, p + s + 1): of the parameters, the initial state
-        and the offset of the rudder, in this order. The other arguments are those of `simulate`.
+        A direction is a row of `directions`: of the parameters, the initial state and the offset
+        of the rudder, in this order, (k, p + s + 1). All else as `simulate`.
         """
         return self.propagate(
             parameters, initial, path, count, directions, offset=offset, scale=scale
@@ -279,11 +175,10 @@ class Model:
     def propagate(
         self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
         directions: FloatArray, *, offset: float = 0.0, scale: Scale = SI,
-    ) -> Propagation:  # fmt: skip
-        """Simulate a run with its last state and the derivatives of both along k >= 1 directions.
+    ) -> "Propagation":  # fmt: skip
+        """A run, where it ends, and how both change along one or more `directions`.
 
-        The arguments are those of `sensitivities`. Each derivative is exact to rounding: the run is
-        simulated once with the direction as a small imaginary part (see `shiplog.ships.motion`).
+        All as `sensitivities`.
         """
         scaled, p = scale.scaled(path), len(parameters)
         outputs_by = np.empty((len(directions), count, len(MODEL_OUTPUTS)))
@@ -291,21 +186,19 @@ class Model:
         out = np.empty((count, len(MODEL_OUTPUTS)), np.complex128)
         for i, along in enumerate(directions * (1j * STEP)):
             ends[i] = initial + along[p:-1]
-            out = self._integrate(
-                parameters + along[:p], ends[i], offset + along[-1], scaled, count
-            )
+            out = self._sail(parameters + along[:p], ends[i], offset + along[-1], scaled, count)
             outputs_by[i] = out.imag / STEP * scale.outputs
         return Propagation(
             out.real * scale.outputs, ends[-1].real.copy(), outputs_by, ends.imag / STEP
         )
 
-    def _integrate(
+    def _sail(
         self, parameters: ComplexArray, initial: ComplexArray, offset: complex, path: InputPath,
         count: int,
     ) -> ComplexArray:  # fmt: skip
-        """Compute the outputs, (count, 4), and overwrite `initial` with the last state.
+        """The outputs, (count, 4); `initial` is left where the run ends.
 
-        All are NaN where an equation divides by zero, such as by the speed of a stopped ship.
+        Where an equation divides by nothing, as by the speed of a ship that stands, there are none.
         """
         coefficients = self.kind(*(complex(value) for value in self.expand(parameters)))
         try:
@@ -313,18 +206,3 @@ class Model:
         except ZeroDivisionError:  # numba's, of complex numbers
             initial[:] = np.nan
             return np.full((count, len(MODEL_OUTPUTS)), np.nan + 0j)
-
-    def __getstate__(self) -> Mapping[str, Any]:
-        """Refer to the compiled function by its module and name, not by its machine code."""
-        module, name = self.compiled.__module__, self.compiled.__name__
-        if getattr(sys.modules.get(module), name, None) is not self.compiled:
-            raise PicklingError(
-                f"the model {self.name} cannot be pickled: its compiled function is not {name} of "
-                f"the module {module}"
-            )
-        state = {each.name: getattr(self, each.name) for each in fields(self)}
-        return state | {"compiled": (module, name)}
-
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        module, name = state["compiled"]
-        vars(self).update(state, compiled=getattr(import_module(module), name))

@@ -12,7 +12,7 @@ import numpy as np
 
 from shiplog.checks.log_stats import compute_log_stats
 from shiplog.errors import LogError, UsageError
-from shiplog.resampling import MAX_SAMPLES, Clock, resample_chunks
+from shiplog.resampling import MAX_INSTANTS, Clock, resample_chunks
 from shiplog.types import Channel, FloatArray, TimeArray, TrialLog, concatenate_signals
 from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 
@@ -84,7 +84,7 @@ def wide_table(
     start_ns = min(channel.valid_span_ns[0] for channel in usable.values())
     end_ns = max(channel.valid_span_ns[1] for channel in usable.values())
     count = int((end_ns - start_ns) * 1e-9 / dt + 1e-6) + 1
-    if count > MAX_SAMPLES:
+    if count > MAX_INSTANTS:
         raise LogError(
             f"the times of {log.name} span {(end_ns - start_ns) / 8.64e13:.4g} days, "
             f"{count} steps of {dt:g} s; give a larger dt_secs or correct the clocks"

@@ -4,7 +4,7 @@ from math import pi
 import pytest
 
 from shiplog import UsageError
-from shiplog.units import CATALOGUE, UNITS, conversion_factor, did_you_mean, kind_of
+from shiplog.units import CATALOGUE, UNITS, channel_kind, conversion_factor, did_you_mean
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def test_units_convert_by_their_definitions(
     assert value * conversion_factor(unit, to) == pytest.approx(expected, rel=1e-15)
 
 
-def test_there_and_back_is_where_one_was() -> None:
+def test_a_conversion_and_its_inverse_cancel() -> None:
     for unit, to in product(UNITS, UNITS):
         if UNITS[unit][0] == UNITS[to][0]:
             assert conversion_factor(unit, to) * conversion_factor(to, unit) == pytest.approx(
@@ -36,23 +36,23 @@ def test_there_and_back_is_where_one_was() -> None:
             )
 
 
-def test_a_unit_is_exactly_itself() -> None:
+def test_a_unit_converts_to_itself_with_factor_one() -> None:
     assert all(conversion_factor(unit, unit) == 1.0 for unit in UNITS)
 
 
-def test_what_does_not_measure_the_same_is_not_converted() -> None:
-    with pytest.raises(UsageError, match=r"'deg' cannot be turned into 'm'"):
+def test_units_of_different_quantities_are_not_converted() -> None:
+    with pytest.raises(UsageError, match=r"cannot convert 'deg' to 'm': .* rad and m"):
         conversion_factor("deg", "m")
 
 
-def test_an_unknown_unit_is_named_with_the_nearest_known() -> None:
+def test_an_unknown_unit_is_reported_with_the_nearest_known() -> None:
     with pytest.raises(UsageError, match=r"unknown unit 'rad/sec'; did you mean 'rad/s'\?; known"):
         conversion_factor("rad/sec", "rad/s")
     with pytest.raises(UsageError, match="unknown unit 'furlong'; known are"):
         conversion_factor("m", "furlong")
 
 
-def test_every_channel_is_in_si_but_rpm_and_can_be_shown() -> None:
+def test_every_channel_except_rpm_is_in_si_and_has_a_display_unit() -> None:
     for name, kind in CATALOGUE.items():
         assert kind.name == name
         assert kind.unit == "rpm" or UNITS[kind.unit] == (kind.unit, 1.0)
@@ -61,17 +61,17 @@ def test_every_channel_is_in_si_but_rpm_and_can_be_shown() -> None:
         assert kind.positive
 
 
-def test_the_rudder_and_the_propeller_are_commanded_and_angles_of_the_compass_wrap() -> None:
+def test_rudder_and_rpm_are_commanded_and_compass_angles_are_circular() -> None:
     assert {name for name, kind in CATALOGUE.items() if kind.commanded} == {"rudder", "rpm"}
     assert {"heading", "wind_direction"} == {n for n, kind in CATALOGUE.items() if kind.circular}
 
 
-def test_a_channel_is_found_by_name_or_the_nearest_is_offered() -> None:
-    assert kind_of("speed").unit == "m/s"
+def test_a_channel_kind_is_found_by_name_or_the_nearest_is_suggested() -> None:
+    assert channel_kind("speed").unit == "m/s"
     with pytest.raises(UsageError, match=r"no channel is called 'yaw-rate'; did you mean"):
-        kind_of("yaw-rate")
+        channel_kind("yaw-rate")
 
 
-def test_nothing_is_offered_where_nothing_is_near() -> None:
+def test_a_name_is_suggested_only_if_it_is_similar() -> None:
     assert did_you_mean("xyzzy", CATALOGUE) == ""
     assert did_you_mean("ruder", CATALOGUE) == "; did you mean 'rudder'?"

@@ -18,7 +18,10 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "trial.mcap"
 
 
-@pytest.mark.parametrize("disabled", [(), ("_even",), ("_indexed",), ("_even", "_indexed")])
+@pytest.mark.parametrize(
+    "disabled",
+    [(), ("locate_by_size",), ("locate_by_index",), ("locate_by_size", "locate_by_index")],
+)
 @pytest.mark.parametrize("mixed", [False, True])
 def test_by_their_even_size_by_the_index_or_by_a_walk(
     path: Path, monkeypatch: pytest.MonkeyPatch, disabled: tuple[str, ...], *, mixed: bool
@@ -38,7 +41,7 @@ def test_a_chunk_of_our_own_is_not_walked(
     held = [channel("yaw_rate", 2000, 1), channel("speed", 700, 2)]
     held += [position(40, ("north", "east"))] if mixed else []
     written(path, *held)
-    monkeypatch.delattr(shiplog.mcap.decode, "_walked")
+    monkeypatch.delattr(shiplog.mcap.decode, "_locate_by_walk")
     assert samples(read(path)) == samples_by_mcap(path)
 
 

@@ -10,9 +10,9 @@ from mcap.writer import Writer
 
 import shiplog.mcap.encode
 from shiplog import Channel, LogWriter, TrialLog, write
-from shiplog.mcap.encode import Part, mcap_chunks
+from shiplog.mcap.encode import SampleBatch, encode_mcap_chunks
 from shiplog.mcap.schema import encode_messages, schema_for
-from shiplog.mcap.writer import CHUNK_BYTES
+from shiplog.mcap.writer import MAX_MCAP_CHUNK_BYTES
 from shiplog.units import GEOGRAPHIC
 
 
@@ -54,9 +54,9 @@ def test_every_message_is_the_one_mcaps_own_writer_would_write(seed: int) -> Non
     for got, number, k, was, data in sorted(messages, key=lambda m: m[0]):
         writer.add_message(number, got, data, was, k)
     writer.finish()
-    parts = [Part(number, 0, c) for number, c in enumerate(log, start=1)]
-    for chunk in mcap_chunks(parts, 8192):
-        ours.write(chunk.body.tobytes())
+    parts = [SampleBatch(number, 0, c) for number, c in enumerate(log, start=1)]
+    for chunk in encode_mcap_chunks(parts, 8192):
+        ours.write(chunk.data.tobytes())
     theirs.seek(0)
     expected = b"".join(
         struct.pack("<BQHIQQ", 5, 22 + len(m.data), m.channel_id, m.sequence, m.log_time,
@@ -79,14 +79,14 @@ def test_laid_out_little_by_little_it_is_the_same_as_all_at_once(
         at = np.sort(rng.integers(0, 2000, count))  # many at one instant
         fields = GEOGRAPHIC if name == "geo" else ()
         values = rng.normal(size=(count, len(fields)) if fields else count)
-        parts.append(Part(number, 7, Channel(name, "a", "1", at, at, values, fields)))
-    at_once = b"".join(chunk.body.tobytes() for chunk in mcap_chunks(parts, 4096))
-    monkeypatch.setattr(shiplog.mcap.encode, "LAID_OUT_AT_ONCE", 100)
-    bits = list(mcap_chunks(parts, 4096))
-    assert b"".join(chunk.body.tobytes() for chunk in bits) == at_once
+        parts.append(SampleBatch(number, 7, Channel(name, "a", "1", at, at, values, fields)))
+    at_once = b"".join(chunk.data.tobytes() for chunk in encode_mcap_chunks(parts, 4096))
+    monkeypatch.setattr(shiplog.mcap.encode, "MESSAGES_AT_ONCE", 100)
+    bits = list(encode_mcap_chunks(parts, 4096))
+    assert b"".join(chunk.data.tobytes() for chunk in bits) == at_once
     assert len(bits) > len(at_once) / 4096 + 3
     for chunk in bits:
-        data = chunk.body.tobytes()
+        data = chunk.data.tobytes()
         for channel_id, entries in chunk.index.items():
             for got, offset in entries.tolist():
                 said = struct.unpack_from("<BQHIQ", data, offset)
@@ -105,10 +105,10 @@ def _split(data: bytes) -> list[bytes]:
 @pytest.mark.parametrize("largest", [100, 1000, 1 << 20])
 def test_the_index_says_where_each_message_stands(largest: int) -> None:
     log = trial(np.random.default_rng(9), 150)
-    parts = [Part(number, 0, c) for number, c in enumerate(log, start=1)]
+    parts = [SampleBatch(number, 0, c) for number, c in enumerate(log, start=1)]
     seen = 0
-    for chunk in mcap_chunks(parts, largest):
-        data = chunk.body.tobytes()
+    for chunk in encode_mcap_chunks(parts, largest):
+        data = chunk.data.tobytes()
         assert len(data) <= largest + 200
         for channel_id, entries in chunk.index.items():
             for got, offset in entries.tolist():
@@ -130,6 +130,6 @@ def test_small_chunks_are_gathered_into_large_chunks(tmp_path: pytest.TempPathFa
     assert summary is not None
     sizes = [index.uncompressed_size for index in summary.chunk_indexes]
     assert len(sizes) == 5
-    assert max(sizes) <= CHUNK_BYTES + 1000
-    assert min(sizes) > CHUNK_BYTES / 4
+    assert max(sizes) <= MAX_MCAP_CHUNK_BYTES + 1000
+    assert min(sizes) > MAX_MCAP_CHUNK_BYTES / 4
     write(TrialLog("x", ()), tmp_path / "empty.mcap")

@@ -48,7 +48,7 @@ def test_a_damaged_summary_is_not_believed(tmp_path: Path) -> None:
     assert found.channels[0].topic == "/speed/log"
     assert (found.start_ns, found.end_ns) == (whole.start_ns, whole.end_ns)
     assert found.metadata == whole.metadata
-    assert any("checksum of its summary is wrong" in warning for warning in found.warnings)
+    assert any("checksum of the summary is wrong" in warning for warning in found.warnings)
     assert found.data_lost
 
 

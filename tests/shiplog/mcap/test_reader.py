@@ -33,7 +33,7 @@ from mcap_files import (
 from places import RECORDINGS
 
 import shiplog.mcap.decode
-import shiplog.mcap.scan
+import shiplog.mcap.decompress
 from shiplog import Channel, LogError, LogWriter, TrialLog, UsageError, read, write
 from shiplog.mcap.schema import schema_for
 from shiplog.units import GEOGRAPHIC
@@ -203,9 +203,9 @@ def test_only_the_chunks_of_the_part_are_decompressed(
             writer.write(Channel(name, "test", UNIT[name], at, at, np.full(100, float(number))))
             writer.flush()
     inflated: list[int] = []
-    inflate = shiplog.mcap.scan._inflate
+    inflate = shiplog.mcap.decompress._decompress
     monkeypatch.setattr(
-        shiplog.mcap.scan, "_inflate", lambda *of: inflated.append(of[2]) or inflate(*of)
+        shiplog.mcap.decompress, "_decompress", lambda *of: inflated.append(of[2]) or inflate(*of)
     )
     speed = read(path, channels=["speed"])["speed"]
     assert len(inflated) == 5
@@ -231,7 +231,7 @@ def test_the_index_of_a_chunk_that_is_passed_over_is_not_taken_for_that_of_anoth
                 here.append(Channel("position", "x", "m", at, at, values, ("north", "east")))
             writer.write(*here)
             writer.flush()
-    monkeypatch.delattr(shiplog.mcap.decode, "_walked")
+    monkeypatch.delattr(shiplog.mcap.decode, "_locate_by_walk")
     assert len(read(path, channels=["position"])["position"]) == 300
 
 
@@ -249,7 +249,7 @@ def test_damage_is_noticed_in_the_chunks_of_the_part_and_in_no_other(path: Path)
     assert len(read(path, channels=["speed"])["speed"]) == 300
     part = read(path, channels=["yaw_rate"])
     assert len(part["yaw_rate"]) == 200
-    assert "damaged chunk" in part.warnings[0]
+    assert "damaged MCAP chunk" in part.warnings[0]
     assert part.data_lost
 
 
@@ -277,7 +277,7 @@ def test_every_conformance_file_is_read_as_finished_and_undamaged() -> None:
     assert len(conforming()) == 208
     for file in conforming():
         log = read(file)
-        assert all("not ours" in warning for warning in log.warnings), file.name
+        assert all("of other programs" in warning for warning in log.warnings), file.name
         records = json.loads((CONFORMANCE / "expected" / f"{file.stem}.json").read_text())[
             "records"
         ]
@@ -332,7 +332,7 @@ def test_foreign_topics_are_passed_over_with_a_warning(path: Path) -> None:
         writer.finish()
     log = read(path)
     assert log.channels == ()
-    assert log.warnings == ("passed over 3 topics not ours: /imu, /camera, /raw",)
+    assert log.warnings == ("ignored 3 topics of other programs: /imu, /camera, /raw",)
 
 
 def test_a_channel_in_another_unit_is_converted(path: Path) -> None:
@@ -372,7 +372,7 @@ def test_a_message_of_the_usual_length_with_another_field_is_not_taken_for_it(pa
 
 def test_a_message_that_is_none_is_an_error(path: Path) -> None:
     foreign(path, [scalar(1.0), b"\x09\x00"])
-    with pytest.raises(LogError, match=r"'yaw_rate' holds messages that are no shiplog\.Scalar"):
+    with pytest.raises(LogError, match=r"'yaw_rate' has messages that are not shiplog\.Scalar"):
         read(path)
 
 
@@ -407,7 +407,7 @@ def test_times_beyond_the_signed_range_do_not_crash(path: Path) -> None:
     [
         (b"", "the file is empty"),
         (b"\x89MCA", "not an MCAP file"),
-        (b"time,yaw_rate\n0,1\n", "not an MCAP file; tables are read by `shiplog convert`"),
+        (b"time,yaw_rate\n0,1\n", "not an MCAP file; `shiplog convert` reads tables"),
     ],
 )
 def test_what_is_no_mcap_is_refused_by_name(path: Path, contents: bytes, says: str) -> None:
@@ -443,7 +443,7 @@ def test_an_unfinished_flushed_file_is_read_whole(path: Path) -> None:
     assert log.metadata["place"] == "Neva"
     assert len(log.warnings) == 1
     assert "was not finished" in log.warnings[0]
-    assert "its 1000 whole samples were read" in log.warnings[0]
+    assert "its 1000 complete samples were read" in log.warnings[0]
     assert not log.data_lost
 
 
@@ -539,8 +539,8 @@ def test_a_bit_flipped_in_a_message_costs_its_chunk_and_no_other(path: Path) -> 
     log = read(path)
     assert samples(log) == {t: told[:200] + told[300:] for t, told in samples(held).items()}
     (warning,) = log.warnings
-    assert warning.startswith("lost what was received 2023-11-14T")
-    assert "damaged chunk" in warning
+    assert warning.startswith("lost the samples received from 2023-11-14T")
+    assert "damaged MCAP chunk" in warning
 
 
 def test_a_damaged_first_chunk_does_not_cost_the_others(path: Path) -> None:
@@ -559,7 +559,7 @@ def test_samples_that_nothing_describes_any_more_are_counted(path: Path) -> None
     path.write_bytes(flipped(data, 8 * (end - 20))[:data_end])
     log = read(path)
     assert log.channels == ()
-    assert "lost 800 samples: nothing describes their channel" in log.warnings[1]
+    assert "lost 800 samples: the description of their channel" in log.warnings[1]
 
 
 @given(ANYWHERE)
@@ -587,7 +587,7 @@ def test_an_index_that_names_a_message_twice_is_not_believed(path: Path) -> None
     path.write_bytes(bytes(changed))
     log = read(path)
     assert samples(log) == samples(held)
-    assert any("checksum of its data is wrong" in warning for warning in log.warnings)
+    assert any("checksum of the data section is wrong" in warning for warning in log.warnings)
 
 
 def test_an_index_of_another_channel_is_not_believed(path: Path) -> None:
@@ -646,5 +646,5 @@ def test_one_channel_may_be_named_without_a_tuple(path: Path) -> None:
     both = [Channel(n, "a", "1", stamps, stamps, np.arange(5.0)) for n in ("speed", "rpm")]
     write(TrialLog("x", (replace(both[0], unit="m/s"), replace(both[1], unit="rpm"))), path)
     assert [c.name for c in read(path, channels="rpm")] == ["rpm"]
-    with pytest.raises(UsageError, match="the span ends before it starts"):
+    with pytest.raises(UsageError, match="end_ns 1 is before start_ns 2; exchange them"):
         read(path, start_ns=2, end_ns=1)

@@ -49,8 +49,8 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shiplog.mcap.stream, "HELD_SAMPLES", 10)
-    monkeypatch.setattr(shiplog.mcap.stream, "CHUNK_SAMPLES", CHUNK)
+    monkeypatch.setattr(shiplog.mcap.stream, "MAX_SAMPLES_IN_MEMORY", 10)
+    monkeypatch.setattr(shiplog.mcap.stream, "FILE_CHUNK_SAMPLES", CHUNK)
 
 
 def in_its_file(path: Path) -> LogFile:
@@ -169,7 +169,7 @@ def test_a_short_log_is_read_whole(path: Path, monkeypatch: pytest.MonkeyPatch) 
     for contents in (data, data[:-40]):  # with a summary and without
         path.write_bytes(contents)
         for enough, kind in ((2000, TrialLog), (1999, LogFile)):
-            monkeypatch.setattr(shiplog.mcap.stream, "HELD_SAMPLES", enough)
+            monkeypatch.setattr(shiplog.mcap.stream, "MAX_SAMPLES_IN_MEMORY", enough)
             log = open_log(path)
             assert isinstance(log, kind)
             assert log.warnings == read(path).warnings
@@ -368,7 +368,7 @@ def test_a_damaged_first_chunk_costs_the_chunks_no_other(path: Path) -> None:
 def test_a_pass_takes_no_more_memory_the_longer_the_file(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shiplog.mcap.stream, "CHUNK_SAMPLES", 1 << 15)
+    monkeypatch.setattr(shiplog.mcap.stream, "FILE_CHUNK_SAMPLES", 1 << 15)
     peaks = []
     for count in (100_000, 400_000):
         write(TrialLog("t", (channel("yaw_rate", count),)), path)

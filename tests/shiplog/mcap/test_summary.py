@@ -12,7 +12,7 @@ from mcap.writer import IndexType, Writer
 from mcap_files import channel, flipped, flushed, mcap_chunks, position, top_level, written
 
 from shiplog import TrialLog, write
-from shiplog.mcap.summary import Summary, read_summary
+from shiplog.mcap.summary import McapSummary, read_summary
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "trial.mcap"
 
 
-def summary_of(path: Path) -> Summary | None:
+def summary_of(path: Path) -> McapSummary | None:
     with path.open("rb") as stream:
         return read_summary(stream)
 
@@ -44,7 +44,7 @@ def test_it_says_what_mcaps_own_reader_finds(path: Path, *, by_us: bool) -> None
     assert found.statistics == theirs.statistics
     assert found.metadata == dict(metadata)
     assert found.vessel_toml == (vessels[0] if vessels else None)
-    places = found.chunk_places()
+    places = found.mcap_chunk_locations()
     assert places is not None
     assert len(places) > 1
     assert [(p.offset, p.first_ns, p.last_ns, p.channel_ids) for p in places] == [
@@ -72,7 +72,7 @@ def test_where_messages_stand_in_no_indexed_chunk_the_chunks_are_not_told(
     written(path, channel("speed", 100), **options)
     found = summary_of(path)
     assert found is not None
-    assert found.chunk_places() is None
+    assert found.mcap_chunk_locations() is None
 
 
 def test_a_bit_flipped_anywhere_in_it_makes_it_none(path: Path) -> None:

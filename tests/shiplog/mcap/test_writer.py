@@ -13,7 +13,7 @@ from mcap.reader import NonSeekingReader, make_reader
 
 import shiplog.mcap.writer
 from shiplog import Channel, LogWriter, ShiplogError, TrialLog, UsageError, read, write
-from shiplog.mcap.encode import McapChunk, Part, mcap_chunks
+from shiplog.mcap.encode import McapChunk, SampleBatch, encode_mcap_chunks
 from shiplog.units import GEOGRAPHIC
 
 START = 1_700_000_000_000_000_000
@@ -299,7 +299,7 @@ os._exit(9)
     assert log.metadata["place"] == "Neva"
     assert log.vessel_toml == "T1 = 1"
     assert len(log.warnings) == 1
-    assert "1000 whole samples were read" in log.warnings[0]
+    assert "1000 complete samples were read" in log.warnings[0]
 
 
 def test_a_unit_that_no_reader_could_convert_is_refused_before_it_is_recorded(path: Path) -> None:
@@ -329,11 +329,11 @@ def test_a_failure_midway_leaves_what_was_there(
         write(trial(channel("speed", 30)), path)
     before = path.read_bytes() if stands else None
 
-    def full_disk(parts: list[Part], largest: int) -> Iterator[McapChunk]:
-        yield from mcap_chunks(parts, largest)
+    def full_disk(batches: list[SampleBatch], max_bytes: int) -> Iterator[McapChunk]:
+        yield from encode_mcap_chunks(batches, max_bytes)
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(shiplog.mcap.writer, "mcap_chunks", full_disk)
+    monkeypatch.setattr(shiplog.mcap.writer, "encode_mcap_chunks", full_disk)
     with pytest.raises(ShiplogError, match="no space left on device"):
         write(trial(channel("speed", 1000)), path)
     assert [p.read_bytes() for p in path.parent.iterdir()] == ([before] if stands else [])

@@ -68,7 +68,7 @@ def test_all_faults_of_a_layout_are_told_at_once_in_one_line() -> None:
         (f"{MINIMAL}[rudder]\ncolumn = 2\nunit = 'deg'", "name the same column 2"),
         (f"{MINIMAL}[rudder]\ncolumn = 'd'\nunit = 'deg'", "that needs header = true"),
         (f"{MINIMAL}[rudder]\ncolumn = true\nunit = 'deg'", "rudder.column must be a number"),
-        (f"{MINIMAL}[rudder]\ncolumn = 3\nunit = 'm'", "cannot be turned into 'rad'"),
+        (f"{MINIMAL}[rudder]\ncolumn = 3\nunit = 'm'", "cannot convert 'm' to 'rad'"),
         (f"{MINIMAL}[rudder]\ncolumn = 3\nunit = 'deg'\nrebuild = 'x'", "'rudder.rebuild'"),
         (f"{MINIMAL}[heading]\ncolumn = 3\nunit = 'deg'\nrebuild = 'x'", "must be 'from yaw_rate'"),
         (f"{MINIMAL}[velocity_north]\ncolumn = 3\nunit = 'kn'", "only with its other component"),

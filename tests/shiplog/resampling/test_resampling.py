@@ -266,7 +266,7 @@ def test_a_step_that_is_none_is_refused(dt_secs: float) -> None:
 def test_a_long_silence_comes_in_chunks_as_it_goes_by(
     silent: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("shiplog.resampling.MOST_INSTANTS", 50)
+    monkeypatch.setattr("shiplog.resampling.grid.MAX_CHUNK_INSTANTS", 50)
     seconds = np.arange(3000.0)
     kept = (seconds < 300) | (seconds > 2500)
     names = ("yaw_rate", "rudder", "heading")
