@@ -15,9 +15,13 @@ from time import process_time
 
 import numpy as np
 
-from analysis.identification.least_squares import ResidualStd, eliminated, information
-from analysis.identification.output_error import LEAST_STD, output_error, pose
-from analysis.identification.segment import Segment, segments_of
+from analysis.identification.least_squares import (
+    ResidualStd,
+    information_matrix,
+    marginal_information,
+)
+from analysis.identification.output_error import MIN_STDS, make_problem, output_error
+from analysis.identification.segment import Segment, split_into_segments
 from analysis.identification.uncertainty import uncertainty
 from recorders.simulated.sensors import Sensor, suite
 from recorders.simulated.simulate import simulate
@@ -97,7 +101,7 @@ def known_trial(
     vessel = load_vessel("table1")[0]
     trial = simulate(vessel, manoeuvre, duration_secs=seconds, seed=seed, sensors=suite(noise))
     log = TrialLog("trial", trial.channels, trial.metadata, trial.vessel_toml)
-    return segments_of(resample(log, channels=CHANNELS), "trial")[0]
+    return split_into_segments(resample(log, channels=CHANNELS), "trial")[0]
 
 
 def one(
@@ -109,7 +113,7 @@ def one(
     begin = {n: true[n] * (1 + off * s) for n, s in zip(model.names, signs, strict=True)}
     started = process_time()
     start = {name: begin[name] for name in sought(model, known)} if off else None
-    fit = output_error([trial], model, known=known, start=start)
+    fit = output_error([trial], model, fixed=known, start=start)
     spent = process_time() - started
     found = uncertainty(fit)
     exact = np.array([true[name] for name in found.names])
@@ -127,16 +131,18 @@ def true_bound(
     and the wave, with the identifier's priors; the noise of each sample is known, and Gaussian.
     """
     clean, true = known_trial(manoeuvre, seed, noise="none"), truth()
-    posed = pose([clean], model, known=known)
+    posed = make_problem([clean], model, fixed=known)
     values = np.array([true[name] for name in model.names])
     problem = replace(posed, values=values, waves=((WAVE,),) if noise == "paper" else ())
     columns = zip(problem.outputs, clean.measured.T, strict=False)
     stds = np.column_stack(
-        [_std(suite(noise)[name], column, LEAST_STD[name]) for name, column in columns]
+        [_std(suite(noise)[name], column, MIN_STDS[name]) for name, column in columns]
     )
     z, left = problem.start(), [np.zeros_like(stds)]
-    told = information(problem, left, [ResidualStd(stds, stds)], [problem.jacobian(z, 0)], power=0)
-    precision = eliminated(told + np.diag(problem.prior[1]), len(problem.free))
+    told = information_matrix(
+        problem, left, [ResidualStd(stds, stds)], [problem.jacobian(z, 0)], power=0
+    )
+    precision = marginal_information(told + np.diag(problem.prior[1]), len(problem.free))
     scale = np.sqrt(np.diag(precision))
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(precision / np.outer(scale, scale)))) / scale)
 

@@ -84,7 +84,7 @@ def _by_each(trial: Segment, truth: Coefficients, seed: int) -> Iterator[tuple[s
     )
     yield "integral form, no prior", _errors(trial, truth, _integral(trial, truth))
     yield "output error, no prior", _errors(trial, truth, _nine(free))
-    tied = output_error([trial], ship_model("burylin-tied"), known={"T3": truth.e / truth.d})
+    tied = output_error([trial], ship_model("burylin-tied"), fixed={"T3": truth.e / truth.d})
     yield "output error, tied, T3 known", _errors(trial, truth, _nine(tied))
 
 

@@ -7,14 +7,14 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from analysis.identification.initial_guess import starts
-from analysis.identification.least_squares import OUTLYING
+from analysis.identification.initial_guess import initial_guesses
+from analysis.identification.least_squares import OUTLIER_STDS
 from analysis.identification.output_error import (
     OutputError,
-    first_residual_stds,
-    fit,
+    fit_problem,
+    initial_residual_stds,
+    make_problem,
     output_error,
-    pose,
 )
 from analysis.identification.problem import Nuisance
 from analysis.identification.segment import Segment
@@ -67,7 +67,9 @@ def _met(met: bool) -> str:
 
 
 def _ours(trial: Segment) -> OutputError:
-    return fit(pose([trial], ship_model("burylin"), nuisance=Nuisance.none()), waves=False)
+    return fit_problem(
+        make_problem([trial], ship_model("burylin"), nuisance=Nuisance.none()), waves=False
+    )
 
 
 def _stds(ours: OutputError) -> FloatArray:
@@ -82,7 +84,7 @@ def peer(trial: Segment, ours: OutputError) -> FloatArray:
     slope = np.append(np.diff(delta), 0.0) / dt
     time, alphas = trial.signals.time_secs - trial.signals.time_secs[0], problem.values[9:]
     weights = 1 / ours.residual_stds[0].effective
-    start = starts(problem, first_residual_stds(problem))[0][:12]  # as ours begins
+    start = initial_guesses(problem, initial_residual_stds(problem))[0][:12]  # as ours begins
     known = np.isfinite(problem.measured(0))
 
     def simulated(z: FloatArray) -> FloatArray:
@@ -108,6 +110,11 @@ def peer(trial: Segment, ours: OutputError) -> FloatArray:
         return ((problem.measured(0) - simulated(z)) * weights)[known]
 
     solved = least_squares(
-        off, start, x_scale=_stds(ours), loss="soft_l1", f_scale=OUTLYING, diff_step=DIFFERENCE * 12
+        off,
+        start,
+        x_scale=_stds(ours),
+        loss="soft_l1",
+        f_scale=OUTLIER_STDS,
+        diff_step=DIFFERENCE * 12,
     )
     return np.asarray(solved.x)

@@ -13,7 +13,7 @@ from PIL import Image
 
 from analysis.identification.identify import IdentifiedShip, identify
 from analysis.identification.prediction import zigzag_overshoots
-from analysis.identification.runs import run_of
+from analysis.identification.runs import run_from_log
 from analysis.identification.validation import Validation, validate
 from shiplog import TrialLog, Vessel, load_vessel
 from shiplog.tables.foreign import read_table
@@ -141,7 +141,7 @@ def _sailed_rows(
 ) -> Iterator[tuple[str, ...]]:
     """The overshoots under the rudder as it was recorded."""
     for angle, log in zip(OVERSHOOTS, zigzags, strict=True):
-        run = run_of(log)
+        run = run_from_log(log)
         figures = [
             {figure.name: figure for figure in validate(each.fit, run)[0].figures}
             for each in found.values()

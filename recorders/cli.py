@@ -1,146 +1,79 @@
-"""The verb record."""
+"""The verb `record`: one subcommand for each installed source of samples."""
 
 import argparse
-import re
 import sys
-from math import radians
 from pathlib import Path
+from typing import Any
 
 from shiplog.cli.console import progress
-from shiplog.cli.options import NUMBER, assigned_numbers
-from shiplog.cli.paths import require_distinct, require_outputs, require_suffix
+from shiplog.cli.paths import require_outputs, require_suffix
 from shiplog.cli.verb import ExitCode, Verb
-from shiplog.errors import UsageError
+from shiplog.errors import ShiplogError
+from shiplog.extensions import extension_names, load_extension
 from shiplog.files import is_device
+
+from .source import RecorderCommand
+
+GROUP = "shiplog.recorders"
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
+    """Add a subcommand for each source; one that cannot be loaded says so when it is used."""
     sources = parser.add_subparsers(metavar="SOURCE", required=True)
-    simulate = sources.add_parser(
-        "simulate",
-        help="a simulated trial",
-        description="Sail a manoeuvre with a model ship and record what its sensors measure.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="""examples:
-  shiplog record simulate zigzag-20-20 --seed 1 -o trial.mcap
-  shiplog record simulate zigzag-20-20 --gust 2@200 --noise white -o gust.mcap
-manoeuvres:
-  turning-circle[-ANGLE][-port] (35 degrees)  zigzag-RUDDER-HEADING[-port]
-  pull-out[-ANGLE] (20)
-  spiral  pseudo-random  paper
-sensors, each setting in SI:
-  --sensor yaw_rate.bias=1e-4 --sensor speed.rate_hz=2 --sensor rudder.dropout=0.02
-  --sensor yaw_rate.spikes=0.001 --sensor yaw_rate.spike_size=0.05
-  --sensor sway.white=0.05 measures the sway as well, which a model may have
-  rate_hz, jitter_secs, delay_secs, white, uniform, uniform_relative, wave, wave_tau_secs,
-  bias, spikes (share of samples), spike_size, dropout (share of samples lost), dropout_secs""",
+    for name in extension_names(GROUP):
+        try:
+            command = load_extension(GROUP, name, RecorderCommand, "recorder")
+        except ShiplogError as error:
+            _add_unloadable(sources, name, error)
+            continue
+        own = sources.add_parser(
+            name,
+            help=command.help,
+            description=f"{command.help[0].upper()}{command.help[1:]}.",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        command.configure(own)
+        own.add_argument("-o", "--output", required=True, metavar="FILE", help="the log to write")
+        own.set_defaults(recorder=command)
+
+
+def _add_unloadable(sources: Any, name: str, error: ShiplogError) -> None:  # noqa: ANN401 - argparse's private class
+    """Add a subcommand that accepts any arguments and reports the error."""
+
+    def report(_: argparse.Namespace) -> Any:  # noqa: ANN401 - it never returns
+        raise error
+
+    # with this prefix no argument is an option, so that none is rejected before the report
+    own = sources.add_parser(
+        name, help="(cannot be loaded; use it to see why)", prefix_chars="\0", add_help=False
     )
-    simulate.add_argument("manoeuvre", metavar="MANOEUVRE", help="such as zigzag-20-20")
-    simulate.add_argument(
-        "--vessel", default="table1", help="a preset (table1, table1-rad) or a vessel.toml"
-    )
-    simulate.add_argument(
-        "--seed", type=int, default=0, help="of the random numbers; the same seed repeats a trial"
-    )
-    simulate.add_argument(
-        "--duration", type=float, default=600.0, metavar="S", help="in seconds (default: 600)"
-    )
-    simulate.add_argument(
-        "--noise", default="paper", help="of the sensors: none, white, paper (default)"
-    )
-    simulate.add_argument(
-        "--sensor", action="append", default=[], metavar="CHANNEL.SETTING=VALUE", help="see below"
-    )
-    simulate.add_argument(
-        "--gust",
-        action="append",
-        default=[],
-        metavar="DEG@START[+LENGTH]",
-        help="a yaw moment worth DEG of rudder at the approach speed (to port: --gust=-2@100)",
-    )
-    simulate.add_argument(
-        "--wave", metavar="DEG@PERIOD", help="a sinusoidal yaw moment worth DEG of rudder"
-    )
-    simulate.add_argument(
-        "--random-forcing",
-        metavar="DEG[,MM]",
-        help="a white yaw moment and surge force: the standard deviations of their means over a "
-        "second, in degrees of rudder at the approach speed and in mm/s²",
-    )
-    simulate.add_argument(
-        "--truth", metavar="FILE", help="write the true motion and disturbances there, at 10 Hz"
-    )
-    simulate.add_argument("-o", "--output", required=True, metavar="FILE", help="the log")
+    own.add_argument("arguments", nargs="*")
+    own.set_defaults(recorder=RecorderCommand("", lambda _: None, report), output=None)
 
 
 def _record(arguments: argparse.Namespace) -> ExitCode:
-    require_suffix(".mcap", arguments.output, arguments.truth)
-    require_distinct([arguments.output, arguments.truth], [arguments.vessel])
-    require_outputs(arguments.output, arguments.truth)
-    from recorders.record import record
-    from recorders.simulated.sensors import suite
-    from recorders.simulated.simulate import simulate
-    from recorders.simulated.trajectory import Gust, RandomForcing, WaveMoment
-    from shiplog.mcap.writer import write
-    from shiplog.vessel.vessel_parser import load_vessel
+    """Open the source that was asked for and write it to the log."""
+    command: RecorderCommand[Any] = arguments.recorder
+    require_outputs(arguments.output)
+    require_suffix(".mcap", arguments.output)
+    source = command.open(arguments)
+    from .record import record
 
-    vessel, text = load_vessel(arguments.vessel)
-    random_forcing, wave = arguments.random_forcing, arguments.wave
-    with progress("recorders") as on_progress:
-        on_progress("simulate")
-        trial = simulate(
-            vessel,
-            arguments.manoeuvre,
-            duration_secs=arguments.duration,
-            seed=arguments.seed,
-            sensors=suite(
-                arguments.noise,
-                assigned_numbers(arguments.sensor, "--sensor", "yaw_rate.bias=1e-4"),
-                angle_unit=vessel.angle_unit,
-            ),
-            gusts=tuple(Gust(*_gust(text)) for text in arguments.gust),
-            wave=WaveMoment(*_wave(wave)) if wave else None,
-            random_forcing=(
-                None if random_forcing is None else RandomForcing(*_random_forcing(random_forcing))
-            ),
-            vessel_toml=text,
-        )
+    with progress() as on_progress:
         on_progress("write")
-        recorded = record(
-            trial, arguments.output, on_chunk=lambda n: on_progress(f"write: {n} samples")
+        recording = record(
+            source, arguments.output, on_chunk=lambda n: on_progress(f"write: {n} samples")
         )
-        if arguments.truth and not recorded.interrupted:
-            write(trial.truth(), arguments.truth)
-    summary = f"{arguments.output}: {recorded.samples} samples of {len(trial.channels)} channels"
-    print(summary, file=sys.stderr if is_device(Path(arguments.output)) else sys.stdout)
-    if recorded.interrupted:
+        if not recording.interrupted:
+            command.finish(arguments, source)
+    output = Path(arguments.output)
+    print(
+        f"{output}: {recording.samples} samples of {recording.channels} channels",
+        file=sys.stderr if is_device(output) else sys.stdout,
+    )
+    if recording.interrupted:
         print("interrupted: the log ends there", file=sys.stderr)
     return ExitCode.OK
-
-
-def _gust(text: str) -> tuple[float, ...]:
-    """Parse `2@200+60`: the rudder in rad, the start and, where given, the length in s."""
-    match = re.fullmatch(rf"{NUMBER}@{NUMBER}(?:\+{NUMBER})?", text)
-    if not match:
-        raise UsageError(f"--gust takes DEG@START[+LENGTH], such as 2@200+60, not {text!r}")
-    angle, *times = (float(number) for number in match.groups() if number is not None)
-    return (radians(angle), *times)
-
-
-def _wave(text: str) -> tuple[float, float]:
-    """Parse `0.5@8`: the rudder in rad and the period in s."""
-    match = re.fullmatch(rf"{NUMBER}@{NUMBER}", text)
-    if not match or float(match[2]) <= 0:
-        raise UsageError(f"--wave takes DEG@PERIOD, such as 0.5@8, not {text!r}")
-    return radians(float(match[1])), float(match[2])
-
-
-def _random_forcing(text: str) -> tuple[float, float]:
-    """Parse `0.2,5`: the rudder in rad and the force in m/s², 0 where none is given."""
-    match = re.fullmatch(rf"{NUMBER}(?:,{NUMBER})?", text)
-    if not match:
-        raise UsageError(f"--random-forcing takes DEG[,MM], such as 0.2,5, not {text!r}")
-    return radians(float(match[1])), float(match[2] or 0) / 1000
 
 
 RECORD = Verb(

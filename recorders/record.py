@@ -1,9 +1,9 @@
-"""A source to a file: the one loop that every recorder runs in."""
+"""The loop that writes a source of samples to a log, safe against crashes and Ctrl-C."""
 
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 from shiplog.errors import ShiplogError
 from shiplog.files import is_device, write_error
@@ -12,11 +12,23 @@ from shiplog.mcap.writer import LogWriter
 from .source import Source
 
 
-class Recorded(NamedTuple):
-    """What came of a recording."""
+@dataclass(frozen=True)
+class Recording:
+    """What a recording holds.
+
+    Attributes
+    ----------
+    samples
+        The number of samples written, of all channels.
+    channels
+        The number of channels written.
+    interrupted
+        Whether Ctrl-C ended the recording.
+    """
 
     samples: int
-    interrupted: bool  # by Ctrl-C
+    channels: int
+    interrupted: bool
 
 
 def record(
@@ -24,13 +36,28 @@ def record(
     path: str | os.PathLike[str],
     *,
     on_chunk: Callable[[int], None] = lambda _: None,
-) -> Recorded:
-    """Write all that `source` yields to `path`.
+) -> Recording:
+    """Write everything that a source yields to a log.
 
-    `on_chunk` is told the samples written so far. While recording, the log grows beside its final
-    name with `.part` behind it, readable up to the last chunk even if the process is killed. Ctrl-C
-    ends the recording, not the log. If the source fails, what was received stays in the `.part`
-    file, finished, and the error says so; `path` then is as it was before.
+    While recording, the log grows beside its final name with ``.part`` appended, readable up to the
+    last chunk even if the process is killed. Ctrl-C ends the recording and keeps the log. If the
+    source fails, what was received until then stays in the ``.part`` file, complete, and the error
+    names it; an older file at `path` is left as it was.
+
+    Parameters
+    ----------
+    source
+        Where the samples come from.
+    path
+        The log to write; ``.mcap`` by convention. A device such as ``/dev/stdout`` is written
+        directly.
+    on_chunk
+        Called after each chunk with the number of samples written so far.
+
+    Raises
+    ------
+    ShiplogError
+        The file cannot be written, an unfinished recording lies beside it, or the source failed.
     """
     final = Path(path)
     part = final if is_device(final) else final.with_name(final.name + ".part")
@@ -38,16 +65,17 @@ def record(
         raise write_error(final, IsADirectoryError())
     if part != final and part.exists():
         raise ShiplogError(
-            "a recording that was not finished lies there; rescue it with `shiplog convert`, "
+            "an unfinished recording lies there; rescue it with `shiplog convert`, "
             f"or delete it: {part}"
         )
-    interrupted = False
+    interrupted, topics = False, set[str]()
     writer = LogWriter(part, metadata=source.metadata, vessel_toml=source.vessel_toml)
     try:
         with writer:
             for chunk in source.chunks():
                 writer.write(*chunk)
                 writer.flush()
+                topics.update(channel.topic for channel in chunk)
                 on_chunk(writer.samples)
     except KeyboardInterrupt:
         interrupted = True
@@ -59,4 +87,4 @@ def record(
         raise
     if part != final:
         part.replace(final)
-    return Recorded(writer.samples, interrupted)
+    return Recording(writer.samples, len(topics), interrupted)

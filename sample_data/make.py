@@ -1,4 +1,8 @@
-"""Make the sample data: `python sample_data/make.py` (then look, then `shiplog check --update`)."""
+"""Make the sample data: `python sample_data/make.py`.
+
+The files stay the same to the last bit unless the simulation changes. After a change that is meant,
+look at the replays, then run `shiplog check sample_data --update`.
+"""
 
 from math import radians
 from pathlib import Path
@@ -12,7 +16,7 @@ from shiplog.vessel.presets import PRESETS
 HERE = Path(__file__).parent
 TRUTH_HZ = 2.0
 
-# name: manoeuvre, duration in s, seed, what is wrong with the sensors
+# name: manoeuvre, duration in s, seed, changed settings of the sensors
 SAMPLES = {
     "turning_circle_35": ("turning-circle", 500.0, 1, {}),
     "zigzag_20_20": ("zigzag-20-20", 600.0, 2, {}),
@@ -36,15 +40,15 @@ SAMPLES = {
 
 
 def main() -> None:
-    """Write every sample with its truth, and the presets as vessel files."""
+    """Write every sample with its true motion, and the presets as vessel files."""
     vessel, text = load_vessel("table1")
-    for name, (manoeuvre, duration_secs, seed, faults) in SAMPLES.items():
+    for name, (manoeuvre, duration_secs, seed, settings) in SAMPLES.items():
         trial = simulate(
             vessel,
             manoeuvre,
             duration_secs=duration_secs,
             seed=seed,
-            sensors=suite("paper", faults),
+            sensors=suite("paper", settings),
             vessel_toml=text,
         )
         record(trial, HERE / f"{name}.mcap")

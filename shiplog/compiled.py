@@ -17,6 +17,8 @@ import numba
 from numba import types
 from numba.extending import overload
 
+from .extensions import extension_sources
+
 F = TypeVar("F", bound=Callable[..., object])
 
 PROJECT_FOLDER = Path(__file__).parents[1]
@@ -25,16 +27,17 @@ MIN_AGE_TO_DELETE_SECS = 86_400.0  # a younger cache may belong to a running pro
 
 
 def _cache_folder() -> Path:
-    """Return the folder of the machine code, named after a hash of all sources.
+    """Return the folder of the machine code, named after a hash of all sources it depends on.
 
     Numba's own cache checks only the file of a compiled function. The machine code also contains
     the functions it calls, the constants it reads and the layout of the NamedTuples it takes;
-    after a change in another file, outdated machine code would run.
+    after a change in another file, outdated machine code would run. The equations of a ship model
+    of another package become a part of our loops, too.
     """
     digest = sha256()
-    for package in PACKAGES:
-        for path in sorted((PROJECT_FOLDER / package).rglob("*.py")):
-            digest.update(path.read_bytes())
+    own = (path for package in PACKAGES for path in (PROJECT_FOLDER / package).rglob("*.py"))
+    for path in sorted({*own, *extension_sources("shiplog.ship_models")}):
+        digest.update(path.read_bytes())
     parent = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _default_cache_parent()
     return parent / f"shiplog-{digest.hexdigest()[:16]}"
 

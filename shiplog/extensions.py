@@ -1,6 +1,8 @@
 """Objects that installed packages add to shiplog by entry point."""
 
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TypeVar
 
 from .errors import ShiplogError, UsageError
@@ -18,6 +20,21 @@ def extension_names(group: str) -> tuple[str, ...]:
     ('simulate',)
     """
     return tuple(sorted({entry.name for entry in entry_points(group=group)}))
+
+
+def extension_sources(group: str) -> list[Path]:
+    """List the Python files of the packages that declare a group's entry points, importing none.
+
+    Of each package these are all files below its top-level module.
+    """
+    files: set[Path] = set()
+    for module in {entry.module.partition(".")[0] for entry in entry_points(group=group)}:
+        spec = find_spec(module)
+        folders = list((spec and spec.submodule_search_locations) or ())
+        files |= {file for folder in folders for file in Path(folder).rglob("*.py")}
+        if spec and spec.origin and not folders:
+            files.add(Path(spec.origin))
+    return sorted(files)
 
 
 def load_extension(group: str, name: str, kind: type[T], noun: str) -> T:

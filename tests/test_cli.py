@@ -399,7 +399,7 @@ def test_a_recording_that_was_killed_is_not_recorded_over(
 ) -> None:
     Path("k.mcap.part").write_bytes(b"hours of trial")
     simulate = "record simulate spiral --duration 20 -o k.mcap"
-    assert "not finished lies there" in refusal(capsys, FAILURE, *simulate.split())
+    assert "an unfinished recording lies there" in refusal(capsys, FAILURE, *simulate.split())
     assert Path("k.mcap.part").read_bytes() == b"hours of trial"
 
 
@@ -437,7 +437,7 @@ def test_a_contrary_rudder_is_said_when_a_table_is_converted(
         layout += f'[{name}]\ncolumn = {i}\nunit = "{unit}"\n'
     Path("layout.toml").write_text(layout)
     assert main(["convert", "run.txt", "run.mcap", "--layout", "layout.toml"]) == FINE
-    assert "its sign is contrary" in capsys.readouterr().err
+    assert "its sign is reversed" in capsys.readouterr().err
 
 
 def test_without_a_verb_the_help_is_shown(capsys: pytest.CaptureFixture[str]) -> None:

@@ -87,6 +87,6 @@ def _in_free_form(fit: OutputError) -> OutputError:
     known = {name: start[name] for name in ("alpha1", "alpha2", "alpha3")}
     start = {name: value for name, value in start.items() if name not in known}
     return output_error(
-        problem.segments, free, start=start, known=known, nuisance=problem.nuisance,
+        problem.segments, free, start=start, fixed=known, nuisance=problem.nuisance,
         outputs=problem.outputs,
     )  # fmt: skip

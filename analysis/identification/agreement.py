@@ -15,10 +15,10 @@ from scipy.special import gammaincinv
 
 from shiplog.types import FloatArray
 
-from .least_squares import Minimum, ResidualStd, eliminated, minimise, total_cost
-from .output_error import OutputError, settled
+from .least_squares import Minimum, ResidualStd, marginal_information, minimise, total_cost
+from .output_error import OutputError, reweighted_fit
 from .problem import Problem, residuals
-from .segment import LEAST_SECS
+from .segment import MIN_SEGMENT_SECS
 
 DOUBTFUL = 0.01  # by chance so rarely, and runs contradict each other
 INDEPENDENT = 2  # of the parameters, in effect: they are correlated
@@ -36,8 +36,8 @@ class Agreement:
 
     names: tuple[str, ...]
     by_own_noise: tuple[float, ...]
-    by_noise_of_all: tuple[float, ...]
-    odd: str | None = None  # the run without which the others agree best; None of fewer than three
+    by_common_noise: tuple[float, ...]
+    outlier: str | None = None  # without it the others agree best
 
     @property
     def contradiction(self) -> float:
@@ -45,9 +45,9 @@ class Agreement:
         return _together(self.by_own_noise)
 
     @property
-    def enlarged(self) -> float:
+    def enlargement(self) -> float:
         """By how much errors by the noise of all are to be enlarged; 1 where it may be chance."""
-        return _together(self.by_noise_of_all)
+        return _together(self.by_common_noise)
 
 
 def _together(ratios: Sequence[float]) -> float:
@@ -60,7 +60,7 @@ def _together(ratios: Sequence[float]) -> float:
     return float(np.sqrt(told)) if told > chance else 1.0
 
 
-def agreement_of(fit: OutputError) -> Agreement:
+def assess_agreement(fit: OutputError) -> Agreement:
     """How the runs of a fit agree, or the halves of a single one."""
     parts = _runs(fit) if len(fit.problem.runs) > 1 else _halves(fit)
     alone = [_alone(part) for part in parts]
@@ -83,7 +83,7 @@ def _runs(fit: OutputError) -> list[_Part]:
     problem, z = fit.problem, fit.minimum.unknowns
     return [
         _Part(
-            problem.segments[run[0]].name, *problem.of_segments(run, z),
+            problem.segments[run[0]].name, *problem.select_segments(run, z),
             tuple(fit.residual_stds[i] for i in run),
         )
         for run in problem.runs
@@ -93,7 +93,7 @@ def _runs(fit: OutputError) -> list[_Part]:
 def _halves(fit: OutputError) -> list[_Part]:
     """None where they are too short."""
     segments, z = fit.problem.segments, fit.minimum.unknowns
-    if min(len(segment) // 2 * segment.dt_secs for segment in segments) < LEAST_SECS:
+    if min(len(segment) // 2 * segment.dt_secs for segment in segments) < MIN_SEGMENT_SECS:
         return []
     halves = []
     for name, share in zip(HALVES, (0.0, 0.5), strict=True):
@@ -136,7 +136,7 @@ def _alone(part: _Part) -> _Alone:
     pinned = replace(alone, values=alone.parameters(part.unknowns), free=())
     first = minimise(pinned, part.unknowns[len(shared) :], part.residual_stds)
     loose = minimise(alone, np.concatenate((shared, first.unknowns)), part.residual_stds)
-    own = settled(alone, loose)
+    own = reweighted_fit(alone, loose)
     there = minimise(pinned, first.unknowns, own.residual_stds)
     by_own = _lost(alone, shared, there, own.minimum, own.residual_stds)
     by_all = _lost(alone, shared, first, loose, part.residual_stds)
@@ -144,7 +144,7 @@ def _alone(part: _Part) -> _Alone:
     whole = own.minimum.information + np.diag(alone.prior[1])
     return _Alone(
         sqrt(by_own * free) if free > 0 else nan, sqrt(by_all),
-        own.parameters[list(alone.free)], eliminated(whole, len(shared)),
+        own.parameters[list(alone.free)], marginal_information(whole, len(shared)),
     )  # fmt: skip
 
 
@@ -169,7 +169,7 @@ def _freedom(fit: OutputError) -> float:
     """
     problem = fit.problem
     independent = sum(
-        float(np.sum((spread.usual / spread.effective)[problem.known(i)] ** 2))
+        float(np.sum((spread.typical / spread.effective)[problem.measured_mask(i)] ** 2))
         for i, spread in enumerate(fit.residual_stds)
     )
     told = fit.minimum.information

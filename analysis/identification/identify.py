@@ -18,10 +18,10 @@ from shiplog.vessel.vessel import Vessel
 
 from .advice import TieCheck, check_ties, manoeuvres_to_identify
 from .model_selection import Candidate, rank_models
-from .output_error import OutputError, output_error, pose
+from .output_error import OutputError, make_problem, output_error
 from .prior_sensitivity import PriorSensitivity, prior_sensitivity
 from .problem import residuals
-from .runs import contradictions, distinct_runs, ship_of
+from .runs import common_vessel, consistency_warnings, distinct_runs
 from .segment import Segment
 from .uncertainty import Uncertainty, uncertainty
 from .validation import Validation, nan_rms, validate
@@ -107,7 +107,7 @@ def identify(
     _require_known(considered, stated)
     on_progress("read")
     runs, held_out = distinct_runs(logs, validation_logs)
-    ship = ship_of([*runs, *held_out], vessel)
+    ship = common_vessel([*runs, *held_out], vessel)
     segments = [segment for run in runs for segment in run.segments]
     length = ship.length if ship else None
     candidates: list[Candidate] = []
@@ -117,7 +117,7 @@ def identify(
     else:
         on_progress(f"fit {considered[0].name}")
         settled = _settled(considered[0], stated, ship)
-        fit = output_error(segments, considered[0], known=settled, length=length)
+        fit = output_error(segments, considered[0], fixed=settled, length=length)
     on_progress("uncertainty")
     found = uncertainty(fit)
     on_progress("echo")
@@ -129,7 +129,7 @@ def identify(
     validations = [each for run in held_out for each in validate(fit, run)]
     every = [*runs, *held_out]
     warnings += [w for run in every for w in run.warnings]
-    warnings += [*contradictions(every), *_doubts(fit, found, echo, validations)]
+    warnings += [*consistency_warnings(every), *_doubts(fit, found, echo, validations)]
     if fit.problem.scale.secs != 1.0 and length is None:
         warnings.append(
             f"no length is known, {fit.problem.scale.secs * fit.problem.scale.speed:.0f} m is "
@@ -199,11 +199,11 @@ def _compared(
     length: float | None,
     on_progress: ProgressCallback,
 ) -> list[Candidate]:
-    pose(segments, models[0], length=length)  # what nothing can be identified from is said at once
+    make_problem(segments, models[0], length=length)  # raises for useless logs
     found: list[Candidate] = []
     for i, model in enumerate(models):
         on_progress(f"cross-validate {model.name}", i / len(models))
-        found += rank_models(segments, [model], known=_settled(model, known, ship), length=length)
+        found += rank_models(segments, [model], fixed=_settled(model, known, ship), length=length)
     return sorted(found, key=lambda candidate: (candidate.fit is None, candidate.score))
 
 
@@ -242,7 +242,7 @@ def _unexplained(fit: OutputError) -> Iterator[str]:
     ):
         for c, output in enumerate(problem.outputs):
             measured = segment.measured[:, MODEL_OUTPUTS.index(output)]
-            white = max(float(np.mean(spread.usual[:, c] ** 2)) - fit.noises[c].slow ** 2, 0.0)
+            white = max(float(np.mean(spread.typical[:, c] ** 2)) - fit.noises[c].slow ** 2, 0.0)
             stays = np.sqrt(max(nan_rms(left[:, c]) ** 2 - white, 0.0))
             size = float(np.nanstd(measured)) if np.isfinite(measured).any() else 0.0
             if stays > UNEXPLAINED * size and stays**2 > white:
@@ -257,7 +257,7 @@ def _doubts(
     fit: OutputError, found: Uncertainty, echo: PriorSensitivity, validations: Sequence[Validation]
 ) -> Iterator[str]:
     """What makes a fit hard to believe."""
-    if not fit.minimum.settled:
+    if not fit.minimum.converged:
         yield "the search has not come to an end: the values are where it stopped"
     if echo.elsewhere:
         yield (
@@ -270,7 +270,7 @@ def _doubts(
     if apart > CONTRADICTING:
         alone = len(fit.problem.runs) == 1
         who = f"the halves of {fit.problem.segments[0].name}" if alone else "the logs"
-        odd = f", {found.agreement.odd} the others" if found.agreement.odd else ""
+        odd = f", {found.agreement.outlier} the others" if found.agreement.outlier else ""
         yield (
             f"{who} contradict each other{odd}, {apart:.0f} times what their noise explains: "
             "another ship, loading or depth, or a model that is not hers; the intervals allow for "

@@ -21,7 +21,7 @@ YAW_FORMS = (("a", "b1", "b2", "b3", "d", "e"), ("a", "b1", "b2", "d", "e"), ("a
 SURGE_FORMS = (("f", "g", "h"), ("f", "h"))
 
 
-def starts(problem: Problem, residual_stds: Sequence[ResidualStd]) -> list[FloatArray]:
+def initial_guesses(problem: Problem, residual_stds: Sequence[ResidualStd]) -> list[FloatArray]:
     """Unknowns to begin with, those that fit best first."""
     given = problem.start()
     found = [given]

@@ -17,7 +17,7 @@ from shiplog.types import FloatArray
 
 from .problem import Problem, residuals
 
-OUTLYING = 3.0  # standard deviations
+OUTLIER_STDS = 3.0  # standard deviations
 MOST_ROUNDS = 60
 SMALL = 1e-4  # a step of so many squared standard deviations of its own is the last
 STALE = 1.0  # after a step of so many, the derivatives are taken anew
@@ -29,11 +29,11 @@ class ResidualStd:
     """How far a segment's residuals may be off, (n, c)."""
 
     effective: FloatArray  # the std that each counts with, for neighbours that are off together
-    usual: FloatArray  # the std it has by itself, by which an outlier is told
+    typical: FloatArray  # the std it has by itself, by which an outlier is told
 
     def part(self, start: int, stop: int) -> "ResidualStd":
         """Of the samples from `start` to before `stop`."""
-        return ResidualStd(self.effective[start:stop], self.usual[start:stop])
+        return ResidualStd(self.effective[start:stop], self.typical[start:stop])
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +44,8 @@ class Minimum:
     information: FloatArray  # (m, m) the data's, without the priors
     jacobians: tuple[FloatArray, ...]  # of each segment, (n, c, k), there or very near
     cost: float
-    rounds: int
-    settled: bool
+    iterations: int
+    converged: bool
 
 
 def minimise(
@@ -57,21 +57,21 @@ def minimise(
     """The unknowns that fit best, from `start` on, where the `jacobians` are known if they are."""
     lowest, highest = problem.bounds
     _, precision = problem.prior
-    z, damping, settled = np.clip(start, lowest, highest), 1e-3, False
+    z, damping, converged = np.clip(start, lowest, highest), 1e-3, False
     left = residuals(problem, z)
     cost, rounds = total_cost(problem, z, left, residual_stds), 0
     if not np.isfinite(cost):
-        return Minimum(z, np.zeros((len(z), len(z))), (), cost, 0, settled=False)
+        return Minimum(z, np.zeros((len(z), len(z))), (), cost, 0, converged=False)
     jacobians = _jacobians(problem, z) if jacobians is None else jacobians
-    gradient, information = linearised(problem, z, left, residual_stds, jacobians)
+    gradient, information = gradient_and_information(problem, z, left, residual_stds, jacobians)
     while rounds < MOST_ROUNDS and damping < STEEPEST:
         rounds += 1
         hessian = information + np.diag(precision)
         inside = ~(((z <= lowest) & (gradient > 0)) | ((z >= highest) & (gradient < 0)))
         step, decrease = _step(hessian, gradient, inside, damping)
         if decrease < SMALL:
-            settled = damping <= 1.0
-            if settled:
+            converged = damping <= 1.0
+            if converged:
                 break
         moved = np.clip(z + step, lowest, highest)
         new_left = residuals(problem, moved)
@@ -80,16 +80,20 @@ def minimise(
             z, left, cost, damping = moved, new_left, new_cost, max(damping / 10, 1e-9)
             if decrease > STALE:
                 jacobians = _jacobians(problem, z)
-            gradient, information = linearised(problem, z, left, residual_stds, jacobians)
+            gradient, information = gradient_and_information(
+                problem, z, left, residual_stds, jacobians
+            )
         else:
             damping *= 10 if damping > 1e-6 else 1e3
-    return Minimum(z, information, tuple(jacobians), cost, rounds, settled)
+    return Minimum(z, information, tuple(jacobians), cost, rounds, converged)
 
 
 def _jacobians(problem: Problem, z: FloatArray) -> list[FloatArray]:
     """Of each segment, zero where nothing was measured: there a ship may even stand."""
     found = [problem.jacobian(z, i) for i in range(len(problem.segments))]
-    return [np.where(problem.known(i)[:, :, None], each, 0.0) for i, each in enumerate(found)]
+    return [
+        np.where(problem.measured_mask(i)[:, :, None], each, 0.0) for i, each in enumerate(found)
+    ]
 
 
 def _step(
@@ -123,15 +127,15 @@ def total_cost(
     centre, precision = problem.prior
     total = float(np.sum(precision * (z - centre) ** 2)) / 2
     for i, (off, spread) in enumerate(zip(left, residual_stds, strict=True)):
-        known = problem.known(i)
-        edge = OUTLYING * spread.usual[known]
+        known = problem.measured_mask(i)
+        edge = OUTLIER_STDS * spread.typical[known]
         with np.errstate(over="ignore"):  # a ship about to run away: the cost is inf
             loss = edge**2 * (np.sqrt(1 + (off[known] / edge) ** 2) - 1)
             total += float(np.sum(loss / spread.effective[known] ** 2))
     return total if np.isfinite(total) else inf
 
 
-def linearised(
+def gradient_and_information(
     problem: Problem,
     z: FloatArray,
     left: Sequence[FloatArray],
@@ -142,12 +146,12 @@ def linearised(
     centre, precision = problem.prior
     gradient = precision * (z - centre)
     for i, (spread, jacobian) in enumerate(zip(residual_stds, jacobians, strict=True)):
-        at, (off, weight) = problem.places(i), weighed(left[i], spread)
+        at, (off, weight) = problem.unknown_indices(i), weighted_residuals(left[i], spread)
         gradient[at] -= jacobian.reshape(-1, len(at)).T @ (weight * off).reshape(-1)
-    return gradient, information(problem, left, residual_stds, jacobians)
+    return gradient, information_matrix(problem, left, residual_stds, jacobians)
 
 
-def information(
+def information_matrix(
     problem: Problem,
     left: Sequence[FloatArray],
     residual_stds: Sequence[ResidualStd],
@@ -161,21 +165,23 @@ def information(
     """
     found = np.zeros((problem.size, problem.size))
     for i, (spread, jacobian) in enumerate(zip(residual_stds, jacobians, strict=True)):
-        at, (_, weight) = problem.places(i), weighed(left[i], spread, power)
+        at, (_, weight) = problem.unknown_indices(i), weighted_residuals(left[i], spread, power)
         flat = jacobian.reshape(-1, len(at))
         found[np.ix_(at, at)] += (flat * weight.reshape(-1, 1)).T @ flat
     return found
 
 
-def weighed(left: FloatArray, spread: ResidualStd, power: int = 1) -> tuple[FloatArray, FloatArray]:
+def weighted_residuals(
+    left: FloatArray, spread: ResidualStd, power: int = 1
+) -> tuple[FloatArray, FloatArray]:
     """A segment's residuals, zero where nothing was measured, and their weights: (n, c) each."""
     known = np.isfinite(left)
     off = np.where(known, left, 0.0)
-    share = 1 / np.sqrt(1 + (off / (OUTLYING * spread.usual)) ** 2)
+    share = 1 / np.sqrt(1 + (off / (OUTLIER_STDS * spread.typical)) ** 2)
     return off, np.where(known, share**power / spread.effective**2, 0.0)
 
 
-def eliminated(information: FloatArray, p: int) -> FloatArray:
+def marginal_information(information: FloatArray, p: int) -> FloatArray:
     """What a matrix of information tells of the first p unknowns, the others unknown, (p, p)."""
     own = information[p:, p:]
     scale = np.sqrt(np.maximum(np.diag(own), 1e-300))

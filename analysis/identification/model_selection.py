@@ -18,11 +18,11 @@ from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
 from .least_squares import minimise
-from .output_error import OutputError, first_residual_stds, output_error, settled
-from .prediction import JUDGED, misfit
+from .output_error import OutputError, initial_residual_stds, output_error, reweighted_fit
+from .prediction import SCORED_OUTPUTS, misfit
 from .segment import Segment
 
-JUDGED_COLUMNS = [MODEL_OUTPUTS.index(name) for name in JUDGED]  # all models alike
+JUDGED_COLUMNS = [MODEL_OUTPUTS.index(name) for name in SCORED_OUTPUTS]  # all models alike
 WORST = 10.0  # of a relative error: a ship that runs away is no worse than ten times off
 
 
@@ -75,11 +75,11 @@ def _left_out(whole: OutputError, run: Sequence[int]) -> list[FloatArray]:
     """
     kept = [i for i in range(len(whole.problem.segments)) if i not in run]
     calm = replace(whole.problem, waves=())
-    rest, _ = calm.of_segments(kept, calm.start())
+    rest, _ = calm.select_segments(kept, calm.start())
     start = rest.start()
     start[: len(rest.free)] = whole.minimum.unknowns[: len(rest.free)]
-    minimum = minimise(rest, start, first_residual_stds(rest))
+    minimum = minimise(rest, start, initial_residual_stds(rest))
     if not np.isfinite(minimum.cost):
         return [np.full(len(MODEL_OUTPUTS), np.inf)] * len(run)
-    others = settled(rest, minimum)
+    others = reweighted_fit(rest, minimum)
     return [misfit(others, whole.problem.segments[i]) for i in run]

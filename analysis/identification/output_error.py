@@ -16,19 +16,26 @@ from shiplog.ships import Model
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
-from .initial_guess import starts
+from .initial_guess import initial_guesses
 from .least_squares import Minimum, ResidualStd, minimise
 from .problem import Nuisance, Problem, residuals
-from .residual_noise import FINEST_SHARE, LEAST_SHARE, Left, ResidualNoise, interval_secs, noise_of
-from .segment import Segment, usual
-from .swell import frequency_of
+from .residual_noise import (
+    FINEST_SHARE,
+    LEAST_SHARE,
+    OutputResiduals,
+    ResidualNoise,
+    fit_residual_noise,
+    interval_secs,
+)
+from .segment import Segment, initial_level
+from .swell import swell_frequency
 
 USUAL_LENGTH = 150.0  # m, of a ship whose length nobody gave: its scale only
 LEAST_SPEED, LEAST_RPM = 0.1, 1.0  # m/s, rpm
 UNEXPLAINED = 0.2  # of what stays off: if a wave leaves more, it was none
 ROUNDS = 3
 GIVEN_UP = 1.5  # times what an output was off: noise that lets it grow so explains it away
-LEAST_STD = {  # of what any instrument is off
+MIN_STDS = {  # of what any instrument is off
     "yaw_rate": radians(1e-5), "speed": 1e-4, "sway": 1e-4, "heading": radians(0.02)
 }  # fmt: skip
 
@@ -53,7 +60,7 @@ def output_error(
     model: Model,
     *,
     start: Mapping[str, float] | None = None,
-    known: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
     free: Sequence[str] = (),
     length: float | None = None,
     nuisance: Nuisance | None = None,
@@ -64,17 +71,17 @@ def output_error(
     `known` parameters keep the value given, those of `free` are sought though the model takes them
     for known; `start` is where the others begin.
     """
-    problem = pose(
-        segments, model, start=start, known=known, free=free, length=length,
+    problem = make_problem(
+        segments, model, start=start, fixed=fixed, free=free, length=length,
         nuisance=nuisance, outputs=outputs,
     )  # fmt: skip
-    return fit(problem)
+    return fit_problem(problem)
 
 
-def pose(
+def make_problem(
     segments: Sequence[Segment], model: Model, *,
     start: Mapping[str, float] | None = None,
-    known: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
     free: Sequence[str] = (),
     length: float | None = None,
     nuisance: Nuisance | None = None,
@@ -86,12 +93,12 @@ def pose(
     _require_steering(segments)
     _require_turning(segments)
     values = model.start_values()
-    for name, value in {**(start or {}), **(known or {})}.items():
+    for name, value in {**(start or {}), **(fixed or {})}.items():
         values[model.names.index(model.parameter(name).name)] = value
     sought = {model.parameter(name).name for name in free}
     sought |= {p.name for p in model.parameters if not p.fixed}
-    sought -= set(known or {})
-    speed, rpm = usual(segments, "speed"), usual(segments, "rpm")
+    sought -= set(fixed or {})
+    speed, rpm = initial_level(segments, "speed"), initial_level(segments, "rpm")
     _require_way(segments, speed, rpm)
     scale = model.scale(length or USUAL_LENGTH, speed, rpm)
     used = [o for o in (outputs or model.outputs) if any(segment.has(o) for segment in segments)]
@@ -134,13 +141,15 @@ def _require_way(segments: Sequence[Segment], speed: float, rpm: float) -> None:
         )
 
 
-def fit(problem: Problem, *, start: FloatArray | None = None, waves: bool = True) -> OutputError:
+def fit_problem(
+    problem: Problem, *, start: FloatArray | None = None, waves: bool = True
+) -> OutputError:
     """The fit, its noise found from what it leaves; `start` is another beginning of the search."""
-    residual_stds = first_residual_stds(problem)
+    residual_stds = initial_residual_stds(problem)
     tried = []
-    for begin in [start] if start is not None else starts(problem, residual_stds):
+    for begin in [start] if start is not None else initial_guesses(problem, residual_stds):
         tried.append(minimise(problem, begin, residual_stds))
-        if tried[-1].settled:
+        if tried[-1].converged:
             break
     minimum = min(tried, key=lambda each: each.cost)
     if not np.isfinite(minimum.cost):
@@ -149,24 +158,24 @@ def fit(problem: Problem, *, start: FloatArray | None = None, waves: bool = True
             f"look at their signs and units, or fit another model: "
             f"{', '.join(dict.fromkeys(t.name for t in problem.segments))}"
         )
-    calm = settled(problem, minimum)
+    calm = reweighted_fit(problem, minimum)
     return _refined(_with_waves(calm) if waves else calm)
 
 
-def settled(problem: Problem, minimum: Minimum, share: float = LEAST_SHARE) -> OutputError:
+def reweighted_fit(problem: Problem, minimum: Minimum, share: float = LEAST_SHARE) -> OutputError:
     """The fit and its noise, found in turn from a first fit.
 
     ResidualNoise is found from what a fit leaves, and tells the next fit what to leave: where runs
     contradict each other an output could so be given up to please another. There it ends before.
     """
-    noises, residual_stds = noise_left(problem, minimum.unknowns, share)
+    noises, residual_stds = estimate_noise(problem, minimum.unknowns, share)
     off = _rms_left(problem, minimum)
     for _ in range(ROUNDS):
         after = minimise(problem, minimum.unknowns, residual_stds, minimum.jacobians)
         if (_rms_left(problem, after) > GIVEN_UP * off).any():
             break
         minimum = after
-        noises, residual_stds = noise_left(problem, minimum.unknowns, share)
+        noises, residual_stds = estimate_noise(problem, minimum.unknowns, share)
     return OutputError(problem, minimum, tuple(noises), tuple(residual_stds))
 
 
@@ -176,7 +185,7 @@ def _refined(found: OutputError) -> OutputError:
     An instrument whose noise is in proportion says most when it says least; but where something
     stays off, it is no noise of the instrument's.
     """
-    fine = settled(found.problem, found.minimum, FINEST_SHARE)
+    fine = reweighted_fit(found.problem, found.minimum, FINEST_SHARE)
     stays = any(new.slow > old.slow for new, old in zip(fine.noises, found.noises, strict=True))
     return found if stays else fine
 
@@ -194,7 +203,7 @@ def _with_waves(calm: OutputError) -> OutputError:
     left = residuals(problem, calm.minimum.unknowns)
     slow = [noise.slow for noise in calm.noises]
     found = [
-        frequency_of(r, spread.usual, problem.segments[i].dt_secs, slow)
+        swell_frequency(r, spread.typical, problem.segments[i].dt_secs, slow)
         for i, (r, spread) in enumerate(zip(left, calm.residual_stds, strict=True))
     ]
     if not any(found):
@@ -206,7 +215,7 @@ def _with_waves(calm: OutputError) -> OutputError:
     for i in range(len(problem.segments)):
         own, old = with_waves.own_slice(i), calm.minimum.unknowns[problem.own_slice(i)]
         start[own.start : own.start + len(old)] = old
-    wavy = settled(with_waves, minimise(with_waves, start, calm.residual_stds))
+    wavy = reweighted_fit(with_waves, minimise(with_waves, start, calm.residual_stds))
     explained = all(
         new.slow**2 * new.slow_secs <= UNEXPLAINED * old.slow**2 * old.slow_secs
         for new, old in zip(wavy.noises, calm.noises, strict=True)
@@ -214,14 +223,14 @@ def _with_waves(calm: OutputError) -> OutputError:
     return wavy if explained else calm
 
 
-def first_residual_stds(problem: Problem) -> list[ResidualStd]:
+def initial_residual_stds(problem: Problem) -> list[ResidualStd]:
     """Before anything is fitted: a tenth of what an output does is off."""
     stds = []
     for column, output in enumerate(problem.outputs):
         every = np.concatenate(
             [problem.measured(i)[:, column] for i in range(len(problem.segments))]
         )
-        stds.append(max(float(np.nanstd(every)) / 10, LEAST_STD[output]))
+        stds.append(max(float(np.nanstd(every)) / 10, MIN_STDS[output]))
     every_std = np.array(stds)
     return [
         ResidualStd(np.tile(every_std, (len(segment), 1)), np.tile(every_std, (len(segment), 1)))
@@ -229,7 +238,7 @@ def first_residual_stds(problem: Problem) -> list[ResidualStd]:
     ]
 
 
-def noise_left(
+def estimate_noise(
     problem: Problem, z: FloatArray, share: float = LEAST_SHARE
 ) -> tuple[list[ResidualNoise], list[ResidualStd]]:
     """The noise of each output, and each segment's residual stds; `share` as `noise_of`."""
@@ -237,9 +246,12 @@ def noise_left(
     levels = [problem.predicted(z, i) for i in segments]
     off = [problem.measured(i) - levels[i] for i in segments]
     noises = [
-        noise_of(
-            [Left.of(off[i][:, c], levels[i][:, c], problem.segments[i].dt_secs) for i in segments],
-            proportional=output != "heading", least=LEAST_STD[output], share=share,
+        fit_residual_noise(
+            [
+                OutputResiduals.of(off[i][:, c], levels[i][:, c], problem.segments[i].dt_secs)
+                for i in segments
+            ],
+            proportional=output != "heading", least=MIN_STDS[output], share=share,
         )
         for c, output in enumerate(problem.outputs)
     ]  # fmt: skip
@@ -252,8 +264,7 @@ def _spread(
     """Of a segment whose predicted outputs are `level`, (n, c)."""
     measured, dt = problem.measured(i), problem.segments[i].dt_secs
     pairs = [
-        noise.spread(level[:, c], interval_secs(measured[:, c], dt))
-        for c, noise in enumerate(noises)
+        noise.stds(level[:, c], interval_secs(measured[:, c], dt)) for c, noise in enumerate(noises)
     ]
     return ResidualStd(
         np.column_stack([p[0] for p in pairs]), np.column_stack([p[1] for p in pairs])

@@ -11,10 +11,10 @@ from shiplog.ships.path import input_path
 from shiplog.types import FloatArray, Signals
 
 from .least_squares import minimise
-from .output_error import OutputError, first_residual_stds
+from .output_error import OutputError, initial_residual_stds
 from .segment import Segment
 
-JUDGED = ("yaw_rate", "speed", "heading")  # every model predicts them
+SCORED_OUTPUTS = ("yaw_rate", "speed", "heading")  # every model predicts them
 ZIGZAG_STEP_SECS = 0.5
 HARD_OVER = 0.8  # of the greatest rudder of a run: there it is held over
 
@@ -48,16 +48,18 @@ def misfit(fit: OutputError, segment: Segment) -> FloatArray:
     """How far a fit is off a segment it never saw, (4,): rms over the std of what was measured.
 
     The segment's own unknowns are fitted to it, the parameters are not: no rudder's zero and no
-    sensor's bias of one run is known from another. Those of `JUDGED` are told of every model,
+    sensor's bias of one run is known from another. `SCORED_OUTPUTS` hold for every model,
     fitted to them or not. NaN for what was not measured or the model does not predict; inf
     where the ship runs away.
     """
     whole = fit.problem
-    judged = tuple(o for o in MODEL_OUTPUTS if o in (*whole.outputs, *JUDGED) and segment.has(o))
+    judged = tuple(
+        o for o in MODEL_OUTPUTS if o in (*whole.outputs, *SCORED_OUTPUTS) and segment.has(o)
+    )
     problem = replace(
         whole, segments=(segment,), outputs=judged, values=fit.parameters, free=(), waves=()
     )
-    minimum = minimise(problem, problem.start(), first_residual_stds(problem))
+    minimum = minimise(problem, problem.start(), initial_residual_stds(problem))
     found = np.full(len(MODEL_OUTPUTS), np.nan)
     off = problem.measured(0) - problem.predicted(minimum.unknowns, 0)
     for at, column in enumerate(problem.columns):
@@ -69,7 +71,7 @@ def misfit(fit: OutputError, segment: Segment) -> FloatArray:
     return found
 
 
-def made_good(outputs: FloatArray, dt: float) -> FloatArray:
+def dead_reckoning(outputs: FloatArray, dt: float) -> FloatArray:
     """North and east, (n, 2) in m from the first sample, of outputs that are known throughout."""
     _, ahead, sway, heading = outputs.T
     sway = np.nan_to_num(sway)

@@ -99,7 +99,7 @@ class Problem:
             for name in dict.fromkeys(names)
         )
 
-    def of_segments(self, kept: Sequence[int], z: FloatArray) -> tuple["Problem", FloatArray]:
+    def select_segments(self, kept: Sequence[int], z: FloatArray) -> tuple["Problem", FloatArray]:
         """The same of some of the segments, and the unknowns `z` as far as they are its own."""
         waves = tuple(self.waves[i] for i in kept) if self.waves else ()
         rest = replace(self, segments=tuple(self.segments[i] for i in kept), waves=waves)
@@ -235,11 +235,11 @@ class Problem:
         """(n, c) what was measured of them, NaN where nothing was."""
         return self.segments[i].measured[:, self.columns]
 
-    def known(self, i: int) -> NDArray[np.bool_]:
+    def measured_mask(self, i: int) -> NDArray[np.bool_]:
         """(n, c) which of them were measured."""
         return np.isfinite(self.measured(i))
 
-    def places(self, i: int) -> list[int]:
+    def unknown_indices(self, i: int) -> list[int]:
         """Where the unknowns of `jacobian` stand among all."""
         own = self.own_slice(i)
         return [*range(len(self.free)), *range(own.start, own.stop)]

@@ -26,7 +26,7 @@ class ResidualNoise:
     slow: float
     slow_secs: float
 
-    def spread(self, level: FloatArray, interval_secs: float) -> tuple[FloatArray, FloatArray]:
+    def stds(self, level: FloatArray, interval_secs: float) -> tuple[FloatArray, FloatArray]:
         """The effective and the usual std of samples of that level, (n,) each, so far apart."""
         white = self.white**2 + (self.relative * level) ** 2
         together = max(self.slow_secs / interval_secs, 1.0)
@@ -34,7 +34,7 @@ class ResidualNoise:
 
 
 @dataclass(frozen=True, eq=False)
-class Left:
+class OutputResiduals:
     """What a fit leaves of one output of a segment, sample by sample as they were measured."""
 
     off: FloatArray  # (k,)
@@ -42,7 +42,7 @@ class Left:
     interval_secs: float  # from sample to sample, as a rule
 
     @classmethod
-    def of(cls, residual: FloatArray, level: FloatArray, dt: float) -> "Left":
+    def of(cls, residual: FloatArray, level: FloatArray, dt: float) -> "OutputResiduals":
         """Of residuals on a clock, (n,), NaN where nothing was measured."""
         at = np.flatnonzero(np.isfinite(residual))
         return cls(residual[at], level[at], interval_secs(residual, dt))
@@ -54,8 +54,12 @@ def interval_secs(values: FloatArray, dt: float) -> float:
     return float(np.median(steps)) * dt if len(steps) else dt
 
 
-def noise_of(
-    every: Sequence[Left], *, proportional: bool, least: float, share: float = LEAST_SHARE
+def fit_residual_noise(
+    every: Sequence[OutputResiduals],
+    *,
+    proportional: bool,
+    least: float,
+    share: float = LEAST_SHARE,
 ) -> ResidualNoise:
     """The noise of one output, of what is left of it in each segment.
 
@@ -71,7 +75,7 @@ def noise_of(
     return ResidualNoise(white, relative, slow, secs)
 
 
-def _white(every: Sequence[Left], *, proportional: bool) -> tuple[float, float]:
+def _white(every: Sequence[OutputResiduals], *, proportional: bool) -> tuple[float, float]:
     """Of the differences of neighbours: the noise, and the noise in proportion.
 
     By likelihood, the variances being sums of squares: iterated least squares, never negative.
@@ -108,7 +112,7 @@ def _line(x: FloatArray | None, y: FloatArray, weight: FloatArray) -> tuple[floa
     return mean_y - slope * mean_x, slope
 
 
-def _slow(every: Sequence[Left], stds: Sequence[FloatArray]) -> tuple[float, float]:
+def _slow(every: Sequence[OutputResiduals], stds: Sequence[FloatArray]) -> tuple[float, float]:
     """The std of the part that stays, and for how many seconds it does."""
     pairs = [(left, std) for left, std in zip(every, stds, strict=True) if len(left.off) > 1]
     every, stds = [left for left, _ in pairs], [std for _, std in pairs]
@@ -129,7 +133,7 @@ def _slow(every: Sequence[Left], stds: Sequence[FloatArray]) -> tuple[float, flo
 
 
 def _autocovariance(
-    every: Sequence[Left], stds: Sequence[FloatArray], lag_secs: float
+    every: Sequence[OutputResiduals], stds: Sequence[FloatArray], lag_secs: float
 ) -> tuple[float, float]:
     """At a lag, those sure of themselves counting for more; and its error if there is none."""
     total = weights = 0.0

@@ -17,7 +17,7 @@ from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, Identif
 from shiplog.vessel.vessel import Vessel
 from shiplog.vessel.vessel_parser import parse_vessel
 
-from .segment import Segment, segments_of, usual
+from .segment import Segment, initial_level, split_into_segments
 
 NEEDED = ("yaw_rate", "speed", "rudder", "rpm")
 ALSO = ("sway", "heading")
@@ -36,7 +36,7 @@ class Run:
     data_lost: bool
 
 
-def run_of(log: Log) -> Run:
+def run_from_log(log: Log) -> Run:
     """A log as an identifier takes it.
 
     Raises `LogError` where a channel is missing or where rudder and revolutions are not known
@@ -50,7 +50,7 @@ def run_of(log: Log) -> Run:
             f"no channel {missing[0]!r} in {log.name}; it has {has or 'none'}; "
             f"an identification needs {', '.join(NEEDED)}"
         )
-    segments = segments_of(resample(log, None, NEEDED, ALSO), log.name)
+    segments = split_into_segments(resample(log, None, NEEDED, ALSO), log.name)
     carried = log.vessel_toml
     vessel = parse_vessel(carried, f"vessel.toml in {log.name}") if carried is not None else None
     places = tuple(_positions(log, segment) for segment in segments) if "position" in found else ()
@@ -70,7 +70,7 @@ def distinct_runs(logs: Sequence[Log], held_out: Sequence[Log]) -> tuple[list[Ru
     """
     runs: list[Run] = []
     for log in (*logs, *held_out):
-        run = run_of(log)
+        run = run_from_log(log)
         for other in runs:
             if _same(run, other):
                 raise UsageError(
@@ -124,7 +124,7 @@ def _positions(log: Log, segment: Segment) -> FloatArray | None:
     return np.column_stack(lines)
 
 
-def ship_of(runs: Sequence[Run], given: Vessel | None) -> Vessel | None:
+def common_vessel(runs: Sequence[Run], given: Vessel | None) -> Vessel | None:
     """The ship that the runs are of: the one given, or the one they carry, if any.
 
     Raises `LogError` where they carry ships that are not the same.
@@ -151,11 +151,12 @@ def _bare(vessel: Vessel) -> Vessel:
     )  # fmt: skip
 
 
-def contradictions(runs: Sequence[Run]) -> Iterator[str]:
+def consistency_warnings(runs: Sequence[Run]) -> Iterator[str]:
     """What makes runs look like those of different ships."""
-    under_way = [run for run in runs if usual(run.segments, "rpm") > 0]
+    under_way = [run for run in runs if initial_level(run.segments, "rpm") > 0]
     paces = {
-        run.name: usual(run.segments, "speed") / usual(run.segments, "rpm") for run in under_way
+        run.name: initial_level(run.segments, "speed") / initial_level(run.segments, "rpm")
+        for run in under_way
     }
     if len(paces) < 2:
         return

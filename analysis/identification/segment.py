@@ -12,7 +12,7 @@ from shiplog.ships.paper import PAPER_INPUTS
 from shiplog.ships.path import input_path
 from shiplog.types import FloatArray, Signals
 
-LEAST_SECS = 60.0  # of a piece: a shorter one says nothing of a ship
+MIN_SEGMENT_SECS = 60.0  # of a piece: a shorter one says nothing of a ship
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,8 @@ class Segment:
         return Segment(self.name, signals, input_path(signals), self.measured[start:stop])
 
 
-def segments_of(signals: Signals, name: str) -> tuple[Segment, ...]:
-    """The pieces of a run in which rudder and revolutions are known, each of `LEAST_SECS` or more.
+def split_into_segments(signals: Signals, name: str) -> tuple[Segment, ...]:
+    """The pieces in which rudder and revolutions are known, each of `MIN_SEGMENT_SECS` or more.
 
     Between an input's samples it is interpolated, over its gaps not. Raises `LogError` where no
     piece is left.
@@ -56,11 +56,11 @@ def segments_of(signals: Signals, name: str) -> tuple[Segment, ...]:
     pieces = [
         (start, stop)
         for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-        if (stop - start - 1) * signals.dt_secs >= LEAST_SECS
+        if (stop - start - 1) * signals.dt_secs >= MIN_SEGMENT_SECS
     ]
     if not pieces:
         raise LogError(
-            f"rudder and rpm are known together for less than {LEAST_SECS:.0f} s at a time, "
+            f"rudder and rpm are known together for less than {MIN_SEGMENT_SECS:.0f} s at a time, "
             f"too short to identify a ship; give a longer log: {name}"
         )
     return tuple(_trial(whole.part(*piece), name) for piece in pieces)
@@ -84,7 +84,7 @@ def _bridged(values: FloatArray, dt: float) -> FloatArray:
     return filled
 
 
-def usual(segments: Sequence[Segment], channel: str) -> float:
+def initial_level(segments: Sequence[Segment], channel: str) -> float:
     """The largest initial speed or rpm among the segments, over their first ten seconds."""
     firsts = [
         np.abs(segment.signals[channel][: max(2, round(10 / segment.dt_secs))])

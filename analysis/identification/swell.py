@@ -14,7 +14,7 @@ MOST = 0.5  # of what stays off: where a wave is less, it is not a wave alone
 SURE = 40.0  # of a peak in a periodogram of chi-squared numbers: one in a hundred million
 
 
-def frequency_of(
+def swell_frequency(
     residuals: FloatArray, usual: FloatArray, dt: float, slow: Sequence[float] = ()
 ) -> float | None:
     """The frequency, in rad/s, of the wave that stands out most in a segment's residuals, if any.

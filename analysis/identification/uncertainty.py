@@ -17,8 +17,8 @@ from scipy.special import stdtrit
 from analysis.regression.newey_west import few_rows
 from shiplog.types import FloatArray
 
-from .agreement import Agreement, agreement_of
-from .least_squares import eliminated, information, minimise, weighed
+from .agreement import Agreement, assess_agreement
+from .least_squares import information_matrix, marginal_information, minimise, weighted_residuals
 from .output_error import OutputError
 from .problem import Problem, residuals
 
@@ -42,7 +42,7 @@ class Uncertainty:
     coloured: FloatArray  # (p,) for noise that stays
     between_runs: FloatArray  # (p,) by the jackknife; NaN with too few runs
     agreement: Agreement  # of the runs with each other
-    enlarged: float  # by how much, for runs that do not agree
+    enlargement: float  # by how much, for runs that do not agree
     prior_share: FloatArray  # (p,) of each value: how much of it was believed before any data
     covariance: FloatArray  # (p, p) that `std` is of
     condition: float  # of the scaled information on the parameters
@@ -79,7 +79,7 @@ def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
     problem, z = fit.problem, fit.minimum.unknowns
     p = len(problem.free)
     left = residuals(problem, z)
-    curvature = information(problem, left, fit.residual_stds, fit.minimum.jacobians, power=3)
+    curvature = information_matrix(problem, left, fit.residual_stds, fit.minimum.jacobians, power=3)
     inverse = _inverse(problem, curvature)
     share = np.diag(inverse)[:p] * problem.prior[1][:p]
     bound = _stds(_inverse(problem, _white_information(fit, left)))[:p]
@@ -87,10 +87,10 @@ def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
     coloured = _stds(covariance)
     jackknife, agreement = np.full(p, np.nan), Agreement((), (), ())
     if between_runs:
-        agreement = agreement_of(fit)
+        agreement = assess_agreement(fit)
         if len(problem.runs) >= LEAST_RUNS:
             jackknife = _jackknife(_left_out(fit))
-    enlarged = 1.0 if np.isfinite(jackknife).any() else agreement.enlarged
+    enlarged = 1.0 if np.isfinite(jackknife).any() else agreement.enlargement
     std = np.fmax(np.maximum(coloured, bound) * enlarged, jackknife)
     grown = std / np.where(coloured > 0, coloured, 1.0)
     whole = fit.minimum.information + np.diag(problem.prior[1])
@@ -112,7 +112,7 @@ def _inverse(problem: Problem, information: FloatArray) -> FloatArray:
 
 def _condition(whole: FloatArray, p: int) -> float:
     """Of the root of the parameters' scaled information, the nuisances eliminated."""
-    left = eliminated(whole, p)
+    left = marginal_information(whole, p)
     size = np.sqrt(np.maximum(np.diag(left), 1e-300))
     values = np.linalg.eigvalsh(left / np.outer(size, size))
     return float(np.sqrt(values[-1] / max(values[0], 1e-16)))
@@ -124,8 +124,8 @@ def _stds(covariance: FloatArray) -> FloatArray:
 
 def _white_information(fit: OutputError, left: Sequence[FloatArray]) -> FloatArray:
     """Fisher's information if each sample were off by itself."""
-    white = [replace(spread, effective=spread.usual) for spread in fit.residual_stds]
-    return information(fit.problem, left, white, fit.minimum.jacobians, power=0)
+    white = [replace(spread, effective=spread.typical) for spread in fit.residual_stds]
+    return information_matrix(fit.problem, left, white, fit.minimum.jacobians, power=0)
 
 
 def _sandwich(fit: OutputError, left: Sequence[FloatArray], inverse: FloatArray) -> FloatArray:
@@ -133,7 +133,7 @@ def _sandwich(fit: OutputError, left: Sequence[FloatArray], inverse: FloatArray)
     problem, middle = fit.problem, np.diag(fit.problem.prior[1])
     longest = max(noise.slow_secs for noise in fit.noises)
     for i, spread in enumerate(fit.residual_stds):
-        off, weight = weighed(left[i], spread)
+        off, weight = weighted_residuals(left[i], spread)
         scores = np.einsum("ncq,nc->nq", fit.minimum.jacobians[i], weight * off)
         together = max(longest, LEAST_WINDOW_SECS) / problem.segments[i].dt_secs
         window = int(min(max(together, 1), len(scores) / 2))
@@ -141,7 +141,7 @@ def _sandwich(fit: OutputError, left: Sequence[FloatArray], inverse: FloatArray)
         ends = np.vstack((sums, np.tile(sums[-1], (window, 1))))
         starts = np.vstack((np.zeros((window, sums.shape[1])), sums))
         runs = ends - starts
-        at = problem.places(i)
+        at = problem.unknown_indices(i)
         middle[np.ix_(at, at)] += (
             float(few_rows(window / len(scores))) ** 2 * (runs.T @ runs) / window
         )
@@ -153,9 +153,9 @@ def _left_out(fit: OutputError) -> FloatArray:
     problem, found = fit.problem, []
     for run in problem.runs:
         kept = [i for i in range(len(problem.segments)) if i not in run]
-        rest, start = problem.of_segments(kept, fit.minimum.unknowns)
+        rest, start = problem.select_segments(kept, fit.minimum.unknowns)
         minimum = minimise(rest, start, [fit.residual_stds[i] for i in kept])
-        if minimum.settled:
+        if minimum.converged:
             found.append(minimum.unknowns[: len(problem.free)])
     return np.array(found).reshape(-1, len(problem.free))
 

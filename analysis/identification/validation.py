@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.manoeuvres.indices import Figure, figures_of, first_order
+from analysis.manoeuvres.indices import ManoeuvreIndex, first_execute, manoeuvre_indices
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
 from .output_error import OutputError
-from .prediction import made_good, predict
+from .prediction import dead_reckoning, predict
 from .runs import Run
 from .segment import Segment
 
@@ -29,7 +29,7 @@ class Validation:
     track: FloatArray  # (n, 2) m north and east from the start, as simulated,
     measured_track: FloatArray  # and as measured: by the fixes, or else by speed and heading
     rms: dict[str, float]  # rad/s, m/s, rad, m: of each output measured, and of the track
-    figures: tuple[Figure, ...]  # of a circle or of a zig-zag
+    figures: tuple[ManoeuvreIndex, ...]  # of a circle or of a zig-zag
 
     @property
     def diverged(self) -> bool:
@@ -51,7 +51,10 @@ def _validation(fit: OutputError, segment: Segment, fixes: FloatArray | None) ->
         course, fixes = 0.0, None
     measured = filled_measurements(segment, course)
     simulated = predict(fit, _headed(segment, measured))
-    track, sailed = made_good(simulated, segment.dt_secs), made_good(measured, segment.dt_secs)
+    track, sailed = (
+        dead_reckoning(simulated, segment.dt_secs),
+        dead_reckoning(measured, segment.dt_secs),
+    )
     if fixes is not None:
         sailed = _from_first_fix(fixes, sailed if np.isnan(track).any() else track)
     off = simulated - segment.measured
@@ -62,7 +65,7 @@ def _validation(fit: OutputError, segment: Segment, fixes: FloatArray | None) ->
         if segment.has(name) and name in predicted
     }
     rms["track"] = nan_rms(np.hypot(*(track - sailed).T))
-    figures = tuple(figures_of(segment, measured, sailed, simulated, track))
+    figures = tuple(manoeuvre_indices(segment, measured, sailed, simulated, track))
     return Validation(segment, simulated, track, sailed, rms, figures)
 
 
@@ -90,13 +93,13 @@ def initial_heading(segment: Segment, fixes: FloatArray) -> float | None:
     Only those before the rudder moves are looked at, for in a turn she drifts. None where they are
     too few, or where no course lays one on the other.
     """
-    order = first_order(segment.signals["rudder"], segment.dt_secs)
+    order = first_execute(segment.signals["rudder"], segment.dt_secs)
     least, most = (round(secs / segment.dt_secs) for secs in FIXES_SECS)
     before = len(segment) if order is None else order + 1
     known = np.flatnonzero(np.isfinite(fixes[:before]).all(axis=1))[:most]
     if len(known) <= least:
         return None
-    sailed = made_good(filled_measurements(segment), segment.dt_secs)[known]
+    sailed = dead_reckoning(filled_measurements(segment), segment.dt_secs)[known]
     way, seen = ((each - each.mean(axis=0)) @ [1, 1j] for each in (sailed, fixes[known]))
     course = float(np.angle(np.vdot(way, seen)))
     off = nan_rms(np.abs(way * np.exp(1j * course) - seen))

@@ -18,7 +18,7 @@ from shiplog.vessel.vessel import Vessel
 
 from .identify import ALPHAS, IdentifiedShip
 from .output_error import USUAL_LENGTH, OutputError, output_error
-from .segment import usual
+from .segment import initial_level
 from .uncertainty import ECHO, UNIDENTIFIABLE, Uncertainty, uncertainty
 
 SECTIONS = {"yaw": YAW_COEFFICIENTS, "surge": ("f", "g", "h")}
@@ -93,12 +93,16 @@ def _beside(found: IdentifiedShip) -> tuple[OutputError, Uncertainty] | None:
     try:
         fit = fits[0] if fits else output_error(
             segments, ship_model("burylin"),
-            known={name: getattr(known, name) for name in ALPHAS} if known is not None else {},
+            fixed={name: getattr(known, name) for name in ALPHAS} if known is not None else {},
         )  # fmt: skip
     except LogError:
         return None
     told, c = uncertainty(fit), _coefficients(fit)
-    works = rudder_effect(c, usual(segments, "speed"), usual(segments, "rpm")) * c.d > 0 > c.a
+    works = (
+        rudder_effect(c, initial_level(segments, "speed"), initial_level(segments, "rpm")) * c.d
+        > 0
+        > c.a
+    )
     return (fit, told) if works else None
 
 
@@ -112,7 +116,7 @@ def _head(found: IdentifiedShip) -> Iterator[str]:
         yield f"length = {ship.length!r}"
     elif found.model.dimensionless:
         yield f"length = {USUAL_LENGTH!r}  # m, ASSUMED, for nobody gave it: the scale of [model]"
-    yield f"approach_rpm = {round(usual(segments, 'rpm'), 3)!r}"
+    yield f"approach_rpm = {round(initial_level(segments, 'rpm'), 3)!r}"
     yield f'angle_unit = "{_angle_unit(ship)}"'
 
 

@@ -47,7 +47,7 @@ FIGURES = {
 
 
 @dataclass(frozen=True)
-class Figure:
+class ManoeuvreIndex:
     """A figure of a manoeuvre, SI."""
 
     name: str
@@ -61,7 +61,7 @@ class Figure:
         return self.simulated - self.measured
 
 
-def first_order(rudder: FloatArray, dt: float) -> int | None:
+def first_execute(rudder: FloatArray, dt: float) -> int | None:
     """The last sample before the rudder first leaves its rest; None where it never does."""
     rest = float(np.median(rudder[: max(1, round(REST_SECS / dt))]))
     hard = np.flatnonzero(np.abs(rudder - rest) > LEAST_RUDDER)
@@ -71,20 +71,20 @@ def first_order(rudder: FloatArray, dt: float) -> int | None:
     return int(resting[-1]) if len(resting) else 0
 
 
-def figures_of(
+def manoeuvre_indices(
     segment: Segment,
     measured: FloatArray,
     sailed: FloatArray,
     simulated: FloatArray,
     track: FloatArray,
-) -> Iterator[Figure]:
+) -> Iterator[ManoeuvreIndex]:
     """The figures of a circle or of a zig-zag; none of any other run, or where the ship ran away.
 
     Outputs are (n, 4), positions (n, 2) in m; measured ones must be known throughout.
     """
     dt = segment.dt_secs
     rudder = median_filter(segment.signals["rudder"], 1 + 2 * round(SPIKE_SECS / 2 / dt))
-    order = first_order(rudder, dt)
+    order = first_execute(rudder, dt)
     if order is None or not np.isfinite(simulated).all():
         return
     holds = _holds(rudder, order)
@@ -149,11 +149,13 @@ def _turn(
     return turn(smooth, positions[order:], rudder[order:], dt, course=_before(heading, order, dt))
 
 
-def _circle(measured: Turn, simulated: Turn) -> Iterator[Figure]:
+def _circle(measured: Turn, simulated: Turn) -> Iterator[ManoeuvreIndex]:
     """The figures that were measured: none of a track that is not known where the turn began."""
     for each in fields(Turn):
         name, unit = FIGURES[each.name]
-        figure = Figure(name, unit, getattr(measured, each.name), getattr(simulated, each.name))
+        figure = ManoeuvreIndex(
+            name, unit, getattr(measured, each.name), getattr(simulated, each.name)
+        )
         if np.isfinite(figure.measured):
             yield figure
 
@@ -197,7 +199,7 @@ def _is_zigzag(rudder: FloatArray, order: int, holds: list[tuple[int, int]], dt:
 
 def _zigzag(
     order: int, holds: list[tuple[int, int]], headings: tuple[FloatArray, FloatArray], dt: float
-) -> Iterator[Figure]:
+) -> Iterator[ManoeuvreIndex]:
     """Initial turning time, overshoots beyond the heading at which she is reversed, and period."""
     executes = [last for _, last in holds[:-1]]
     half = round(SMOOTH * float(np.min(np.diff(executes))))
@@ -210,16 +212,16 @@ def _zigzag(
         return
     sides = np.sign(both[0][executes])
     reaches = [reached(sides[0] * off[order:], switch) * dt for off in both]
-    yield Figure("initial turning time", "s", *reaches)
+    yield ManoeuvreIndex("initial turning time", "s", *reaches)
     ends = [*executes[1:], holds[-1][1] + 1]
     spans = list(zip(sides, executes, ends, strict=True))[:MOST_OVERSHOOTS]
     for number, (side, start, end) in enumerate(spans):
         beyond = [_beyond(side * off[start:end], switch) for off in both]
         if all(np.isfinite(beyond)):
-            yield Figure(f"overshoot {number + 1}", "rad", *beyond)
+            yield ManoeuvreIndex(f"overshoot {number + 1}", "rad", *beyond)
     periods = [_period(off[order : ends[-1]], switch) * dt for off in both]
     if np.isfinite(periods[0]):
-        yield Figure("period", "s", *periods)
+        yield ManoeuvreIndex("period", "s", *periods)
 
 
 def _switch(there: FloatArray, noise: float) -> float | None:

@@ -37,13 +37,13 @@ def identification_json(found: IdentifiedShip) -> dict[str, Any]:
         "covariance": {"of": list(told.names), "values": told.covariance.tolist()},
         "correlation": told.correlation.tolist(),
         "condition": told.condition,
-        "enlarged": told.enlarged,
+        "enlarged": told.enlargement,
         "agreement": {
             "logs": list(told.agreement.names),
             "by_own_noise": list(told.agreement.by_own_noise),
-            "by_noise_of_all": list(told.agreement.by_noise_of_all),
+            "by_noise_of_all": list(told.agreement.by_common_noise),
             "contradiction": told.agreement.contradiction,
-            "odd": told.agreement.odd,
+            "odd": told.agreement.outlier,
         },
         "ties": None if found.ties is None else {
             "sum_over_d": found.ties.sum_over_d,

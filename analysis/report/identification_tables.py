@@ -9,7 +9,7 @@ from analysis.identification.comparison.history import OFF
 from analysis.identification.identify import IdentifiedShip
 from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
 from analysis.identification.validation import Validation
-from analysis.manoeuvres.indices import Figure
+from analysis.manoeuvres.indices import ManoeuvreIndex
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.units import CATALOGUE, conversion_factor
 
@@ -94,11 +94,11 @@ def _remarks(found: IdentifiedShip) -> Iterator[str]:
             f"Without dimensions: time in {scale.secs:.4g} s (L/U0), speed in {scale.speed:.4g} "
             f"m/s, revolutions in {scale.rpm:.4g} rpm."
         )
-    if found.uncertainty.enlarged > 1:
+    if found.uncertainty.enlargement > 1:
         yield (
             f"{'The halves' if len(found.fit.problem.runs) == 1 else 'The runs'} differ more than "
             "their noise explains: intervals are enlarged "
-            f"{found.uncertainty.enlarged:.1f} times."
+            f"{found.uncertainty.enlargement:.1f} times."
         )
     if found.ties is not None:
         yield found.ties.advice(tied=found.model.name == "burylin-tied")
@@ -196,7 +196,7 @@ def _figures(validation: Validation) -> Section:
     return Section(f"Figures of {validation.segment.name}", columns, rows, (remark,))
 
 
-def _figure(figure: Figure) -> tuple[str, ...]:
+def _figure(figure: ManoeuvreIndex) -> tuple[str, ...]:
     """A row; of an angle no per cent are told."""
     unit = figure.unit
     cells = [_shown(v, unit, 4) for v in (figure.measured, figure.simulated)]

@@ -141,7 +141,7 @@ def _normalised(
     """Measured less simulated over what the fit leaves of it as a rule, (n,)."""
     column = MODEL_OUTPUTS.index(name)
     noise = found.fit.noises[found.fit.problem.outputs.index(name)]
-    _, usual = noise.spread(simulated[:, column], segment.dt_secs)
+    _, usual = noise.stds(simulated[:, column], segment.dt_secs)
     return np.asarray((segment.measured[:, column] - simulated[:, column]) / usual)
 
 

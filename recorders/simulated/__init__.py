@@ -1,5 +1,6 @@
-"""A simulated trial: manoeuvre, ship and sensors as a `Source`.
+"""Simulated trials: a manoeuvre, a ship model and sensors as a source of samples.
 
-`manoeuvres` gives the orders, `trajectory` integrates the ship's motion, `sensors` distorts it as
-real sensors do, and `simulate` joins the three.
+`manoeuvres` gives the orders, `trajectory` integrates the ship's motion, `sensors` adds the errors
+of real sensors, `simulate` joins the three, and `cli` offers them as ``shiplog record simulate``.
+This folder must not import `analysis`.
 """

@@ -1,7 +1,13 @@
-"""What is ordered on the bridge: the standard manoeuvres, by name.
+"""Standard manoeuvres by name, as orders of rudder and revolutions.
 
-Rudder to starboard is positive. Each begins with a straight approach of `APPROACH_SECS`, and is
-repeated until the duration is filled where that makes sense (ITTC 7.5-04-02-01; IMO MSC.137(76)).
+Rudder to starboard is positive. Each begins with a straight approach of `APPROACH_SECS` (except
+the paper's run), and pull-out and spiral are repeated until the duration is filled.
+
+References
+----------
+ITTC Recommended Procedure 7.5-04-02-01, full scale manoeuvring trials.
+
+IMO Resolution MSC.137(76), standards for ship manoeuvrability.
 """
 
 import re
@@ -21,7 +27,17 @@ SPIRAL_DEG = (15.0, 10.0, 5.0, 3.0, 1.0, 0.0, -1.0, -3.0, -5.0, -10.0, -15.0)
 
 @dataclass(frozen=True)
 class Order:
-    """From `time_secs` on: the rudder ordered, in rad, and the revolutions, in rpm."""
+    """An order, valid from a time on.
+
+    Attributes
+    ----------
+    time_secs
+        The time from the start, s.
+    rudder
+        The ordered rudder, rad.
+    rpm
+        The propeller's revolutions, rpm.
+    """
 
     time_secs: float
     rudder: float
@@ -30,7 +46,17 @@ class Order:
 
 @dataclass(frozen=True)
 class ZigZag:
-    """Rudder to `rudder`, reversed whenever the heading is `heading` off: both in rad."""
+    """A zig-zag: the rudder is reversed whenever the heading has changed far enough.
+
+    Attributes
+    ----------
+    start_secs
+        When the first rudder is ordered, s.
+    rudder
+        The first rudder, rad; negative to port.
+    heading
+        The change of heading from the approach at which the rudder is reversed, rad.
+    """
 
     start_secs: float
     rudder: float
@@ -39,20 +65,51 @@ class ZigZag:
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """Orders by the clock, and for a zig-zag by the heading from its start on."""
+    """A manoeuvre: orders by time, and for a zig-zag by the heading from its start on.
+
+    Attributes
+    ----------
+    name
+        The name it was asked for by.
+    orders
+        The orders, the first at time zero.
+    zigzag
+        The zig-zag, which replaces the rudder of the orders from its start on.
+    initial_speed
+        The speed at the start, m/s; None for the steady speed at the first order's revolutions.
+    """
 
     name: str
     orders: tuple[Order, ...]
     zigzag: ZigZag | None = None
-    initial_speed: float | None = None  # m/s; None: what the revolutions give on a straight run
+    initial_speed: float | None = None
 
 
 def manoeuvre(
     name: str, duration_secs: float, rpm: float, rng: np.random.Generator | None = None
 ) -> Manoeuvre:
-    """The manoeuvre of that name: `zigzag-20-20`, `turning-circle-35-port`, `spiral`, ...
+    """Make the manoeuvre of a name, such as ``zigzag-20-20`` or ``turning-circle-35-port``.
 
-    `rng` draws the orders of `pseudo-random`. Raises `UsageError` for a name nobody knows.
+    Parameters
+    ----------
+    name
+        One of `EXAMPLES`, or such a name with other angles in degrees or ``-port`` at its end.
+    duration_secs
+        The length of the run, s.
+    rpm
+        The propeller's revolutions on the approach, rpm.
+    rng
+        Draws the orders of ``pseudo-random``; seeded with 0 by default.
+
+    Raises
+    ------
+    UsageError
+        The name is unknown, or an angle is out of range.
+
+    Examples
+    --------
+    >>> manoeuvre("zigzag-10-10", 600.0, 80.0).zigzag
+    ZigZag(start_secs=10.0, rudder=0.17453292519943295, heading=0.17453292519943295)
     """
     for pattern, build in _BUILDERS.items():
         if match := re.fullmatch(pattern, name):
@@ -78,17 +135,22 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class _Setting:
+    """What the orders of a manoeuvre depend on."""
+
     duration_secs: float
     rpm: float
     side: float
     angles: list[float]
     rng: np.random.Generator | None
 
-    def angle(self, usual_deg: float) -> float:
-        """The angle named, or the usual one, on the side asked for; 0 < angle <= 90°."""
-        angle = self.angles[0] if self.angles else usual_deg * DEG
+    def angle(self, default_deg: float) -> float:
+        """Return the rudder angle of the name, or the default, in rad, negative to port."""
+        angle = self.angles[0] if self.angles else default_deg * DEG
         if not 0 < angle <= 45 * DEG:
-            raise UsageError(f"a rudder angle of {angle / DEG:g}° cannot be ordered")
+            raise UsageError(
+                f"a rudder angle of {angle / DEG:g}° cannot be ordered; it must be above 0 and at "
+                "most 45°"
+            )
         return self.side * angle
 
 
@@ -100,7 +162,10 @@ def _turning_circle(name: str, setting: _Setting) -> Manoeuvre:
 def _zigzag(name: str, setting: _Setting) -> Manoeuvre:
     rudder, heading = setting.angle(20.0), setting.angles[1]
     if not 0 < heading <= 90 * DEG:
-        raise UsageError(f"a zig-zag cannot turn at {heading / DEG:g}° of heading")
+        raise UsageError(
+            f"a zig-zag cannot reverse at {heading / DEG:g}° of heading; it must be above 0 and at "
+            "most 90°"
+        )
     orders = (Order(0.0, 0.0, setting.rpm),)
     return Manoeuvre(name, orders, ZigZag(APPROACH_SECS, rudder, heading))
 
@@ -116,7 +181,7 @@ def _spiral(name: str, setting: _Setting) -> Manoeuvre:
 
 
 def _held(name: str, setting: _Setting, angles: tuple[float, ...], hold_secs: float) -> Manoeuvre:
-    """One angle after another, over and over."""
+    """Order one angle after another, repeatedly."""
     orders = [Order(0.0, 0.0, setting.rpm)]
     times = np.arange(APPROACH_SECS, setting.duration_secs, hold_secs)
     for i, time in enumerate(times.tolist()):
@@ -125,7 +190,7 @@ def _held(name: str, setting: _Setting, angles: tuple[float, ...], hold_secs: fl
 
 
 def _pseudo_random(name: str, setting: _Setting) -> Manoeuvre:
-    """Rudder and revolutions stepped at random: what identification likes best."""
+    """Order random steps of rudder and revolutions, the best excitation for identification."""
     rng = setting.rng or np.random.default_rng(0)
     rudder_steps = _steps(rng, setting.duration_secs, (20.0, 60.0), (-20 * DEG, 20 * DEG))
     rpm_steps = _steps(
@@ -144,7 +209,7 @@ def _steps(
     hold: tuple[float, float],
     level: tuple[float, float],
 ) -> dict[float, float]:
-    """Levels drawn evenly, each held for a time drawn evenly, on whole tenths of seconds."""
+    """Draw uniform levels, each held for a uniform time, rounded to tenths of seconds."""
     steps, time = {}, APPROACH_SECS
     while time < duration:
         steps[time] = float(rng.uniform(*level))
@@ -153,7 +218,7 @@ def _steps(
 
 
 def _paper(name: str, _: _Setting) -> Manoeuvre:
-    """The identification paper's own run: slow ahead, then two circles, at 100 rpm."""
+    """Order the identification paper's run: from slow speed two circles, at 100 rpm."""
     orders = (Order(0.0, 20 * DEG, 100.0), Order(200.0, -20 * DEG, 100.0))
     return Manoeuvre(name, orders, initial_speed=2.0)
 

@@ -1,4 +1,4 @@
-"""What the sensors make of the truth: rates, jitter, noise, bias, spikes, dropouts."""
+"""Simulated sensors: sampling rate, jitter, noise, bias, spikes, dropouts and delay."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -16,21 +16,43 @@ DEG = pi / 180
 
 @dataclass(frozen=True)
 class Sensor:
-    """One instrument. All in SI of its channel; its noise is a sum of the parts given."""
+    """One sensor and its errors, in the SI unit of its channel; the errors add up.
+
+    Attributes
+    ----------
+    rate_hz
+        The sampling rate.
+    jitter_secs
+        The standard deviation of the instant of measurement.
+    delay_secs
+        The longest delay from measurement to reception.
+    white
+        The standard deviation of Gaussian white noise.
+    uniform, uniform_relative
+        The half width of uniform white noise, absolute and as a fraction of the value.
+    wave, wave_tau_secs
+        The amplitude of a slow error sin(t / tau), and tau.
+    bias
+        A constant error.
+    spikes, spike_size
+        The fraction of samples with a spike, and its size, of either sign.
+    dropout, dropout_secs
+        The fraction of samples lost, and the length of one loss; 0 loses single samples.
+    """
 
     rate_hz: float = 10.0
-    jitter_secs: float = 0.0  # the standard deviation of the instant of measurement
-    delay_secs: float = 0.005  # from measurement to reception, at the most
-    white: float = 0.0  # standard deviation of Gaussian white noise
-    uniform: float = 0.0  # half width of uniform white noise
-    uniform_relative: float = 0.0  # the same, as a share of the value
-    wave: float = 0.0  # amplitude of a slow sine on the sensor
-    wave_tau_secs: float = 10.0  # sin(t / tau)
+    jitter_secs: float = 0.0
+    delay_secs: float = 0.005
+    white: float = 0.0
+    uniform: float = 0.0
+    uniform_relative: float = 0.0
+    wave: float = 0.0
+    wave_tau_secs: float = 10.0
     bias: float = 0.0
-    spikes: float = 0.0  # share of the samples that are off
-    spike_size: float = 0.0  # by so much, to either side
-    dropout: float = 0.0  # share of the samples lost
-    dropout_secs: float = 0.0  # how long one loss lasts; 0: single samples
+    spikes: float = 0.0
+    spike_size: float = 0.0
+    dropout: float = 0.0
+    dropout_secs: float = 0.0
 
 
 Suite = Mapping[str, Sensor]
@@ -43,19 +65,41 @@ _PERFECT = {
     "rpm": Sensor(),
     **_NAVIGATION,
 }
-_ON_REQUEST = {"sway": Sensor()}  # few ships have it: only where a setting of it is given
+_ON_REQUEST = {"sway": Sensor()}  # rare on ships: present only where a setting names it
 SUITES = ("none", "white", "paper")
 
 
 def suite(
     name: str, settings: Mapping[str, float] | None = None, *, angle_unit: str = "deg"
 ) -> Suite:
-    """A suite by name, with single settings changed: `{"yaw_rate.bias": 1e-4}`.
+    """Make a set of sensors.
 
-    A setting of `sway` adds a sensor of it. `paper` is Burylin's law: w (1 + 0.02 nu) + 5e-5
-    sin(t/10) and v + 0.2 nu + 0.05 sin(t/10), nu uniform on [-1, 1]; the yaw rate is in the angle
-    unit in which his table is read.
-    Raises `UsageError` for a suite, a sensor or a setting nobody knows, or a value out of range.
+    Parameters
+    ----------
+    name
+        ``none`` for perfect sensors, ``white`` for white noise of yaw rate and speed, or ``paper``
+        for the noise of the identification paper: w (1 + 0.02 nu) + 5e-5 sin(t/10) and
+        v + 0.2 nu + 0.05 sin(t/10), with nu uniform on [-1, 1].
+    settings
+        Changed settings, such as ``{"yaw_rate.bias": 1e-4}``. A setting of ``sway`` adds a sensor
+        of it.
+    angle_unit
+        The unit of the paper's yaw rate, ``deg`` or ``rad``: its table can be read in either.
+
+    Returns
+    -------
+    dict of Sensor
+        The sensors by channel.
+
+    Raises
+    ------
+    UsageError
+        The name, a sensor or a setting is unknown, or a value is out of range.
+
+    Examples
+    --------
+    >>> suite("white", {"speed.rate_hz": 2.0})["speed"].rate_hz
+    2.0
     """
     if name not in SUITES:
         raise UsageError(
@@ -101,19 +145,25 @@ def _check_range(channel: str, sensor: Sensor) -> None:
     if sensor.rate_hz == 0 or sensor.wave_tau_secs == 0:
         raise UsageError(f"{channel}.rate_hz and {channel}.wave_tau_secs must be positive")
     if sensor.dropout >= 1:
-        raise UsageError(f"{channel}.dropout is the share lost: below 1, got {sensor.dropout}")
+        raise UsageError(f"{channel}.dropout is a fraction, below 1; got {sensor.dropout}")
     if sensor.spikes > 1:
-        raise UsageError(f"{channel}.spikes is the share off: at most 1, got {sensor.spikes}")
+        raise UsageError(f"{channel}.spikes is a fraction, at most 1; got {sensor.spikes}")
 
 
 def _check_spikes(sensors: Suite) -> None:
     for channel, sensor in sensors.items():
         if sensor.spikes and not sensor.spike_size:
-            raise UsageError(f"{channel}.spikes have no size; give {channel}.spike_size, too")
+            raise UsageError(f"{channel}.spikes have no size; give {channel}.spike_size as well")
 
 
 def sample_times(sensor: Sensor, duration_secs: float, rng: np.random.Generator) -> FloatArray:
-    """When the sensor measures, (n,) seconds, whole microseconds; lost samples left out."""
+    """Draw the instants of measurement, (n,) s, in whole microseconds, without lost samples.
+
+    Examples
+    --------
+    >>> sample_times(Sensor(rate_hz=2.0), 1.5, np.random.default_rng(0)).tolist()
+    [0.0, 0.5, 1.0, 1.5]
+    """
     count = int(np.floor(duration_secs * sensor.rate_hz + 1e-9)) + 1
     times = np.arange(count) / sensor.rate_hz
     if sensor.jitter_secs:
@@ -135,26 +185,43 @@ def _lost(sensor: Sensor, times: FloatArray, rng: np.random.Generator) -> NDArra
 def corrupt(
     sensor: Sensor, times: FloatArray, truth: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
-    """What the sensor reports, (n,) or (n, k), of what was true at those times."""
+    """Add the sensor's errors to the true values.
+
+    Parameters
+    ----------
+    sensor
+        The sensor.
+    times
+        (n,) the instants of measurement, s.
+    truth
+        (n,) or (n, k) the true values at these times, SI.
+    rng
+        Draws the noise.
+
+    Returns
+    -------
+    (n,) or (n, k) array
+        The measured values, SI.
+    """
     shape = truth.shape
     wave = sensor.wave * np.sin(times / sensor.wave_tau_secs)
-    reported: FloatArray = (
+    measured: FloatArray = (
         truth * (1 + sensor.uniform_relative * rng.uniform(-1, 1, shape))
         + sensor.white * rng.standard_normal(shape)
         + sensor.uniform * rng.uniform(-1, 1, shape)
         + wave.reshape(-1, *([1] * (truth.ndim - 1)))
         + sensor.bias
     )
-    return reported + _spikes(sensor, shape, rng) if sensor.spikes else reported
+    return measured + _spikes(sensor, shape, rng) if sensor.spikes else measured
 
 
 def _spikes(sensor: Sensor, shape: tuple[int, ...], rng: np.random.Generator) -> FloatArray:
-    """What is off, as the samples are shaped: all components of a sample at once."""
-    own = rng.spawn(1)[0]  # the rest of the noise is then as it would be without
-    off = own.random((shape[0], *[1] * (len(shape) - 1))) < sensor.spikes
-    return sensor.spike_size * np.where(off, own.choice((-1.0, 1.0), shape), 0.0)
+    """Draw the spikes, shaped as the samples; a spike has all components of its sample."""
+    own = rng.spawn(1)[0]  # so that the other noise is the same with and without spikes
+    hit = own.random((shape[0], *[1] * (len(shape) - 1))) < sensor.spikes
+    return sensor.spike_size * np.where(hit, own.choice((-1.0, 1.0), shape), 0.0)
 
 
 def delays(sensor: Sensor, count: int, rng: np.random.Generator) -> FloatArray:
-    """How long each sample takes to arrive, (n,) seconds, whole microseconds."""
+    """Draw the delays from measurement to reception, (n,) s, in whole microseconds."""
     return np.round(sensor.delay_secs * rng.uniform(0.2, 1.0, count), 6)

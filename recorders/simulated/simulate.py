@@ -1,4 +1,4 @@
-"""Ship + manoeuvre + sensors = a simulated trial."""
+"""Simulated trials: a ship, a manoeuvre and sensors joined to a source of samples."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -15,15 +15,29 @@ from .manoeuvres import manoeuvre
 from .sensors import Suite, corrupt, delays, sample_times, suite
 from .trajectory import Gust, RandomForcing, Trajectory, WaveMoment, compute_trajectory
 
-CHUNK_SECS = 60.0  # of reception: what one damaged chunk can cost
-MOST_SAMPLES = 50_000_000  # of one sensor
-START_NS = 1_767_225_600 * 10**9  # 2026-01-01 00:00 UTC: a fixed instant, so that runs repeat
-RANDOM_FORCING_CHILD = 1_000_000  # of the seed: far behind the sensors' own, of which more may come
+CHUNK_SECS = 60.0  # of reception: a damaged chunk loses no more
+MAX_SAMPLES = 50_000_000  # of one sensor
+START_NS = 1_767_225_600 * 10**9  # 2026-01-01 00:00 UTC; fixed, so that runs repeat
+RANDOM_FORCING_CHILD = 1_000_000  # of the seed: far beyond those of the sensors, now and later
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedTrial:
-    """A `Source`: the samples of every sensor, and the truth they were taken from."""
+    """A source of samples: those of every sensor, and the true motion.
+
+    Attributes
+    ----------
+    channels
+        The samples of every sensor.
+    trajectory
+        The true motion.
+    duration_secs
+        The length of the trial, s.
+    vessel_toml
+        The text of the vessel file to keep in the log.
+    metadata
+        Texts to keep in the log: the source, the manoeuvre and the seed.
+    """
 
     channels: tuple[Channel, ...]
     trajectory: Trajectory
@@ -32,7 +46,7 @@ class SimulatedTrial:
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
-        """The samples in chunks of `CHUNK_SECS` of reception."""
+        """Yield the samples in chunks of `CHUNK_SECS` of reception."""
         ends = START_NS + (np.arange(CHUNK_SECS, self.duration_secs, CHUNK_SECS) * 1e9).astype(int)
         cuts = [
             [0, *np.searchsorted(channel.received_ns, ends).tolist(), len(channel)]
@@ -40,12 +54,12 @@ class SimulatedTrial:
         ]
         for i in range(len(ends) + 1):
             yield tuple(
-                _part(channel, cut[i], cut[i + 1])
+                channel.part(cut[i], cut[i + 1])
                 for channel, cut in zip(self.channels, cuts, strict=True)
             )
 
     def truth(self, rate_hz: float = 10.0) -> TrialLog:
-        """What really happened, as a log of source `truth`."""
+        """Return the true motion and disturbances as a log, all of the source ``truth``."""
         times = np.arange(int(self.duration_secs * rate_hz) + 1) / rate_hz
         stamps = _stamps(times)
         ship, constants = self.trajectory.ship, self.trajectory.constants
@@ -70,13 +84,41 @@ def simulate(
     random_forcing: RandomForcing | None = None,
     vessel_toml: str | None = None,
 ) -> SimulatedTrial:
-    """Sail a manoeuvre and measure it; the same seed gives the same samples to the last bit.
+    """Simulate a manoeuvre and measure it; the same seed gives the same samples to the last bit.
 
-    Raises `UsageError` for an unknown manoeuvre, a duration that is not positive, a gust outside
-    the trial, or an random_forcing that is negative or not finite.
+    Parameters
+    ----------
+    vessel
+        The ship.
+    manoeuvre_name
+        Such as ``zigzag-20-20``; see `recorders.simulated.manoeuvres`.
+    duration_secs
+        The length of the trial, s.
+    seed
+        Seed of all random numbers. Each sensor has its own, so that a change of one sensor leaves
+        the noise of the others unchanged.
+    sensors
+        The sensors by channel, from `recorders.simulated.sensors.suite`; the paper's by default.
+    gusts, wave, random_forcing
+        The disturbances.
+    vessel_toml
+        The text of the vessel file to keep in the log.
+
+    Raises
+    ------
+    UsageError
+        The manoeuvre is unknown, the duration is not positive, a gust lies outside the trial, or a
+        random forcing is negative or not finite.
+
+    Examples
+    --------
+    >>> from shiplog import load_vessel
+    >>> trial = simulate(load_vessel("table1")[0], "spiral", duration_secs=60.0)
+    >>> [channel.name for channel in trial.channels]
+    ['yaw_rate', 'speed', 'rudder', 'rpm', 'heading', 'position']
     """
     sensors = suite("paper") if sensors is None else sensors
-    _require_sensible(duration_secs, seed, sensors, gusts, random_forcing)
+    _require_valid(duration_secs, seed, sensors, gusts, random_forcing)
     orders_seed, *sensor_seeds = np.random.SeedSequence(seed).spawn(1 + len(CATALOGUE))
     ordered = manoeuvre(
         manoeuvre_name, duration_secs, vessel.approach_rpm, np.random.default_rng(orders_seed)
@@ -103,7 +145,7 @@ def simulate(
     return SimulatedTrial(tuple(channels), trajectory, duration_secs, vessel_toml, metadata)
 
 
-def _require_sensible(
+def _require_valid(
     duration_secs: float,
     seed: int,
     sensors: Suite,
@@ -115,22 +157,23 @@ def _require_sensible(
     if seed < 0:
         raise UsageError(f"the seed must not be negative, got {seed}")
     for name, sensor in sensors.items():
-        if duration_secs * sensor.rate_hz > MOST_SAMPLES:
+        if duration_secs * sensor.rate_hz > MAX_SAMPLES:
             raise UsageError(
                 f"{name} at {sensor.rate_hz:g} Hz for {duration_secs:g} s is over "
-                f"{MOST_SAMPLES:,} samples; shorten the trial or slow the sensor"
+                f"{MAX_SAMPLES:,} samples; shorten the trial or lower the sensor's rate"
             )
     for gust in gusts:
         if not (0 <= gust.start_secs < duration_secs and gust.duration_secs > 0):
             raise UsageError(
-                f"a gust must begin within the trial and last: it begins at {gust.start_secs:g} s "
-                f"of {duration_secs:g} s, for {gust.duration_secs:g} s"
+                f"a gust must start within the trial and have a positive length, got a start at "
+                f"{gust.start_secs:g} s of {duration_secs:g} s and a length of "
+                f"{gust.duration_secs:g} s"
             )
     if random_forcing and not all(
         isfinite(std) and std >= 0 for std in (random_forcing.rudder, random_forcing.force)
     ):
         raise UsageError(
-            "an random_forcing's standard deviations must be finite and not negative, got "
+            "the standard deviations of a random forcing must be finite and not negative, got "
             f"{random_forcing.rudder:g} rad of rudder and {random_forcing.force:g} m/s²"
         )
 
@@ -153,17 +196,3 @@ def _channel(
     components = ("north", "east") if name == "position" else ()
     unit = unit or CATALOGUE[name].unit
     return Channel(name, source, unit, measured, received, values, components)
-
-
-def _part(channel: Channel, start: int, stop: int) -> Channel:
-    cut = slice(start, stop)
-    return Channel(
-        channel.name,
-        channel.source,
-        channel.unit,
-        channel.measured_ns[cut],
-        channel.received_ns[cut],
-        channel.values[cut],
-        channel.fields,
-        channel.metadata,
-    )

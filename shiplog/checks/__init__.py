@@ -1,5 +1,5 @@
-"""Checks of raw channels: statistics, stuck values, signs, biases, data quality.
+"""Checks of raw channels: statistics, stuck values, signs, biases and data quality.
 
-Each check takes channels chunk by chunk and returns statistics or warnings; none changes a sample.
-Imports nothing of `shiplog.mcap`, `shiplog.tables` or `shiplog.vessel`.
+Each check takes a log chunk by chunk and returns statistics or warnings; none changes a sample.
+This folder must not import `shiplog.mcap`, `shiplog.tables` or `shiplog.vessel`.
 """

@@ -1,110 +1,148 @@
-"""What is wrong with a log's data, in words: for the person who could still sail again."""
+"""Warnings about the data of a log, in words for the person who can still repeat the trial."""
 
 from collections.abc import Iterator
 
 from shiplog.errors import LogError
-from shiplog.types import TrialLog
 from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 
 from .channel_stats import ChannelStats, LogStats
-from .log_stats import compute_log_stats
 
-IRREGULAR_SHARE = 0.1  # of the intervals, which may be more than half off the usual one
+MAX_IRREGULAR_SHARE = 0.1  # of the intervals
 
 
-def examine(log: TrialLog, names: tuple[str, ...]) -> list[str]:
-    """What is wrong with these channels of a log, a sentence each; nothing where all is well.
+def data_warnings(stats: LogStats, names: tuple[str, ...]) -> list[str]:
+    """Report the defects of some channels, one line each.
 
-    `names` are keys as `log[...]` takes them.
+    A warning has what was found, the likely cause and the remedy.
 
-    Raises `LogError` where a channel is missing, holds an infinite value, or has measured times
-    that run backwards: with these nothing can be computed.
+    Parameters
+    ----------
+    stats
+        Statistics of the log.
+    names
+        Channels to check, as keys of the log: `yaw_rate` or `yaw_rate/gyro`.
+
+    Raises
+    ------
+    LogError
+        A channel is missing, has an infinite value, or has measured times that run backwards:
+        nothing can be computed from it.
+
+    Examples
+    --------
+    >>> import shiplog
+    >>> from shiplog.checks.log_stats import compute_log_stats
+    >>> log = shiplog.read("sample_data/zigzag_20_20.mcap")
+    >>> data_warnings(compute_log_stats(log), ("yaw_rate", "rudder"))
+    []
     """
-    return data_warnings(compute_log_stats(log), names)
-
-
-def data_warnings(found: LogStats, names: tuple[str, ...]) -> list[str]:
-    """As `examine`, of a log that was surveyed."""
-    said = []
+    warnings = []
     for name in names:
-        channel = found[name]
-        _require_usable(found, channel)
-        if channel.samples:
-            said += [f"{channel.topic}: {fault}" for fault in _faults(channel)]
-        else:
-            said.append(f"{channel.topic}: no samples")
-    return said
+        channel = stats[name]
+        _require_usable(stats, channel)
+        warnings += [f"{channel.topic}: {warning}" for warning in _channel_warnings(channel)]
+    return warnings
 
 
-def _require_usable(found: LogStats, channel: ChannelStats) -> None:
-    infinite, back = channel.infinite, channel.backward_steps
+def times_in_words(count: int) -> str:
+    """Return `once`, or `3 times`."""
+    return "once" if count == 1 else f"{count} times"
+
+
+def _require_usable(stats: LogStats, channel: ChannelStats) -> None:
+    infinite, backward = channel.infinite, channel.backward_steps
     if infinite.count:
         raise LogError(
             f"{channel.topic} has {_count(infinite.count, 'infinite value')}, the first "
-            f"{infinite.first_secs:.3f} s after its start; convert the log to CSV, make it nan "
-            f"there and convert it back: {found.name}"
+            f"{infinite.first_secs:.3f} s after its start; convert the log to CSV, replace "
+            f"{'it' if infinite.count == 1 else 'them'} by nan and convert it back: {stats.name}"
         )
-    if back.count:
+    if backward.count:
         raise LogError(
-            f"the measured times of {channel.topic} run backwards {times_in_words(back.count)}, "
-            f"first by {back.extent:.3f} s, {back.first_secs:.3f} s after its start; "
-            f"`shiplog convert IN.mcap OUT.mcap` sorts them: {found.name}"
+            f"the measured times of {channel.topic} run backwards "
+            f"{times_in_words(backward.count)}, first by {backward.extent:.3f} s, "
+            f"{backward.first_secs:.3f} s after its start; "
+            f"`shiplog convert IN.mcap OUT.mcap` sorts them: {stats.name}"
         )
 
 
-def _faults(channel: ChannelStats) -> Iterator[str]:
+def _channel_warnings(channel: ChannelStats) -> Iterator[str]:
+    if not channel.samples:
+        yield "no samples; check that the sensor was connected and switched on"
+        return
+    yield from _time_warnings(channel)
+    yield from _value_warnings(channel)
+
+
+def _time_warnings(channel: ChannelStats) -> Iterator[str]:
+    """Gaps, duplicates, irregular intervals, and clocks that disagree."""
     if channel.gaps:
         start, longest = max(channel.gaps, key=lambda gap: gap[1])
-        count = _count(len(channel.gaps), "gap")
-        yield f"{count}, the longest {longest:.1f} s, {start:.1f} s after its start"
+        yield (
+            f"{_count(len(channel.gaps), 'gap')}, the longest {longest:.1f} s, {start:.1f} s after "
+            "its start; samples were lost: check the sensor and its connection"
+        )
     if channel.duplicate_times:
-        yield f"{_count(channel.duplicate_times, 'sample')} with the time of the one before"
-    if channel.missing:
-        share = 100 * channel.missing / channel.samples
-        yield f"{_count(channel.missing, 'sample')} ({share:.1f} %) not measured (NaN)"
-    yield from _stuck(channel)
-    yield from _impossible(channel)
-    if channel.irregular_share > IRREGULAR_SHARE:
+        yield (
+            f"{_count(channel.duplicate_times, 'sample')} with the same time as the one before; "
+            "the time stamps are too coarse or samples were recorded twice: "
+            "check the sensor's clock and the recorder"
+        )
+    if channel.irregular_share > MAX_IRREGULAR_SHARE:
         low, high = channel.interval_range_secs
         yield (
-            f"irregular: {100 * channel.irregular_share:.0f} % of its intervals are more than half "
-            f"off the usual {channel.interval_secs:.3g} s; they go from {low:.2g} to {high:.2g} s"
+            f"irregular sampling: {100 * channel.irregular_share:.0f} % of the intervals differ by "
+            f"more than half from their median of {channel.interval_secs:.3g} s (percentiles 1 and "
+            f"99: {low:.2g} and {high:.2g} s); check the time stamps and the load of the network"
         )
     if channel.received_early.count:
         yield (
-            f"{_count(channel.received_early.count, 'sample')} received before measured, by up to "
-            f"{channel.received_early.extent:.3g} s: the sensor's clock is ahead of the recorder's"
+            f"{_count(channel.received_early.count, 'sample')} received before being measured, by "
+            f"up to {channel.received_early.extent:.3g} s; the sensor's clock is ahead of the "
+            "recorder's: synchronise them"
         )
 
 
-def _stuck(channel: ChannelStats) -> Iterator[str]:
+def _value_warnings(channel: ChannelStats) -> Iterator[str]:
+    """Missing, stuck and impossible values."""
+    if channel.missing:
+        share = 100 * channel.missing / channel.samples
+        yield (
+            f"{_count(channel.missing, 'sample')} ({share:.1f} %) not measured (NaN); "
+            "the sensor gave no value: check it if that is unexpected"
+        )
     stuck = channel.stuck
     if stuck:
-        held = ", ".join(_shown(channel, float(value)) for value in stuck.value)
+        held = ", ".join(_displayed(channel, float(value)) for value in stuck.value)
         yield (
             f"stuck {times_in_words(stuck.count)}, longest at {held} for "
-            f"{stuck.lasted_secs:.1f} s, {stuck.start_secs:.1f} s after its start"
+            f"{stuck.duration_secs:.1f} s, {stuck.start_secs:.1f} s after its start; the sensor "
+            "froze: check it, and set these values to nan in a CSV of the log"
         )
+    yield from _impossible_warnings(channel)
 
 
-def _impossible(channel: ChannelStats) -> Iterator[str]:
-    """Values that no ship has."""
+def _impossible_warnings(channel: ChannelStats) -> Iterator[str]:
     count = channel.impossible.count
     if not count:
         return
     if channel.fields:
-        yield f"{_count(count, 'impossible position')}, beyond 90 or 180 deg"
+        yield (
+            f"{_count(count, 'impossible position')}, beyond 90 deg of latitude or 180 deg of "
+            "longitude; check the receiver and the columns of the layout"
+        )
     else:
         kind = CATALOGUE[channel.name]
         yield (
-            f"{_count(count, 'impossible value')}, such as "
-            f"{_shown(channel, channel.impossible.extent)}; between "
-            f"{_shown(channel, kind.lowest)} and {_shown(channel, kind.highest)} is possible"
+            f"{_count(count, 'impossible value')}, the worst "
+            f"{_displayed(channel, channel.impossible.extent)}; possible are "
+            f"{_displayed(channel, kind.lowest)} to {_displayed(channel, kind.highest)}: "
+            "check the unit in the layout and the sensor"
         )
 
 
-def _shown(channel: ChannelStats, value: float) -> str:
-    """A value as a person reads it."""
+def _displayed(channel: ChannelStats, value: float) -> str:
+    """Format a value in the unit people use."""
     kind = CATALOGUE.get(channel.name)
     if kind is None or channel.fields == GEOGRAPHIC:
         return f"{value:.4g} {channel.unit}"
@@ -113,8 +151,3 @@ def _shown(channel: ChannelStats, value: float) -> str:
 
 def _count(number: int, thing: str) -> str:
     return f"1 {thing}" if number == 1 else f"{number} {thing}s"
-
-
-def times_in_words(count: int) -> str:
-    """How often, as it is said."""
-    return "once" if count == 1 else f"{count} times"

@@ -1,4 +1,4 @@
-"""Whether the yaw rate agrees with the heading: a gyro that is off shows in the long run."""
+"""Check of the yaw rate against the heading: a biased gyro drifts away from the compass."""
 
 from collections.abc import Callable
 
@@ -11,91 +11,108 @@ from .channel_stats import ChannelStats, LogStats
 from .interpolate import Interpolator, valid_samples
 from .log_stats import compute_log_stats
 
-BLOCKS = 8  # of a record, each telling the bias for itself
-SIGNIFICANT = 4.0  # standard errors
-LEAST_DRIFT = np.radians(1.0)  # rad over the record: less does not matter
+BLOCKS = 8  # stretches of a record, each of which gives an estimate of the bias
+SIGNIFICANT_ERRORS = 4.0  # standard errors by which a bias must differ from zero
+MIN_DRIFT = np.radians(1.0)  # rad over the whole record: a smaller drift does not matter
 
 
 def gyro_bias_warning(log: Log) -> str | None:
-    """A sentence if the integrated yaw rate drifts away from the heading, else None.
+    """Warn if the integrated yaw rate drifts away from the heading.
 
-    The bias is the mean over blocks of the record of the integral's gain on the heading, its error
-    their scatter; blocks with a gap in either channel are left out. None where a channel is
-    missing, or too little of it is whole.
+    The record is divided into blocks. In each, the bias is the difference between the integral of
+    the yaw rate and the change of the heading, over the block's length. The estimate is the mean
+    over the blocks, its standard error follows from their scatter. Blocks with a gap in either
+    channel are left out.
+
+    Returns
+    -------
+    str or None
+        One line with the bias, its effect and the remedy. None where the two agree, where a
+        channel is missing, or where too few blocks are complete.
     """
-    watch = GyroBiasCheck(compute_log_stats(log))
+    check = GyroBiasCheck(compute_log_stats(log))
     for chunk in log.chunks():
-        watch.add(chunk)
-    return watch.result()
+        check.add(chunk)
+    return check.result()
 
 
 class GyroBiasCheck:
-    """Looks at yaw rate and heading as they come, and gives `gyro_bias_warning`'s answer.
+    """The check of `gyro_bias_warning` for a log that comes chunk by chunk.
 
-    `found` is the log_stats of the log that comes.
+    Parameters
+    ----------
+    stats
+        Statistics of the whole log.
     """
 
-    def __init__(self, found: LogStats) -> None:
-        self._duration_secs = found.duration_secs
-        self._turned: _Turning | None = None
-        gyro, compass = found.get("yaw_rate"), found.get("heading")
+    def __init__(self, stats: LogStats) -> None:
+        self._duration_secs = stats.duration_secs
+        self._gyro: _HeadingChange | None = None
+        gyro, compass = stats.get("yaw_rate"), stats.get("heading")
         if gyro is None or compass is None or min(gyro.valid, compass.valid) < 4 * BLOCKS:
             return
         start = max(gyro.valid_span_ns[0], compass.valid_span_ns[0])
         end = min(gyro.valid_span_ns[1], compass.valid_span_ns[1])
         self._edges = np.linspace(0.0, (end - start) * 1e-9, BLOCKS + 1)
-        self._turned = _Turning(gyro, self._edges, start, _integrated)
-        self._headed = _Turning(compass, self._edges, start, _unwrapped)
+        self._gyro = _HeadingChange(gyro, self._edges, start, _integrated)
+        self._compass = _HeadingChange(compass, self._edges, start, _unwrapped)
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
-        """Take the next samples."""
-        if self._turned:
-            self._turned.add(chunk)
-            self._headed.add(chunk)
+        """Add the next samples of the log."""
+        if self._gyro:
+            self._gyro.add(chunk)
+            self._compass.add(chunk)
 
     def result(self) -> str | None:
-        """What there is to say, once all samples were added."""
-        if not self._turned:
+        """Return the warning, or None, once all samples were added."""
+        if not self._gyro:
             return None
-        whole = self._turned.whole & self._headed.whole
-        turned, headed = self._turned.result(), self._headed.result()
-        biases, contrary = (
-            (np.diff(turned + sign * headed) / np.diff(self._edges))[whole] for sign in (-1, 1)
+        complete = self._gyro.complete & self._compass.complete
+        by_gyro, by_compass = self._gyro.result(), self._compass.result()
+        biases, reversed_biases = (
+            (np.diff(by_gyro + sign * by_compass) / np.diff(self._edges))[complete]
+            for sign in (-1, 1)
         )
         if len(biases) < BLOCKS // 2:
             return None
-        if np.std(contrary) < 0.1 * np.std(biases):
-            topic = self._headed.channel.topic
-            return f"{topic}: counts to port; turn the heading's sign in the layout"
+        if np.std(reversed_biases) < 0.1 * np.std(biases):
+            return (
+                f"{self._compass.channel.topic}: the heading increases to port, it must increase "
+                "to starboard; reverse its sign in the layout (sign = -1) or in the recorder"
+            )
         bias = float(np.mean(biases))
         error = float(np.std(biases, ddof=1)) / np.sqrt(len(biases))
-        if abs(bias) < SIGNIFICANT * error or abs(bias) * self._duration_secs < LEAST_DRIFT:
+        drift = abs(bias) * self._duration_secs
+        if abs(bias) < SIGNIFICANT_ERRORS * error or drift < MIN_DRIFT:
             return None
-        per_second, its_error = (x * conversion_factor("rad/s", "deg/s") for x in (bias, error))
+        bias_deg, error_deg = (x * conversion_factor("rad/s", "deg/s") for x in (bias, error))
         return (
-            f"{self._turned.channel.topic}: off by {per_second:+.4f} ± {2 * its_error:.4f} deg/s "
-            "against the heading; a bias passes for a yaw moment and spoils b1, b2, b3 and e"
+            f"{self._gyro.channel.topic}: bias of {bias_deg:+.4f} ± {2 * error_deg:.4f} deg/s "
+            "against the heading; a bias acts like a yaw moment and distorts b1, b2, b3 and e: "
+            "calibrate the gyro or subtract the bias"
         )
 
 
-class _Turning:
-    """How far the ship turned until each edge, by one channel, and the blocks it has no gap in."""
+class _HeadingChange:
+    """Heading change up to the edge of each block, as one channel measures it.
+
+    `complete` marks the blocks in which the channel has no gap.
+    """
 
     def __init__(
         self,
         channel: ChannelStats,
         edges: FloatArray,
         origin_ns: int,
-        turns: Callable[[FloatArray, FloatArray], FloatArray],
+        changes: Callable[[FloatArray, FloatArray], FloatArray],
     ) -> None:
         self.channel = channel
-        self.whole = np.ones(len(edges) - 1, bool)
-        self._edges, self._origin, self._turns = edges, origin_ns, turns
-        self._probe, self._turned = Interpolator(edges), 0.0
+        self.complete = np.ones(len(edges) - 1, bool)
+        self._edges, self._origin, self._changes = edges, origin_ns, changes
+        self._interpolator, self._turned = Interpolator(edges), 0.0
         self._last: tuple[FloatArray, FloatArray] = (np.zeros(0), np.zeros(0))
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
-        """Take the next samples."""
         channel = self.channel.select(chunk)
         if channel is None or not len(channel):
             return
@@ -104,21 +121,23 @@ class _Turning:
         self._last = times[-1:], values[-1:]
         if len(times) < 2:
             return
-        turned = np.cumsum(np.concatenate(([self._turned], self._turns(times, values))))
+        turned = np.cumsum(np.concatenate(([self._turned], self._changes(times, values))))
         self._turned = float(turned[-1])
-        self._probe.add(times, turned)
+        self._interpolator.add(times, turned)
         for i in np.flatnonzero(np.diff(times) > self.channel.gap_threshold_secs):
             first, last = np.searchsorted(self._edges, times[i : i + 2]) - 1
-            self.whole[max(first, 0) : last + 1] = False
+            self.complete[max(first, 0) : last + 1] = False
 
     def result(self) -> FloatArray:
-        """Radians at the edges, (n,), from some direction on."""
-        return self._probe.result()
+        """Heading at the edges in rad, (n,), relative to an arbitrary direction."""
+        return self._interpolator.result()
 
 
 def _integrated(times: FloatArray, rates: FloatArray) -> FloatArray:
+    """Heading change between samples of the yaw rate, rad, by the trapezoidal rule."""
     return np.diff(times) * (rates[1:] + rates[:-1]) / 2
 
 
 def _unwrapped(_: FloatArray, headings: FloatArray) -> FloatArray:
+    """Heading change between samples of the heading, rad, within half a turn."""
     return np.asarray((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)

@@ -1,11 +1,12 @@
-"""The paper's model: second-order nonlinear Nomoto with surge, as `shiplog.ships.paper` has it.
+"""The identification paper's models: second-order nonlinear Nomoto with surge, free and tied.
 
     w'' = a w' + b1 w + b2 w|w| + b3 w^3 + ks (d delta + e delta')
     v'  = f w^2 + g v^2 + h n
     ks  = alpha1 v + alpha2 n exp(-alpha3 v)
 
-in SI, n in rpm. Here it is in all its coefficients, the alphas known; or tied as the paper's own
-derivation has it, b1 = -d and e = T3 d, which is singular for a ship at the margin of stability.
+in SI, n in rpm, as in `shiplog.ships.paper`. ``burylin`` has all coefficients as parameters, the
+alphas fixed. ``burylin-tied`` ties them as the paper's derivation does, b1 = -d and e = T3 d, which
+is singular for a ship at the margin of stability.
 """
 
 from collections.abc import Sequence
@@ -46,7 +47,7 @@ def _observed(c: Coefficients, x: ComplexArray) -> tuple[complex, complex, compl
 
 
 @compiled
-def _sail(
+def _integrate(
     c: Coefficients, x: ComplexArray, offset: complex, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
@@ -70,7 +71,7 @@ _STATE = (
     StateValue("v", "speed"),
     StateValue("heading", "heading"),
 )
-# a ship of 200 m, in general
+# start values for a typical ship of 200 m
 _A, _D = _parameter("a", -0.03), _parameter("d", 1.5e-4)
 _NONLINEAR = (_parameter("b2", -0.05), _parameter("b3", 0.0, typical=5.0))
 _OTHERS = (
@@ -84,10 +85,10 @@ _OTHERS = (
 BURYLIN = Model(
     "burylin", "the paper's model", Coefficients,
     (_A, _parameter("b1", -1.5e-4), *_NONLINEAR, _D, _parameter("e", 1e-4), *_OTHERS),
-    _STATE, _sail, ("yaw_rate", "speed"), dimensionless=False,
+    _STATE, _integrate, ("yaw_rate", "speed"), dimensionless=False,
 )  # fmt: skip
 BURYLIN_TIED = Model(
     "burylin-tied", "the paper's model, b1 = -d and e = T3 d", Coefficients,
     (_A, *_NONLINEAR, _D, Parameter("T3", "s", 1.0), *_OTHERS),
-    _STATE, _sail, ("yaw_rate", "speed"), dimensionless=False, expand=_tied,
+    _STATE, _integrate, ("yaw_rate", "speed"), dimensionless=False, expand=_tied,
 )  # fmt: skip

@@ -1,13 +1,13 @@
-"""The slipstream model with a drift that takes time, a sided propeller, and surge from sway.
+"""The slipstream model with a lag of the drift, a propeller side force, and surge from sway.
 
     rho''  = a nu rho' + b1 nu^2 rho + b2 nu rho|rho| + ks (nu delta + T3 delta') + e0 nu eta^2
     ks     = k ((1 - m) nu^2 + m eta^2)
     nu'    = f rho^2 + f1 rho sigma + f2 sigma^2 + g nu^2 + h eta
     sigma' = (c1 nu rho + c2 rho|rho| - nu sigma) / Td
 
-sigma is the sway over U0, all else as in `slipstream`. One screw turns one way: e0 is what that
-does to a ship whose rudder is amidships. A ship in a turn is slowed by her drift, rho sigma above
-all, for that is her own mass going sideways.
+sigma is the sway over U0, all else as in `slipstream`. A single screw pushes the stern to one side:
+e0 is its yaw moment with the rudder amidships. In a turn the drift slows the ship, mainly by the
+term rho sigma, which is the inertia of its own mass moving sideways.
 """
 
 from typing import NamedTuple
@@ -29,7 +29,7 @@ from .slipstream import SURGE, YAW
 
 
 class DriftLag(NamedTuple):
-    """The coefficients."""
+    """The coefficients of the equations, dimensionless."""
 
     a: complex
     b1: complex
@@ -70,7 +70,7 @@ def _observed(c: DriftLag, x: ComplexArray) -> tuple[complex, complex, complex, 
 
 
 @compiled
-def _sail(
+def _integrate(
     c: DriftLag, x: ComplexArray, offset: complex, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
@@ -93,5 +93,5 @@ DRIFT_LAG = Model(
         StateValue("sigma", "sway", prior_std=0.1),
         StateValue("psi", "heading"),
     ),
-    _sail, ("yaw_rate", "speed", "sway", "heading"),
+    _integrate, ("yaw_rate", "speed", "sway", "heading"),
 )  # fmt: skip

@@ -1,9 +1,12 @@
-"""What a model of a ship is: parameters with their limits, a state, equations, and its scale."""
+"""What a ship model is: parameters with limits and priors, a state, equations, and a scale."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from importlib import import_module
 from math import inf
+from pickle import PicklingError
 from typing import Any
 
 import numpy as np
@@ -19,53 +22,95 @@ STEP = 1e-30  # along the imaginary axis: nothing is lost to rounding, however s
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a model, in its own unit."""
+    """One parameter of a model, in its own unit.
+
+    Attributes
+    ----------
+    name, unit
+        Such as ``T3`` and ``s``.
+    start
+        Where a fit starts without other information, and the mean of the prior.
+    lowest, highest
+        The limits of its estimate.
+    prior_std
+        The standard deviation of the prior about `start`; infinite for none.
+    fixed
+        Whether it keeps the value `start` unless it is freed explicitly.
+    typical
+        Its magnitude for ships in general, where `start` is zero.
+    """
 
     name: str
     unit: str
-    start: float  # where a search begins that knows nothing,
-    lowest: float = -inf  # and between which it stays
+    start: float
+    lowest: float = -inf
     highest: float = inf
-    prior_std: float = inf  # how far from `start` it is believed to be, before any data
-    fixed: bool = False  # kept at `start` unless it is asked for
-    typical: float = 0.0  # its size of ships in general, where `start` is none
+    prior_std: float = inf
+    fixed: bool = False
+    typical: float = 0.0
 
     @property
     def size(self) -> float:
-        """What its size is of ships in general."""
+        """The parameter's magnitude for ships in general, to scale it with."""
         return self.typical or abs(self.start) or self.prior_std
 
 
 @dataclass(frozen=True)
 class StateValue:
-    """One number of a model's state, and what is known of it as a run begins."""
+    """One value of a model's state, and what is known of it at the start of a run.
+
+    Attributes
+    ----------
+    name
+        Its symbol in the equations.
+    channel
+        The one of `MODEL_OUTPUTS` that measures it; None where nothing does.
+    prior_std
+        The standard deviation about zero of its initial value where nothing measures it.
+    """
 
     name: str
-    channel: str | None = None  # that measures it
-    prior_std: float = inf  # of what it is when nothing measures it, from zero
+    channel: str | None = None
+    prior_std: float = inf
 
 
 @dataclass(frozen=True)
 class Scale:
-    """The units in which a model's equations are written: one each of time, speed, revolutions."""
+    """The units of a model's equations: one of time, of speed and of revolutions each.
+
+    Attributes
+    ----------
+    secs
+        The unit of time, s.
+    speed
+        The unit of speed, m/s.
+    rpm
+        The unit of the propeller's revolutions, rpm.
+    """
 
     secs: float = 1.0
-    speed: float = 1.0  # m/s
+    speed: float = 1.0
     rpm: float = 1.0
 
     @property
     def outputs(self) -> FloatArray:
-        """(4,) what one of each of `MODEL_OUTPUTS` is in SI."""
+        """(4,) the factors from the units of the equations to SI, in the order of `MODEL_OUTPUTS`.
+
+        Examples
+        --------
+        >>> Scale(secs=20.0, speed=8.0, rpm=90.0).outputs.tolist()
+        [0.05, 8.0, 8.0, 1.0]
+        """
         return np.array([1 / self.secs, self.speed, self.speed, 1.0])
 
     def of_channel(self, channel: str | None) -> float:
-        """What one of a channel's is in SI; 1 for what no channel measures."""
+        """Return the factor to SI of one channel; 1 for None."""
         return (
             float(self.outputs[MODEL_OUTPUTS.index(channel)]) if channel in MODEL_OUTPUTS else 1.0
         )
 
     def scaled(self, path: InputPath) -> InputPath:
-        """A path in these units."""
+        """Return the inputs of a run in these units."""
         return path._replace(
             secs=path.secs / self.secs,
             delta_dot=path.delta_dot * self.secs,
@@ -76,49 +121,77 @@ class Scale:
 SI = Scale()
 
 
-def _as_they_are(values: ComplexArray) -> Sequence[complex]:
+def _unchanged(values: ComplexArray) -> Sequence[complex]:
     return tuple(values)
 
 
 @dataclass(frozen=True, eq=False)
 class Propagation:
-    """A run of `count` samples, and how it changes along k directions."""
+    """A simulated run of `count` samples and its derivatives along k directions.
 
-    outputs: FloatArray  # (count, 4) SI, in the order of MODEL_OUTPUTS
-    end: FloatArray  # (s,) the state at the last sample, in the units of the equations
-    outputs_by: FloatArray  # (k, count, 4)
-    end_by: FloatArray  # (k, s)
+    Attributes
+    ----------
+    outputs
+        (count, 4) the outputs in SI, in the order of `MODEL_OUTPUTS`.
+    end
+        (s,) the state at the last sample, in the units of the equations.
+    outputs_by, end_by
+        (k, count, 4) and (k, s) their derivatives along each direction.
+    """
+
+    outputs: FloatArray
+    end: FloatArray
+    outputs_by: FloatArray
+    end_by: FloatArray
 
 
 @dataclass(frozen=True)
 class Model:
-    """A ship's equations, for simulation and for estimation.
+    """A ship model, for simulation and for estimation.
 
-    `expand` makes of the parameters the equations' coefficients, which are a `kind`: where some
-    are tied to others there are fewer parameters than coefficients.
+    A model can be pickled and copied, as long as its functions stand in a module by their names.
+
+    Attributes
+    ----------
+    name
+        The name by which `ship_model` finds it.
+    title
+        A few words for tables.
+    kind
+        The NamedTuple of the equations' coefficients. Compiled code chooses the equations by it.
+    parameters
+        The parameters, in the order in which arrays hold them.
+    state
+        The state, in the order of the equations. One value each is measured by ``yaw_rate`` and
+        ``speed``.
+    compiled
+        `shiplog.ships.motion.integrate` compiled for this kind, in the model's own module.
+    outputs
+        Those of `MODEL_OUTPUTS` that the model predicts.
+    dimensionless
+        Whether the equations are dimensionless, in ship lengths and approach speeds; else in SI.
+    expand
+        Makes the coefficients, in the order of `kind`, of the parameters. Where coefficients are
+        tied to each other there are fewer parameters than coefficients.
     """
 
     name: str
     title: str
-    kind: Callable[..., Any]  # a NamedTuple, whose type the compiled equations are chosen by
+    kind: Callable[..., Any]
     parameters: tuple[Parameter, ...]
     state: tuple[StateValue, ...]
-    compiled: Callable[..., ComplexArray]  # `sail` for this kind, kept in the model's own file
-    outputs: tuple[str, ...] = (
-        "yaw_rate",
-        "speed",
-        "heading",
-    )  # of MODEL_OUTPUTS: what it predicts
-    dimensionless: bool = True  # else its equations are in SI
-    expand: Callable[[ComplexArray], Sequence[complex]] = field(default=_as_they_are)
+    compiled: Callable[..., ComplexArray]
+    outputs: tuple[str, ...] = ("yaw_rate", "speed", "heading")
+    dimensionless: bool = True
+    expand: Callable[[ComplexArray], Sequence[complex]] = field(default=_unchanged)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of the parameters."""
+        """The names of the parameters."""
         return tuple(p.name for p in self.parameters)
 
     def parameter(self, name: str) -> Parameter:
-        """The parameter of that name; `UsageError` where there is none."""
+        """Return the parameter of a name; raises `UsageError` where there is none."""
         for parameter in self.parameters:
             if parameter.name == name:
                 return parameter
@@ -128,15 +201,30 @@ class Model:
         )
 
     def start_values(self) -> FloatArray:
-        """(p,) where a search begins that knows nothing."""
+        """(p,) where a fit starts without other information."""
         return np.array([p.start for p in self.parameters])
 
     def scale(self, length: float, speed: float, rpm: float) -> Scale:
-        """The units of its equations for a ship of that length, in m, at that speed and rpm."""
+        """Return the units of the equations for one ship.
+
+        Parameters
+        ----------
+        length
+            The length between perpendiculars, m.
+        speed, rpm
+            Those of the straight approach, m/s and rpm.
+        """
         return Scale(length / speed, speed, rpm) if self.dimensionless else SI
 
     def coefficients(self, parameters: Sequence[float] | FloatArray) -> Any:  # noqa: ANN401 - a `kind`
-        """The equations' coefficients, real, of the parameters."""
+        """Return the equations' coefficients as a `kind` of real numbers.
+
+        Examples
+        --------
+        >>> from shiplog.ships import ship_model
+        >>> ship_model("nomoto").coefficients([-0.6, 0.5, -0.5, -0.05, 0.05])
+        Norrbin(a=-0.6, a3=0.0, k=0.5, f=-0.5, g=-0.05, h=0.05)
+        """
         values = self.expand(np.array(parameters, np.complex128))
         return self.kind(*(float(np.real(value)) for value in values))
 
@@ -144,13 +232,29 @@ class Model:
         self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
         *, offset: float = 0.0, scale: Scale = SI,
     ) -> FloatArray:  # fmt: skip
-        """What would be measured, (count, 4), SI, in the order of `MODEL_OUTPUTS`.
+        """Simulate a run under given inputs.
 
-        `parameters` are (p,), `initial` is the state at the first sample in the units of the
-        equations, `offset` a rudder added to that of the path, in rad. NaN from where the
-        ship runs away.
+        Parameters
+        ----------
+        parameters
+            (p,) the model's parameters.
+        initial
+            (s,) the state at the first sample, in the units of the equations.
+        path
+            The rudder and the revolutions, from `shiplog.ships.path.input_path`.
+        count
+            The number of samples.
+        offset
+            Rudder added to that of the path, rad.
+        scale
+            The units of the equations.
+
+        Returns
+        -------
+        (count, 4) array
+            The outputs in SI, in the order of `MODEL_OUTPUTS`; NaN from where the run diverges.
         """
-        out = self._sail(
+        out = self._integrate(
             parameters.astype(np.complex128),
             initial.astype(np.complex128),
             complex(offset),
@@ -163,10 +267,10 @@ class Model:
         self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
         directions: FloatArray, *, offset: float = 0.0, scale: Scale = SI,
     ) -> FloatArray:  # fmt: skip
-        """How the outputs change along each direction, (k, count, 4).
+        """Compute the derivatives of the outputs along given directions, (k, count, 4).
 
-        A direction is a row of `directions`: of the parameters, the initial state and the offset
-        of the rudder, in this order, (k, p + s + 1). All else as `simulate`.
+        A direction is a row of `directions`, (k, p + s + 1): of the parameters, the initial state
+        and the offset of the rudder, in this order. The other arguments are those of `simulate`.
         """
         return self.propagate(
             parameters, initial, path, count, directions, offset=offset, scale=scale
@@ -175,10 +279,11 @@ class Model:
     def propagate(
         self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
         directions: FloatArray, *, offset: float = 0.0, scale: Scale = SI,
-    ) -> "Propagation":  # fmt: skip
-        """A run, where it ends, and how both change along one or more `directions`.
+    ) -> Propagation:  # fmt: skip
+        """Simulate a run with its last state and the derivatives of both along k >= 1 directions.
 
-        All as `sensitivities`.
+        The arguments are those of `sensitivities`. Each derivative is exact to rounding: the run is
+        simulated once with the direction as a small imaginary part (see `shiplog.ships.motion`).
         """
         scaled, p = scale.scaled(path), len(parameters)
         outputs_by = np.empty((len(directions), count, len(MODEL_OUTPUTS)))
@@ -186,19 +291,21 @@ class Model:
         out = np.empty((count, len(MODEL_OUTPUTS)), np.complex128)
         for i, along in enumerate(directions * (1j * STEP)):
             ends[i] = initial + along[p:-1]
-            out = self._sail(parameters + along[:p], ends[i], offset + along[-1], scaled, count)
+            out = self._integrate(
+                parameters + along[:p], ends[i], offset + along[-1], scaled, count
+            )
             outputs_by[i] = out.imag / STEP * scale.outputs
         return Propagation(
             out.real * scale.outputs, ends[-1].real.copy(), outputs_by, ends.imag / STEP
         )
 
-    def _sail(
+    def _integrate(
         self, parameters: ComplexArray, initial: ComplexArray, offset: complex, path: InputPath,
         count: int,
     ) -> ComplexArray:  # fmt: skip
-        """The outputs, (count, 4); `initial` is left where the run ends.
+        """Compute the outputs, (count, 4), and overwrite `initial` with the last state.
 
-        Where an equation divides by nothing, as by the speed of a ship that stands, there are none.
+        All are NaN where an equation divides by zero, such as by the speed of a stopped ship.
         """
         coefficients = self.kind(*(complex(value) for value in self.expand(parameters)))
         try:
@@ -206,3 +313,18 @@ class Model:
         except ZeroDivisionError:  # numba's, of complex numbers
             initial[:] = np.nan
             return np.full((count, len(MODEL_OUTPUTS)), np.nan + 0j)
+
+    def __getstate__(self) -> Mapping[str, Any]:
+        """Refer to the compiled function by its module and name, not by its machine code."""
+        module, name = self.compiled.__module__, self.compiled.__name__
+        if getattr(sys.modules.get(module), name, None) is not self.compiled:
+            raise PicklingError(
+                f"the model {self.name} cannot be pickled: its compiled function is not {name} of "
+                f"the module {module}"
+            )
+        state = {each.name: getattr(self, each.name) for each in fields(self)}
+        return state | {"compiled": (module, name)}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        module, name = state["compiled"]
+        vars(self).update(state, compiled=getattr(import_module(module), name))

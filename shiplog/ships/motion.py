@@ -1,12 +1,17 @@
-"""A ship's motion under a recorded rudder: one compiled loop for all models, with sensitivities.
+"""Integration of a ship model under recorded inputs: one compiled loop for all models.
 
-A model states its equations for a type of its own (`equations`, `observations`), written so that
-they hold for real numbers, with which a ship is sailed, and for complex ones too. A derivative is
-then had by moving a parameter along the imaginary axis by next to nothing (Squire and Trapp, "Using
-complex variables to estimate derivatives of real functions", 1998): exact to the last digit, with
-no step to choose and nothing to derive by hand. So |x| is `magnitude(x)`, e^x `exponential(x)`, the
-square root `root(x)`, and powers are products: numba's power of a complex number goes by its
-logarithm, and loses what is next to nothing.
+A model registers its equations for its own type of coefficients (`equations`, `observations`). They
+must hold for real numbers, with which a ship is simulated, and for complex ones: a derivative is
+computed by the complex step, a tiny imaginary part of the parameter whose effect on the outputs is
+read off their imaginary parts. It is exact to rounding, has no step size to choose and needs no
+derivation by hand. So the equations write |x| as `magnitude(x)`, e^x as `exponential(x)`, the
+square root as `root(x)`, and powers as products: numba computes the power of a complex number by
+its logarithm, which loses a tiny imaginary part.
+
+References
+----------
+W. Squire and G. Trapp, "Using complex variables to estimate derivatives of real functions", SIAM
+Review, 1998.
 """
 
 from collections.abc import Callable
@@ -20,63 +25,92 @@ from shiplog.compiled import compiled_in_caller, overload_for
 from shiplog.types import FloatArray
 
 ComplexArray = NDArray[np.complex128]
+DIVERGED = 1e6  # of a model's unit of yaw rate
 F = TypeVar("F", bound=Callable[..., object])
 
-MODEL_OUTPUTS = ("yaw_rate", "speed", "sway", "heading")  # what `observed` gives, in this order
+MODEL_OUTPUTS = ("yaw_rate", "speed", "sway", "heading")  # the values of `observed`
 
 
 class Forcing(NamedTuple):
-    """What a ship is given at an instant."""
+    """The inputs of a ship at an instant, in the units of the equations.
 
-    delta: complex  # rad, as all here: real where the state is
-    delta_dot: complex  # rad/s
-    n: float  # rpm
+    Attributes
+    ----------
+    delta, delta_dot
+        The rudder in rad and its rate; real where the state is real.
+    n
+        The propeller's revolutions.
+    """
+
+    delta: complex
+    delta_dot: complex
+    n: float
 
 
 class InputPath(NamedTuple):
-    """What a ship is given over a run, in m steps on which the rudder moves evenly."""
+    """The inputs of a run, in m steps on each of which the rudder moves at a constant rate.
 
-    secs: FloatArray  # (m,) how long each is
-    delta: FloatArray  # (m,) rad, as it begins
-    delta_dot: FloatArray  # (m,) rad/s
-    rpm: FloatArray  # (m,)
-    sample: NDArray[np.int64]  # (m,) the number of the sample it ends at, -1 between samples
-    samples: NDArray[np.int64]  # (m,) how many lie evenly within it, that one the last; or 0
+    Attributes
+    ----------
+    secs
+        (m,) the length of each step, s.
+    delta, delta_dot
+        (m,) the rudder at its start, rad, and its rate, rad/s.
+    rpm
+        (m,) the revolutions.
+    sample
+        (m,) the number of the sample at its end; -1 where it ends between samples.
+    samples
+        (m,) how many samples lie in it at equal intervals, the last at its end; 0 for none.
+    """
+
+    secs: FloatArray
+    delta: FloatArray
+    delta_dot: FloatArray
+    rpm: FloatArray
+    sample: NDArray[np.int64]
+    samples: NDArray[np.int64]
 
 
 def state_rates(c: Any, x: Any, u: Forcing) -> tuple[complex, ...]:  # noqa: ANN401
-    """The rates of the state's values `x`, under the coefficients `c`: a model's equations."""
+    """Compute the rates of the state `x` under the coefficients `c`: the model's equations.
+
+    Compiled code calls the function that `equations` registered for the type of `c`.
+    """
     raise NotImplementedError(f"no equations for {type(c).__name__}")
 
 
 def observed(c: Any, x: Any) -> tuple[complex, complex, complex, complex]:  # noqa: ANN401
-    """What would be measured in a state, in the order of `MODEL_OUTPUTS`."""
+    """Compute the outputs of a state, in the order of `MODEL_OUTPUTS` and the equations' units.
+
+    Compiled code calls the function that `observations` registered for the type of `c`.
+    """
     raise NotImplementedError(f"no observations for {type(c).__name__}")
 
 
 def equations(kind: type) -> Callable[[F], F]:
-    """Make a function the `motion` of a model whose coefficients are a `kind`."""
+    """Register a function as `state_rates` for coefficients of the type `kind`."""
     return overload_for(state_rates, kind)
 
 
 def observations(kind: type) -> Callable[[F], F]:
-    """Make a function what is `observed` of a model whose coefficients are a `kind`."""
+    """Register a function as `observed` for coefficients of the type `kind`."""
     return overload_for(observed, kind)
 
 
 @compiled_in_caller
 def magnitude(x: complex) -> complex:
-    """|x| of what is real but for a derivative along the imaginary axis."""
+    """Compute |x|; an imaginary part is carried as a derivative (so in the next two)."""
     return x if x.real >= 0 else -x
 
 
 def exponential(x: complex) -> complex:
-    """The same of e^x, at a fraction of the cost of a complex one."""
+    """Compute e^x, at a fraction of the cost of the complex function."""
     return complex(exp(x.real), exp(x.real) * x.imag)
 
 
 def root(x: complex) -> complex:
-    """The same of the square root."""
+    """Compute the square root."""
     size = sqrt(x.real)
     return complex(size, x.imag / (2 * size))
 
@@ -103,15 +137,33 @@ def integrate(
     path: InputPath,
     samples: int,
 ) -> ComplexArray:
-    """The outputs at so many samples, (samples, 4), of a run that begins in the state `x`.
+    """Integrate a run and return its outputs at the samples.
 
-    `x` is left where the run ends, NaN where it ran away. `offset` is added to the rudder. One
-    Runge-Kutta step of order four for each step of the path; where there are samples between its
-    ends, Hermite's cubic by the rates there. A run that leaves the numbers ends in NaN.
+    Each step of the path is one Runge-Kutta step of order four. Samples within a step are
+    interpolated by Hermite's cubic, with the rates at its ends.
+
+    Parameters
+    ----------
+    c
+        The coefficients, a NamedTuple of complex numbers of a registered type.
+    x
+        (s,) the initial state in the units of the equations. It is overwritten by the state at the
+        end, NaN where the run diverged.
+    offset
+        Rudder added to that of the path, rad.
+    path
+        The inputs in the units of the equations.
+    samples
+        The number of samples, the first at the start.
+
+    Returns
+    -------
+    (samples, 4) complex array
+        The outputs in the order of `MODEL_OUTPUTS`; NaN from where the run diverges.
     """
     out = np.full((samples, 4), np.nan + 0j)
     between, after, at_sample = x.copy(), x.copy(), x.copy()
-    _note(out, 0, observed(c, x))
+    _store(out, 0, observed(c, x))
     for k in range(len(path.secs)):
         h, rate, n = path.secs[k], path.delta_dot[k], path.rpm[k]
         delta = path.delta[k] + offset
@@ -124,7 +176,7 @@ def integrate(
         _add(after, x, state_rates(c, between, halfway), h / 3, between, h / 2)
         _add(after, x, state_rates(c, between, halfway), h / 3, between, h)
         _add(after, x, state_rates(c, between, at_end), h / 6, between, 0.0)
-        if not abs(after[0].real) < 1e6:  # it has run away; NaN too
+        if not abs(after[0].real) < DIVERGED:  # NaN, too
             x[:] = np.nan
             break
         count = path.samples[k]
@@ -132,14 +184,14 @@ def integrate(
             arriving = state_rates(c, after, at_end)
             for j in range(1, count):
                 _interpolate(at_sample, x, leaving, after, arriving, h, j / count)
-                _note(out, path.sample[k] - count + j, observed(c, at_sample))
+                _store(out, path.sample[k] - count + j, observed(c, at_sample))
         x[:] = after
         if count > 0:
-            _note(out, path.sample[k], observed(c, x))
+            _store(out, path.sample[k], observed(c, x))
     return out
 
 
-# numba would take the real factor of a complex number for a complex one, at twice the cost
+# numba would make the real factor of a complex number complex, at twice the cost
 
 
 @compiled_in_caller
@@ -151,7 +203,7 @@ def _add(
     between: ComplexArray,
     reach: float,
 ) -> None:
-    """One stage's rates: their share in the step, and where the next stage looks."""
+    """Add a stage's rates to the step, and put the state of the next stage into `between`."""
     for i in range(len(x)):
         real, imag = rates[i].real, rates[i].imag
         after[i] += complex(weight * real, weight * imag)
@@ -160,7 +212,7 @@ def _add(
 
 @compiled_in_caller
 def _interpolate(
-    found: ComplexArray,
+    at_sample: ComplexArray,
     x: ComplexArray,
     leaving: tuple[complex, ...],
     after: ComplexArray,
@@ -168,18 +220,18 @@ def _interpolate(
     h: float,
     s: float,
 ) -> None:
-    """The state a share s of the way through a step."""
+    """Put the state at the fraction s of a step into `at_sample`."""
     first, last = (1 + 2 * s) * (1 - s) ** 2, s * s * (3 - 2 * s)
     out, into = h * s * (1 - s) ** 2, h * s * s * (s - 1)
     for i in range(len(x)):
         a, b, f, g = x[i], after[i], leaving[i], arriving[i]
-        found[i] = complex(
+        at_sample[i] = complex(
             first * a.real + last * b.real + out * f.real + into * g.real,
             first * a.imag + last * b.imag + out * f.imag + into * g.imag,
         )
 
 
 @compiled_in_caller
-def _note(out: ComplexArray, k: int, values: tuple[complex, complex, complex, complex]) -> None:
+def _store(out: ComplexArray, k: int, values: tuple[complex, complex, complex, complex]) -> None:
     for i in range(4):
         out[k, i] = values[i]

@@ -3,11 +3,17 @@
     rho' = a rho + a3 rho^3 + k delta          (Nomoto: a3 = 0)
     nu'  = f rho^2 + g nu^2 + h eta
 
-rho is the yaw rate times L/U0, nu the speed over U0, eta the revolutions over theirs, time is in
-L/U0. Products stand for T = -1/a and K = -k/a, which mean nothing for a ship at the margin of
-stability, where full tankers are (Nomoto and others, "On the steering qualities of ships", 1957;
-Norrbin, "Theory and observations on the use of a mathematical model for ship manoeuvring in deep
-and confined waters", 1971).
+With L the ship's length and U0 the approach speed, rho is the yaw rate times L/U0, nu the speed
+over U0, eta the revolutions over those of the approach, time is in L/U0. a and k replace Nomoto's
+T = -1/a and K = -k/a, which are infinite for a ship at the margin of stability, where full-form
+tankers are.
+
+References
+----------
+K. Nomoto and others, "On the steering qualities of ships", 1957.
+
+N. H. Norrbin, "Theory and observations on the use of a mathematical model for ship manoeuvring in
+deep and confined waters", 1971.
 """
 
 from collections.abc import Sequence
@@ -20,7 +26,7 @@ from .motion import ComplexArray, Forcing, InputPath, equations, integrate, obse
 
 
 class Norrbin(NamedTuple):
-    """The coefficients."""
+    """The coefficients of the equations, dimensionless."""
 
     a: complex
     a3: complex
@@ -46,7 +52,7 @@ def _observed(c: Norrbin, x: ComplexArray) -> tuple[complex, complex, complex, c
 
 
 @compiled
-def _sail(
+def _integrate(
     c: Norrbin, x: ComplexArray, offset: complex, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
@@ -68,10 +74,10 @@ _SURGE = (
     Parameter("h", "1", 0.05),
 )
 NOMOTO = Model(
-    "nomoto", "first-order Nomoto with surge", Norrbin, (_A, _K, *_SURGE), _STATE, _sail,
+    "nomoto", "first-order Nomoto with surge", Norrbin, (_A, _K, *_SURGE), _STATE, _integrate,
     expand=_without_cube,
 )  # fmt: skip
 NORRBIN = Model(
     "norrbin", "Norrbin's cubic with surge", Norrbin,
-    (_A, Parameter("a3", "1", -0.5, highest=0.0), _K, *_SURGE), _STATE, _sail,
+    (_A, Parameter("a3", "1", -0.5, highest=0.0), _K, *_SURGE), _STATE, _integrate,
 )  # fmt: skip

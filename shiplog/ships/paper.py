@@ -1,9 +1,8 @@
-"""The paper's equations of motion, which filters and observers are built on.
+"""The identification paper's equations of motion, on which filters and observers are built.
 
-`shiplog.ships.burylin` has them beside other models, for simulation and for identification; they
-give the same to the last bit. The model is Burylin's, "Continuous identification of a nonlinear
-vessel movement model with an estimator", eqs (1)-(4): a second-order nonlinear Nomoto model of yaw,
-coupled with surge.
+A second-order nonlinear Nomoto model of yaw, coupled with surge. `shiplog.ships.burylin` has the
+same equations as a ship model for simulation and identification; both give the same numbers to the
+last bit.
 
     w'' = a w' + b1 w + b2 w|w| + b3 w^3 + ks (d delta + e delta')
     v'  = f w^2 + g v^2 + h n
@@ -11,8 +10,13 @@ coupled with surge.
 
 w is the yaw rate in rad/s, v the speed ahead in m/s, delta the rudder in rad, n the propeller's
 revolutions in rpm. `ks` has no unit where the paper's time constants and gains are used: its
-alpha1 is in s/m, its alpha2 in 1/rpm and its alpha3 in s/m. The model is one of a ship going ahead:
-g v^2 has no sign, so that astern it drives her on.
+alpha1 is in s/m, its alpha2 in 1/rpm and its alpha3 in s/m. The model holds for a ship going ahead:
+g v^2 has no sign, so that astern it would accelerate the ship.
+
+References
+----------
+Ya. V. Burylin, "Continuous identification of a nonlinear vessel movement model with an estimator",
+equations (1) to (4).
 """
 
 from math import exp, sqrt
@@ -55,21 +59,28 @@ COEFFICIENT_UNITS = {
     "alpha2": "1/rpm",
     "alpha3": "s/m",
 }
-PAPER_OUTPUTS = ("yaw_rate", "speed")  # what is measured of the ship,
-PAPER_INPUTS = ("rudder", "rpm")  # and what she is given
+PAPER_OUTPUTS = ("yaw_rate", "speed")
+PAPER_INPUTS = ("rudder", "rpm")
 YAW_COEFFICIENTS = ("a", "b1", "b2", "b3", "d", "e")
 SURGE_COEFFICIENTS = ("f", "g", "h")
 
 
 @compiled
 def rudder_effect(c: Coefficients, v: float, n: float) -> float:
-    """How well the rudder works at a speed and a rate of revolutions: ks of eq. (3)."""
+    """Compute the rudder effectiveness ks at a speed `v`, m/s, and `n` rpm, equation (3).
+
+    Examples
+    --------
+    >>> from shiplog import load_vessel
+    >>> round(rudder_effect(load_vessel("table1")[0].paper, 9.0, 80.0), 4)
+    0.2205
+    """
     return c.alpha1 * v + c.alpha2 * n * exp(-c.alpha3 * v)
 
 
 @compiled
 def rudder_effects(c: Coefficients, v: FloatArray, n: FloatArray) -> FloatArray:
-    """ks over a run, (n,); NaN where speed or revolutions are."""
+    """Compute ks over a run, (n,); NaN where the speed or the revolutions are NaN."""
     effects = np.empty(len(v))
     for k in range(len(v)):
         effects[k] = rudder_effect(c, v[k], n[k])
@@ -78,7 +89,7 @@ def rudder_effects(c: Coefficients, v: FloatArray, n: FloatArray) -> FloatArray:
 
 @compiled
 def rudder_effect_rate(c: Coefficients, v: float, v_dot: float, n: float, n_dot: float) -> float:
-    """d ks / dt."""
+    """Compute the time derivative of ks, 1/s, at the rates `v_dot`, m/s², and `n_dot`, rpm/s."""
     slipstream = c.alpha2 * exp(-c.alpha3 * v)
     return c.alpha1 * v_dot + slipstream * (n_dot - c.alpha3 * n * v_dot)
 
@@ -87,23 +98,30 @@ def rudder_effect_rate(c: Coefficients, v: float, v_dot: float, n: float, n_dot:
 def yaw_acceleration_rate(
     c: Coefficients, w: float, w_dot: float, v: float, n: float, delta: float, delta_dot: float
 ) -> float:
-    """w'' of eq. (4), rad/s^3."""
+    """Compute w'' of equation (4), rad/s³."""
     hull = c.a * w_dot + c.b1 * w + c.b2 * w * abs(w) + c.b3 * w * w * w
     return hull + rudder_effect(c, v, n) * (c.d * delta + c.e * delta_dot)
 
 
 @compiled
 def yaw_stiffness(c: Coefficients, w: float) -> float:
-    """d w'' / dw at a yaw rate: b1 and what the nonlinear terms add to it, 1/s^2."""
+    """Compute d w'' / dw at a yaw rate, 1/s²: b1 and the share of the nonlinear terms."""
     return c.b1 + 2 * c.b2 * abs(w) + 3 * c.b3 * w * w
 
 
 @compiled
 def surge_acceleration(c: Coefficients, w: float, v: float, n: float) -> float:
-    """v' of eq. (4), m/s^2."""
+    """Compute v' of equation (4), m/s²."""
     return c.f * w * w + c.g * v * v + c.h * n
 
 
 def steady_speed(c: Coefficients, n: float) -> float:
-    """The speed ahead, m/s, at which a straight run at `n` rpm settles; 0 astern or stopped."""
+    """Compute the steady speed ahead, m/s, of a straight run at `n` rpm; 0 astern or stopped.
+
+    Examples
+    --------
+    >>> from shiplog import load_vessel
+    >>> round(steady_speed(load_vessel("table1")[0].paper, 80.0), 2)
+    10.33
+    """
     return sqrt(c.h * n / -c.g) if c.h * n > 0 and c.g < 0 else 0.0

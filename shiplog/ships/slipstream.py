@@ -1,4 +1,4 @@
-"""The paper's model with what a real tanker taught: speed scaling, slipstream and drift.
+"""The paper's model with speed scaling, propeller slipstream and drift.
 
     rho'' = a nu rho' + b1 nu^2 rho + b2 nu rho|rho| + ks (nu delta + T3 delta')
     ks    = k ((1 - m) nu^2 + m eta^2)
@@ -6,9 +6,11 @@
     sigma = c1 rho + c2 rho|rho| / nu
 
 rho is the yaw rate times L/U0, nu the speed over U0 and sigma the sway over U0, eta the
-revolutions over theirs, time is in L/U0. A slower ship turns more slowly over the ground she
-covers, not in it; the rudder works by the propeller's stream where the ship has lost her speed;
-and the ship goes where she drifts, not where she points. b3 is left out: it and b2 are collinear.
+revolutions over theirs, time is in L/U0. Three effects, seen in the trials of a tanker, extend the
+paper's model: the hull terms scale with the speed, so that a slower ship turns more slowly in time
+but not over the distance covered; the rudder works in the propeller's slipstream when the ship has
+lost speed; and the course over ground differs from the heading by the drift. b3 is omitted: it is
+collinear with b2.
 """
 
 from typing import NamedTuple
@@ -29,7 +31,7 @@ from .motion import (
 
 
 class Slipstream(NamedTuple):
-    """The coefficients."""
+    """The coefficients of the equations, dimensionless."""
 
     a: complex
     b1: complex
@@ -65,7 +67,7 @@ def _observed(c: Slipstream, x: ComplexArray) -> tuple[complex, complex, complex
 
 
 @compiled
-def _sail(
+def _integrate(
     c: Slipstream, x: ComplexArray, offset: complex, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
@@ -93,5 +95,5 @@ SLIPSTREAM = Model(
         StateValue("nu", "speed"),
         StateValue("psi", "heading"),
     ),
-    _sail, outputs=("yaw_rate", "speed", "sway", "heading"),
+    _integrate, outputs=("yaw_rate", "speed", "sway", "heading"),
 )  # fmt: skip

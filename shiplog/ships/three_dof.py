@@ -1,4 +1,4 @@
-"""Surge, sway and yaw with cross-flow drag, small, its parameters believed within wide limits.
+"""Surge, sway and yaw with cross-flow drag, with wide priors on all parameters.
 
     sigma' = yv nu sigma + yr nu rho - cy Y(sigma, rho) + yd F
     rho'   = nv nu sigma + nr nu rho - cn N(sigma, rho) + nd F
@@ -8,21 +8,30 @@
     F      = s delta + w sqrt(s) (sigma - 0.8 rho),  s = (1 - m) nu^2 + m eta^2
 
 nu is the speed ahead over U0, sigma the sway over U0, rho the yaw rate times L/U0, eta the
-revolutions over theirs, time is in L/U0; the forces are divided by the inertias. Thrust and
-resistance balance on the straight run, but for g; a slower ship's propeller thrusts more, by p.
-The rudder is in a stream s of which m is the propeller's, and the stern's own way to the side
-turns that stream by w: it eases the rudder in a turn, and damps what the hull does not.
+revolutions over those of the approach, time is in L/U0; the forces are divided by the inertias. On
+the straight run thrust and resistance balance, except for g; the propeller of a slower ship gives
+more thrust, by p. The rudder works in a stream s of which the fraction m is the propeller's. The
+sideways motion of the stern turns that stream by w, which reduces the rudder's angle of attack in a
+turn and adds damping to that of the hull.
 
-The priors are wide, and of ships in general: slender-body regressions (Clarke, Gedling and Hine,
-"The application of manoeuvring criteria in hull design using linear theory", 1983), a drag
-coefficient near 0.6 (Hooft, "The cross-flow drag on a manoeuvring ship", 1994), the drive of a
-strong drift (Yoshimura and Masumoto, "Hydrodynamic database and manoeuvring prediction method with
-medium high-speed merchant ships and fishing vessels", 2012), and the usual sizes of thrust, flow
-straightening and rudder drag in the model of the MMG (Yasukawa and Yoshimura, "Introduction of MMG
-standard method for ship maneuvering predictions", 2015). Surge is what zig-zags tell least, and
-there its parts are bounded by what they stand for: xvr by a ship's inertia going sideways, from
-her mass to her mass and that of the water over those ahead, 0.95 to 1.75; xd by the rudder's size,
-which its drag and its force to the side share; g by how steady a run is on which a trial begins.
+The priors are wide and hold for ships in general: slender-body regressions for the linear hull
+terms [1]_, a drag coefficient near 0.6 for the cross-flow [2]_, the driving force at large drift
+[3]_, and the usual magnitudes of thrust, flow straightening and rudder drag in the MMG model [4]_.
+Zig-zags determine surge least, so that the priors of its terms come from their physical meaning:
+xvr from the inertia of a ship that moves sideways, the ratio of its mass, without or with the added
+mass of sway, to its mass with the added mass of surge, 0.95 to 1.75; xd from the size of the
+rudder, on which its drag and its side force both depend; g from how steady the approach of a trial
+is.
+
+References
+----------
+.. [1] D. Clarke, P. Gedling and G. Hine, "The application of manoeuvring criteria in hull design
+   using linear theory", 1983.
+.. [2] J. P. Hooft, "The cross-flow drag on a manoeuvring ship", 1994.
+.. [3] Y. Yoshimura and Y. Masumoto, "Hydrodynamic database and manoeuvring prediction method with
+   medium high-speed merchant ships and fishing vessels", 2012.
+.. [4] H. Yasukawa and Y. Yoshimura, "Introduction of MMG standard method for ship maneuvering
+   predictions", 2015.
 """
 
 from typing import NamedTuple
@@ -41,11 +50,11 @@ from .motion import (
     root,
 )
 
-AFT = 0.8  # where the rudder feels the ship turn, in lengths: further aft than it is
+RUDDER_ARM = 0.8  # ship lengths: effective lever of the yaw rate at the rudder, beyond its position
 
 
 class ThreeDof(NamedTuple):
-    """The coefficients."""
+    """The coefficients of the equations, dimensionless."""
 
     yv: complex
     yr: complex
@@ -67,7 +76,7 @@ class ThreeDof(NamedTuple):
 
 @compiled_in_caller
 def _cross_flow(sigma: complex, rho: complex) -> tuple[complex, complex]:
-    """Y and N by Gauss's five points."""
+    """Compute Y and N by Gauss-Legendre quadrature with five points."""
     middle, inner, outer = 128 / 450, 0.4786286704993665 / 2, 0.2369268850561891 / 2
     near, far = 0.5384693101056831 / 2, 0.9061798459386640 / 2
     y = middle * sigma * magnitude(sigma)
@@ -85,7 +94,7 @@ def _motion(c: ThreeDof, x: ComplexArray, u: Forcing) -> tuple[complex, ...]:
     rho, sigma, nu = x[0], x[1], x[2]
     y, n = _cross_flow(sigma, rho)
     stream = (1 - c.m) * nu * nu + c.m * u.n * u.n
-    force = stream * u.delta + c.w * root(stream) * (sigma - AFT * rho)
+    force = stream * u.delta + c.w * root(stream) * (sigma - RUDDER_ARM * rho)
     drift = sigma * sigma
     thrust = c.h * u.n * (u.n + c.p * (u.n - nu))
     return (
@@ -106,7 +115,7 @@ def _observed(c: ThreeDof, x: ComplexArray) -> tuple[complex, complex, complex, 
 
 
 @compiled
-def _sail(
+def _integrate(
     c: ThreeDof, x: ComplexArray, offset: complex, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
@@ -138,5 +147,5 @@ THREE_DOF = Model(
         StateValue("nu", "speed"),
         StateValue("psi", "heading"),
     ),
-    _sail, ("yaw_rate", "speed", "sway", "heading"),
+    _integrate, ("yaw_rate", "speed", "sway", "heading"),
 )  # fmt: skip

@@ -1,9 +1,11 @@
-"""A ship under way: what moves her, what pushes her off her way, and where she goes.
+"""Simulated motion of a ship of any model in SI: inputs, disturbances and position.
 
-One Runge-Kutta step of order four for every model, in real numbers: the paper's ship moves as
-`shiplog.ships.paper` has her, to the last bit. A yaw moment is given as the rudder that turns her
-as much on the straight run of her approach, and changes what that rudder changes there, but for her
-loss of speed, the same to either side. So it pushes a ship with a sway to the side, too, as a
+One Runge-Kutta step of order four serves every model, in real numbers; with the paper's model it
+gives the equations of `shiplog.ships.paper` to the last bit.
+
+A yaw moment as a disturbance is given as the rudder angle that turns the ship as much on its
+straight approach. It adds to the rates of the state what that rudder adds there, the mean of both
+sides, so that the speed is not reduced. In a model with sway it also pushes the ship sideways, as a
 rudder does.
 """
 
@@ -21,39 +23,72 @@ from .motion import Forcing, observed, state_rates
 from .paper import Coefficients
 from .paper import steady_speed as papers_steady_speed
 
-SLOWEST, FASTEST = 1e-6, 1e3  # of a steady run, in a model's unit of speed
-HALVINGS = 100
+MIN_STEADY_SPEED, MAX_STEADY_SPEED = 1e-6, 1e3  # in a model's unit of speed
+BISECTIONS = 100
 
-CoefficientTuple = tuple[float, ...]  # a model's `kind`, real
+CoefficientTuple = tuple[float, ...]  # a model's `kind` of real numbers
 
 
 class Excitation(NamedTuple):
-    """What acts on the ship from one instant on, until something changes."""
+    """Inputs and disturbances of a ship from one instant until one of them changes.
 
-    delta: float  # rad, at that instant
-    delta_dot: float  # rad/s
-    n: float  # rpm
-    moment: float  # rad: a yaw moment, as the rudder that turns her as much,
-    wave: float  # rad, amplitude of a sinusoidal one
-    wave_frequency: float  # rad/s
-    force: float  # m/s^2: a surge force, as it stands in the equation of the speed
+    Attributes
+    ----------
+    delta, delta_dot
+        The rudder at that instant, rad, and its rate, rad/s.
+    n
+        The propeller's revolutions, rpm.
+    moment
+        A constant yaw moment, as the rudder that turns the ship as much, rad.
+    wave, wave_frequency
+        The amplitude of a sinusoidal yaw moment, rad of rudder, and its frequency, rad/s.
+    force
+        A surge force over the ship's mass: what it adds to the rate of the speed, m/s².
+    """
+
+    delta: float
+    delta_dot: float
+    n: float
+    moment: float
+    wave: float
+    wave_frequency: float
+    force: float
 
 
 class ShipConstants(NamedTuple):
-    """What compiled code must know of a ship beside her coefficients."""
+    """What compiled code needs of a ship besides its coefficients.
 
-    secs: float  # the units of her equations
-    speed: float  # m/s
+    Attributes
+    ----------
+    secs, speed, rpm
+        The units of its equations: s, m/s and rpm.
+    ahead
+        The index of the speed in its state.
+    per_rudder
+        (s,) what a yaw moment of one rad of rudder adds to the rates of its state.
+    """
+
+    secs: float
+    speed: float
     rpm: float
-    ahead: int  # where in her state the speed stands
-    per_rudder: FloatArray  # (s,) what a moment of one rad of rudder adds to its rates
+    ahead: int
+    per_rudder: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class Ship:
     """A model with its coefficients and the units of its equations.
 
-    Her state is the model's, and after it the metres made good north and east, (s + 2,).
+    Its state is the model's, followed by the position north and east in metres, (s + 2,).
+
+    Attributes
+    ----------
+    model
+        The ship model.
+    coefficients
+        The coefficients of its equations, a ``model.kind`` of real numbers.
+    scale
+        The units of its equations.
     """
 
     model: Model
@@ -61,13 +96,13 @@ class Ship:
     scale: Scale
 
     def straight_state(self, speed: float) -> FloatArray:
-        """The state of a ship that goes north at a speed, in m/s."""
+        """Return the state, (s + 2,), of a straight run north at a speed in m/s."""
         x = np.zeros(len(self.model.state) + 2)
         x[self._at("speed")] = speed / self.scale.speed
         return x
 
     def constants(self, speed: float, rpm: float) -> ShipConstants:
-        """The hull of a ship whose approach is at that speed, in m/s, and rpm."""
+        """Compute what compiled code needs of a ship whose approach is at a speed, m/s, and rpm."""
         count, ahead = len(self.model.state), self._at("speed")
         constants = ShipConstants(
             self.scale.secs, self.scale.speed, self.scale.rpm, ahead, np.zeros(count)
@@ -86,9 +121,9 @@ class Ship:
         return constants._replace(per_rudder=(starboard - port)[:count] / 2)
 
     def moment_per_rudder(self, constants: ShipConstants) -> tuple[float, str]:
-        """A moment of one rad of rudder as her equation of yaw has it, and its unit.
+        """Return what one rad of rudder as a yaw moment adds to the equation of yaw, and the unit.
 
-        In an equation of the second order that is rad/s³, in one of the first rad/s².
+        The unit is rad/s³ in an equation of second order in the yaw rate, rad/s² in one of first.
         """
         names, yaw = [value.name for value in self.model.state], self.yaw
         acceleration = f"{names[yaw]}_dot"
@@ -97,31 +132,38 @@ class Ship:
         return float(constants.per_rudder[names.index(acceleration)] / self.scale.secs**2), "rad/s³"
 
     def steady_speed(self, rpm: float) -> float:
-        """The speed ahead, m/s, at which a straight run at so many revolutions settles; 0 if none.
+        """Compute the steady speed ahead, m/s, of a straight run at given revolutions; 0 if none.
 
-        The paper's in closed form; of another model where nothing changes the speed, by bisection.
+        In closed form for the paper's model, else the zero of the surge equation, by bisection.
+
+        Examples
+        --------
+        >>> from shiplog import load_vessel
+        >>> from shiplog.vessel.ship import ship_of
+        >>> round(ship_of(load_vessel("table1")[0]).steady_speed(80.0), 2)
+        10.33
         """
         if isinstance(self.coefficients, Coefficients):
             return papers_steady_speed(self.coefficients, rpm)
         constants, ahead = self.constants(self.scale.speed, rpm), self._at("speed")
 
-        def gains(nu: float) -> bool:
+        def accelerates(nu: float) -> bool:
             x = self.straight_state(nu * self.scale.speed)
             return bool(
                 rates_si(self.coefficients, constants, x, straight_run(rpm), 0.0, 0.0)[ahead] > 0
             )
 
-        low, high = SLOWEST, FASTEST
-        if not gains(low) or gains(high):
+        low, high = MIN_STEADY_SPEED, MAX_STEADY_SPEED
+        if not accelerates(low) or accelerates(high):
             return 0.0
-        for _ in range(HALVINGS):
+        for _ in range(BISECTIONS):
             middle = (low + high) / 2
-            low, high = (middle, high) if gains(middle) else (low, middle)
+            low, high = (middle, high) if accelerates(middle) else (low, middle)
         return high * self.scale.speed
 
     @property
     def yaw(self) -> int:
-        """Where in her state the yaw rate stands."""
+        """The index of the yaw rate in the state."""
         return self._at("yaw_rate")
 
     def _at(self, channel: str) -> int:
@@ -129,7 +171,7 @@ class Ship:
 
 
 def straight_run(rpm: float, delta: float = 0.0) -> Excitation:
-    """Nothing that acts but the revolutions and a rudder that rests."""
+    """Return the excitation of constant revolutions, rpm, and a constant rudder, rad."""
     return Excitation(float(delta), 0.0, float(rpm), 0.0, 0.0, 0.0, 0.0)
 
 
@@ -142,7 +184,7 @@ def rates_si(
     t: float,
     after: float,
 ) -> FloatArray:
-    """How the state changes, per s, `after` seconds from the instant `t` of what acts, (s + 2,)."""
+    """Compute the rates of the state per s, (s + 2,), `after` seconds from the instant `t`."""
     rates = np.empty_like(x)
     write_rates_si(c, constants, x, u, t, after, rates)
     return rates
@@ -158,7 +200,7 @@ def write_rates_si(
     after: float,
     rates: FloatArray,
 ) -> None:
-    """Put them into `rates`."""
+    """Compute them as `rates_si` does, into `rates`."""
     delta = u.delta + u.delta_dot * after
     moment = u.moment + u.wave * sin(u.wave_frequency * (t + after))
     own = state_rates(c, x, Forcing(delta, u.delta_dot * constants.secs, u.n / constants.rpm))
@@ -181,9 +223,10 @@ def runge_kutta_step(
     h: float,
     work: FloatArray,
 ) -> FloatArray:
-    """The state after `h` seconds from `t`, no knot of the rudder between.
+    """Integrate the state over `h` seconds from `t`, without a knot of the rudder between.
 
-    `work` is (3, s + 2): what is returned is its first row, and holds until the next step.
+    `work` is scratch memory of shape (3, s + 2). The result is its first row, valid until the next
+    step.
     """
     after: FloatArray = work[0]
     between, rates = work[1], work[2]
@@ -208,8 +251,8 @@ def runge_kutta_step(
 
 @compiled_in_caller
 def observed_real(c: CoefficientTuple, x: FloatArray) -> tuple[float, float, float, float]:
-    """What is observed of a state, in the units of the equations, real."""
-    values: tuple[Any, Any, Any, Any] = observed(c, x)  # of a real state real
+    """Compute the real outputs of a real state, in the units of the equations."""
+    values: tuple[Any, Any, Any, Any] = observed(c, x)  # real, of a real state
     return values
 
 
@@ -221,7 +264,7 @@ def outputs_si(
     rates: FloatArray,
     yaw: int,
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Yaw rate and acceleration, speed ahead, sway, heading, north and east, SI."""
+    """Compute yaw rate and acceleration, speed ahead, sway, heading, north and east, in SI."""
     rho, ahead, sway, heading = observed_real(c, x)
     acceleration = rates[yaw] / constants.secs
     north, east = x[-2], x[-1]

@@ -54,3 +54,14 @@ def code_blocks(page: Path) -> dict[str, str]:
             end = lines.index("```", i + 1)
             found[name] = "\n".join(lines[i + 1 : end]) + "\n"
     return found
+
+
+def declare(folder: Path, package: str, group: str, **entries: str) -> None:
+    """Write the metadata of an installed package that declares entry points, and nothing else."""
+    metadata = folder / f"{package}-1.0.dist-info"
+    metadata.mkdir(parents=True)
+    (metadata / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n", encoding="utf-8"
+    )
+    lines = [f"[{group}]", *(f"{name} = {value}" for name, value in entries.items())]
+    (metadata / "entry_points.txt").write_text("\n".join(lines), encoding="utf-8")

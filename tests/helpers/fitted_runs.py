@@ -5,7 +5,7 @@ from functools import cache
 from trial_logs import as_log
 
 from analysis.identification.output_error import OutputError, output_error
-from analysis.identification.segment import Segment, segments_of
+from analysis.identification.segment import Segment, split_into_segments
 from analysis.identification.uncertainty import Uncertainty, uncertainty
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
@@ -20,12 +20,12 @@ TRUE = load_vessel("table1")[0].coefficients._asdict()
 def a_trial(manoeuvre: str = "zigzag-20-20", seed: int = 3, seconds: float = 400.0) -> Segment:
     vessel = load_vessel("table1")[0]
     trial = simulate(vessel, manoeuvre, duration_secs=seconds, seed=seed, sensors=suite("white"))
-    return segments_of(resample(as_log(trial, "t"), channels=CHANNELS), "t")[0]
+    return split_into_segments(resample(as_log(trial, "t"), channels=CHANNELS), "t")[0]
 
 
 @cache
 def fitted(model: str = "burylin", runs: int = 1) -> tuple[OutputError, Uncertainty]:
     known = {"T3": 0.5} if model == "burylin-tied" else {}
     segments = [a_trial(seed=3 + i) for i in range(runs)]
-    fit = output_error(segments, ship_model(model), known=known)
+    fit = output_error(segments, ship_model(model), fixed=known)
     return fit, uncertainty(fit)

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from analysis.identification.least_squares import weighed
+from analysis.identification.least_squares import weighted_residuals
 from analysis.identification.output_error import OutputError
 from analysis.identification.problem import Problem, residuals
 from analysis.identification.segment import Segment
@@ -71,7 +71,7 @@ def _calm(fit: OutputError, i: int) -> tuple[FloatArray, FloatArray]:
     """What was measured in a segment less the swell the fit found, and its weights: (n, c) each."""
     problem, z = fit.problem, fit.minimum.unknowns
     left = residuals(problem, z)[i]
-    _, weight = weighed(left, fit.residual_stds[i])
+    _, weight = weighted_residuals(left, fit.residual_stds[i])
     still = replace(problem, waves=())
     own = z[problem.own_slice(i)][: _own_size(problem)]
     parts = [z[: len(problem.free)]]
@@ -93,7 +93,7 @@ def _begun(fit: OutputError, i: int, values: FloatArray, covariance: FloatArray)
         stds = np.asarray(still.prior[1])[own] ** -0.5
     for k, value in enumerate(problem.model.state):
         if value.channel in outputs and segment.has(value.channel or ""):
-            usual = fit.residual_stds[i].usual[0, outputs.index(value.channel or "")]
+            usual = fit.residual_stds[i].typical[0, outputs.index(value.channel or "")]
             stds[k] = FIRST_STDS * usual / problem.scale.of_channel(value.channel)
         elif value.channel == "heading":
             stds[k] = STILL

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from trial_logs import as_log
 
-from analysis.identification.agreement import Agreement, agreement_of
+from analysis.identification.agreement import Agreement, assess_agreement
 from analysis.identification.identify import IdentifiedShip, identify
 from analysis.identification.output_error import output_error
-from analysis.identification.runs import run_of
+from analysis.identification.runs import run_from_log
 from analysis.identification.segment import Segment
 from analysis.identification.uncertainty import uncertainty
 from recorders.simulated.sensors import suite
@@ -31,7 +31,7 @@ def a_log(manoeuvre: str, seed: int, vessel: Vessel = SHIP, noise: str = "paper"
 
 
 def a_trial(*args: object) -> Segment:
-    return run_of(a_log(*args)).segments[0]  # type: ignore[arg-type]
+    return run_from_log(a_log(*args)).segments[0]  # type: ignore[arg-type]
 
 
 @cache
@@ -43,18 +43,18 @@ def mixed() -> IdentifiedShip:
 
 def test_runs_of_one_ship_agree_within_their_noise() -> None:
     fit = output_error([a_trial(*run) for run in RUNS], ship_model("burylin"))
-    found = agreement_of(fit)
+    found = assess_agreement(fit)
     assert found.names == tuple(f"{manoeuvre}-{seed}.mcap" for manoeuvre, seed in RUNS)
-    for ratios in (found.by_own_noise, found.by_noise_of_all):
+    for ratios in (found.by_own_noise, found.by_common_noise):
         # sums of squares of some thirty Gaussian numbers, over their number
         assert 0.3 < np.mean(np.square(ratios)) * 3 / 2 < 2.0
-    assert (found.contradiction, found.enlarged) == (1.0, 1.0)
+    assert (found.contradiction, found.enlargement) == (1.0, 1.0)
 
 
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "turning-circle-35", "pseudo-random"])
 def test_the_halves_of_a_run_agree_too(manoeuvre: str) -> None:
     for seed in (0, 1):
-        found = agreement_of(output_error([a_trial(manoeuvre, seed)], ship_model("burylin")))
+        found = assess_agreement(output_error([a_trial(manoeuvre, seed)], ship_model("burylin")))
         assert found.names == ("its first half", "its second half")
         assert found.contradiction == 1.0
 
@@ -80,22 +80,22 @@ def test_no_output_is_given_up_to_please_another_ships() -> None:
 
 def test_of_two_logs_none_is_the_odd_one() -> None:
     fit = output_error(
-        [a_trial(*RUNS[0]), a_trial(*RUNS[2], OTHER)], ship_model("burylin-tied"), known={"T3": 0.5}
+        [a_trial(*RUNS[0]), a_trial(*RUNS[2], OTHER)], ship_model("burylin-tied"), fixed={"T3": 0.5}
     )
-    found = agreement_of(fit)
-    assert found.odd is None
+    found = assess_agreement(fit)
+    assert found.outlier is None
     assert found.contradiction > 20
 
 
 def test_a_run_too_short_to_judge_by_itself_is_not_held_against_the_others() -> None:
     assert Agreement(("a", "b"), (np.nan, 9.0), (1.0, 1.0)).contradiction == 1.0
-    assert Agreement((), (), ()).enlarged == 1.0
+    assert Agreement((), (), ()).enlargement == 1.0
 
 
 def test_four_clean_logs_seldom_raise_the_alarm() -> None:
     manoeuvres = ("zigzag-20-20", "zigzag-10-10-port", "zigzag-20-20-port", "zigzag-10-10")
     for first in (100, 200):
         segments = [a_trial(m, first + i) for i, m in enumerate(manoeuvres)]
-        found = uncertainty(output_error(segments, ship_model("burylin-tied"), known={"T3": 0.5}))
+        found = uncertainty(output_error(segments, ship_model("burylin-tied"), fixed={"T3": 0.5}))
         assert found.agreement.contradiction == 1.0
         assert np.isfinite(found.between_runs).all()

@@ -11,7 +11,7 @@ from trial_logs import as_log
 
 from analysis.identification.identify import IdentifiedShip, _best, identify
 from analysis.identification.prediction import predict
-from analysis.identification.runs import run_of
+from analysis.identification.runs import run_from_log
 from analysis.identification.vessel_file import vessel_toml
 from analysis.report.identification_json import identification_json
 from analysis.report.identification_tables import identification_tables
@@ -143,7 +143,7 @@ def test_the_vessel_file_is_the_ship_that_was_found() -> None:
     assert "tied: b1 = -d" in text
     # and she sails as the fit says
     trial = simulate(written, "zigzag-20-20", duration_secs=300.0, sensors=suite("none"))
-    (sailed,) = run_of(as_log(trial)).segments
+    (sailed,) = run_from_log(as_log(trial)).segments
     outputs = predict(found.fit, sailed)
     np.testing.assert_allclose(outputs[:, 0], sailed.measured[:, 0], atol=1e-6)
     np.testing.assert_allclose(outputs[:, 1], sailed.measured[:, 1], atol=1e-5)

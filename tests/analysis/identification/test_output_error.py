@@ -9,9 +9,9 @@ from trial_logs import as_log
 
 from analysis.identification.output_error import OutputError, output_error
 from analysis.identification.problem import Nuisance
-from analysis.identification.residual_noise import Left, noise_of
-from analysis.identification.segment import Segment, segments_of
-from analysis.identification.swell import frequency_of
+from analysis.identification.residual_noise import OutputResiduals, fit_residual_noise
+from analysis.identification.segment import Segment, split_into_segments
+from analysis.identification.swell import swell_frequency
 from analysis.identification.uncertainty import uncertainty
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
@@ -33,7 +33,7 @@ def sailed(
 
 def a_trial(*args: object, **settings: object) -> Segment:
     name = f"{args}{settings}.mcap"  # pieces of one name are pieces of one run
-    return segments_of(sailed(*args, **settings), name)[0]  # type: ignore[arg-type]
+    return split_into_segments(sailed(*args, **settings), name)[0]  # type: ignore[arg-type]
 
 
 def errors(fit: OutputError) -> dict[str, float]:
@@ -49,7 +49,7 @@ def errors(fit: OutputError) -> dict[str, float]:
 def test_clean_data_give_the_truth_without_a_start(manoeuvre: str) -> None:
     fit = output_error([a_trial(manoeuvre, noise="none")], ship_model("burylin"))
     assert max(errors(fit).values()) < 1e-2
-    assert fit.minimum.settled
+    assert fit.minimum.converged
 
 
 def test_tied_zigzags_meet_what_was_asked_for() -> None:
@@ -58,7 +58,7 @@ def test_tied_zigzags_meet_what_was_asked_for() -> None:
     off = [{n: TRUTH[n] * rng.choice([0.5, 1.5]) for n in model.names[:8]} for _ in seeds]
     for starts in ([None] * 5, [{n: v for n, v in o.items() if n != "T3"} for o in off]):
         found = [
-            errors(output_error([a_trial(seed=s)], model, known={"T3": 0.5}, start=start))
+            errors(output_error([a_trial(seed=s)], model, fixed={"T3": 0.5}, start=start))
             for s, start in zip(seeds, starts, strict=True)
         ]
         median = {name: np.median([f[name] for f in found]) for name in found[0]}
@@ -88,8 +88,8 @@ def test_each_trial_has_its_own_rudder_zero_and_gyro_bias() -> None:
         values = dict(s.values) | {
             "rudder": s["rudder"] - offset, "yaw_rate": s["yaw_rate"] + bias
         }  # fmt: skip
-        segments += segments_of(Signals(s.start_ns, s.dt_secs, values), f"{seed}.mcap")
-    fit = output_error(segments, ship_model("burylin-tied"), known={"T3": 0.5})
+        segments += split_into_segments(Signals(s.start_ns, s.dt_secs, values), f"{seed}.mcap")
+    fit = output_error(segments, ship_model("burylin-tied"), fixed={"T3": 0.5})
     own = [fit.minimum.unknowns[fit.problem.own_slice(i)] for i in (0, 1)]
     assert [u[4] for u in own] == pytest.approx(offsets, abs=radians(0.03))
     assert [u[5] for u in own] == pytest.approx(biases, abs=radians(0.001))
@@ -99,7 +99,7 @@ def test_each_trial_has_its_own_rudder_zero_and_gyro_bias() -> None:
 def test_a_known_parameter_stays_and_a_freed_one_is_sought() -> None:
     fit = output_error(
         [a_trial("pseudo-random", noise="none")], ship_model("burylin"),
-        known={"b3": TRUTH["b3"]}, free=["alpha2"], nuisance=Nuisance.none(),
+        fixed={"b3": TRUTH["b3"]}, free=["alpha2"], nuisance=Nuisance.none(),
     )  # fmt: skip
     assert "b3" not in fit.problem.free_names
     assert errors(fit)["alpha2"] < 1
@@ -110,7 +110,7 @@ def test_samples_that_were_not_measured_do_not_count() -> None:
     values = {name: np.array(v) for name, v in s.values.items()}
     values["yaw_rate"][100:900] = np.nan
     values["speed"][::3] = np.nan
-    trial = segments_of(Signals(s.start_ns, s.dt_secs, values), "holes.mcap")[0]
+    trial = split_into_segments(Signals(s.start_ns, s.dt_secs, values), "holes.mcap")[0]
     assert max(errors(output_error([trial], ship_model("burylin"))).values()) < 1e-2
 
 
@@ -118,8 +118,8 @@ def test_one_spike_in_a_hundred_changes_little() -> None:
     s = sailed(seed=4)
     values = {name: np.array(v) for name, v in s.values.items()}
     values["yaw_rate"][::100] += radians(0.3)
-    spiked = segments_of(Signals(s.start_ns, s.dt_secs, values), "spikes.mcap")[0]
-    fit = output_error([spiked], ship_model("burylin-tied"), known={"T3": 0.5})
+    spiked = split_into_segments(Signals(s.start_ns, s.dt_secs, values), "spikes.mcap")[0]
+    fit = output_error([spiked], ship_model("burylin-tied"), fixed={"T3": 0.5})
     assert errors(fit)["d"] < 1
     assert errors(fit)["b2"] < 2
 
@@ -133,7 +133,7 @@ def test_what_one_turning_circle_cannot_tell_is_said_to_be_vague() -> None:
     assert "b1" in unidentifiable
     assert not {"a", "d", "f", "g", "h"} & set(unidentifiable)
     tied = output_error(
-        [a_trial("turning-circle-35")], ship_model("burylin-tied"), known={"T3": 0.5}
+        [a_trial("turning-circle-35")], ship_model("burylin-tied"), fixed={"T3": 0.5}
     )
     assert uncertainty(tied).unidentifiable == ()
 
@@ -158,18 +158,18 @@ def test_runs_of_different_ships_widen_the_intervals() -> None:
     s = sailed(seed=1)
     other = Signals(s.start_ns, s.dt_secs, dict(s.values) | {"rudder": 0.8 * s["rudder"]})
     same = [a_trial(seed=0), a_trial(seed=1)]
-    mixed = [a_trial(seed=0), segments_of(other, "other.mcap")[0]]
+    mixed = [a_trial(seed=0), split_into_segments(other, "other.mcap")[0]]
     model, known = ship_model("burylin-tied"), {"T3": 0.5}
-    alike, unlike = (uncertainty(output_error(t, model, known=known)) for t in (same, mixed))
-    assert alike.enlarged == 1.0
+    alike, unlike = (uncertainty(output_error(t, model, fixed=known)) for t in (same, mixed))
+    assert alike.enlargement == 1.0
     assert np.all(unlike.std > 2 * alike.std)
 
 
 def test_four_runs_are_judged_by_leaving_each_out() -> None:
     runs = [a_trial(seed=s, seconds=200.0) for s in range(4)]
-    found = uncertainty(output_error(runs, ship_model("burylin-tied"), known={"T3": 0.5}))
+    found = uncertainty(output_error(runs, ship_model("burylin-tied"), fixed={"T3": 0.5}))
     assert np.isfinite(found.between_runs).all()
-    assert found.enlarged == 1.0
+    assert found.enlargement == 1.0
     # three degrees of freedom: rough, but of the size of the others
     assert np.all(found.between_runs < 8 * found.bound)
 
@@ -181,12 +181,14 @@ def test_noise_is_told_apart_by_its_law() -> None:
     rng = np.random.default_rng(0)
     level = np.sin(np.arange(20_000) / 300)
     white = 0.02 * rng.standard_normal(20_000) + 0.05 * level * rng.uniform(-1, 1, 20_000) * 3**0.5
-    found = noise_of([Left(white, level, 0.1)], proportional=True, least=1e-9)
+    found = fit_residual_noise([OutputResiduals(white, level, 0.1)], proportional=True, least=1e-9)
     assert found.white == pytest.approx(0.02, rel=0.05)
     assert found.relative == pytest.approx(0.05, rel=0.05)
     assert found.slow == 0
     slow = np.convolve(rng.standard_normal(20_200), np.ones(201) / 201**0.5, "valid") * 0.03
-    found = noise_of([Left(white + slow, level, 0.1)], proportional=True, least=1e-9)
+    found = fit_residual_noise(
+        [OutputResiduals(white + slow, level, 0.1)], proportional=True, least=1e-9
+    )
     assert found.slow == pytest.approx(0.03, rel=0.3)
     assert 10 < found.slow_secs < 40
 
@@ -195,10 +197,10 @@ def test_a_wave_is_found_and_white_noise_has_none() -> None:
     rng = np.random.default_rng(1)
     time = np.arange(5000) * 0.1
     noise, std = rng.standard_normal((5000, 2)), np.ones((5000, 2))
-    assert frequency_of(noise, std, 0.1) is None
+    assert swell_frequency(noise, std, 0.1) is None
     noise[:, 1] += 0.3 * np.sin(time / 10 + 1)
     noise[500:900] = np.nan
-    assert frequency_of(noise, std, 0.1) == pytest.approx(0.1, rel=0.03)
+    assert swell_frequency(noise, std, 0.1) == pytest.approx(0.1, rel=0.03)
 
 
 def test_a_swell_is_a_nuisance_and_no_longer_stays_off() -> None:
@@ -217,21 +219,21 @@ def test_no_trials_unknown_names_and_a_rudder_at_rest_are_refused() -> None:
     with pytest.raises(UsageError, match="at least one log"):
         output_error([], ship_model("nomoto"))
     with pytest.raises(UsageError, match="no parameter 'T4'; it has a, b2"):
-        output_error([a_trial()], ship_model("burylin-tied"), known={"T4": 1.0})
+        output_error([a_trial()], ship_model("burylin-tied"), fixed={"T4": 1.0})
     s = sailed()
     still = Signals(s.start_ns, s.dt_secs, dict(s.values) | {"rudder": np.zeros(len(s))})
     with pytest.raises(LogError, match=r"the rudder moves by 0.0° in all.*still\.mcap"):
-        output_error(segments_of(still, "still.mcap"), ship_model("nomoto"))
+        output_error(split_into_segments(still, "still.mcap"), ship_model("nomoto"))
 
 
 def test_ten_seconds_are_too_short_and_gaps_part_a_trial() -> None:
     s = sailed()
     with pytest.raises(LogError, match=r"less than 60 s at a time.*short\.mcap"):
-        segments_of(s.part(0, 100), "short.mcap")
+        split_into_segments(s.part(0, 100), "short.mcap")
     rudder = np.array(s["rudder"])
     rudder[2000:2300] = np.nan
     values = dict(s.values) | {"rudder": rudder}
-    pieces = segments_of(Signals(s.start_ns, s.dt_secs, values), "gap.mcap")
+    pieces = split_into_segments(Signals(s.start_ns, s.dt_secs, values), "gap.mcap")
     assert [len(piece) for piece in pieces] == [2000, len(s) - 2300]
     assert all(np.isfinite(piece.signals["rudder"]).all() for piece in pieces)
 
@@ -241,9 +243,9 @@ def test_a_sparse_run_does_not_hide_what_stays_off_in_another() -> None:
     slow = np.zeros(6000)
     for k in range(1, len(slow)):
         slow[k] = 0.99 * slow[k - 1] + 0.1 * np.sqrt(1 - 0.99**2) * rng.standard_normal()
-    dense = Left(slow + 0.01 * rng.standard_normal(6000), np.zeros(6000), 0.1)
-    sparse = Left(0.1 * rng.standard_normal(2), np.zeros(2), 600.0)
-    alone = noise_of([dense], proportional=False, least=1e-9)
-    beside = noise_of([dense, sparse], proportional=False, least=1e-9)
+    dense = OutputResiduals(slow + 0.01 * rng.standard_normal(6000), np.zeros(6000), 0.1)
+    sparse = OutputResiduals(0.1 * rng.standard_normal(2), np.zeros(2), 600.0)
+    alone = fit_residual_noise([dense], proportional=False, least=1e-9)
+    beside = fit_residual_noise([dense, sparse], proportional=False, least=1e-9)
     assert beside.slow == pytest.approx(alone.slow, rel=0.05)
     assert beside.slow_secs == pytest.approx(alone.slow_secs, rel=0.3)

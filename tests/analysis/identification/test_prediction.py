@@ -10,8 +10,14 @@ from trial_logs import as_log
 
 from analysis.identification.model_selection import rank_models
 from analysis.identification.output_error import OutputError, output_error
-from analysis.identification.prediction import made_good, misfit, predict, turn, zigzag_overshoots
-from analysis.identification.segment import Segment, segments_of
+from analysis.identification.prediction import (
+    dead_reckoning,
+    misfit,
+    predict,
+    turn,
+    zigzag_overshoots,
+)
+from analysis.identification.segment import Segment, split_into_segments
 from analysis.identification.uncertainty import uncertainty
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
@@ -30,7 +36,7 @@ def recorded(path: Path) -> tuple[TrialLog, Segment]:
         pytest.skip(f"the real recordings are not here: {path}")
     layout = load_layout(PROJECT / "sample_data" / "layouts" / f"simman_{path.parent.name}.toml")
     log = read_table(path, layout)
-    return log, segments_of(resample(log, 1.0, CHANNELS, OPTIONAL), path.name)[0]
+    return log, split_into_segments(resample(log, 1.0, CHANNELS, OPTIONAL), path.name)[0]
 
 
 def marin(run: str) -> tuple[TrialLog, Segment]:
@@ -54,7 +60,7 @@ def off_the_circle(fit: OutputError) -> dict[str, float]:
     assert measured.tactical_diameter / LENGTH == pytest.approx(3.067, abs=0.005)
     assert measured.time_90_secs == pytest.approx(169.3, abs=0.5)
     outputs = predict(fit, trial)
-    said = turn(outputs, made_good(outputs, trial.dt_secs), rudder, trial.dt_secs)
+    said = turn(outputs, dead_reckoning(outputs, trial.dt_secs), rudder, trial.dt_secs)
     return {
         name: 100 * (getattr(said, name) / getattr(measured, name) - 1)
         for name in measured.__dataclass_fields__
@@ -111,7 +117,8 @@ def test_a_zigzag_of_the_papers_ship_overshoots_as_she_does() -> None:
     vessel, _ = load_vessel("table1")
     trial = simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=suite("none"))
     fit = output_error(
-        segments_of(resample(as_log(trial), channels=CHANNELS), "z.mcap"), ship_model("burylin")
+        split_into_segments(resample(as_log(trial), channels=CHANNELS), "z.mcap"),
+        ship_model("burylin"),
     )
     overshoots = zigzag_overshoots(
         fit, np.radians(20), np.radians(20), rudder_rate=np.radians(2.5),
@@ -144,7 +151,7 @@ def test_the_figures_of_a_true_circle_are_its_own() -> None:
         (np.where(heading < 0.3, -rate, 0), np.full(len(time), speed), 0 * time, heading)
     )
     rudder = np.where(time > 50, -0.6, 0.0)
-    found = turn(outputs, made_good(outputs, dt), rudder, dt)
+    found = turn(outputs, dead_reckoning(outputs, dt), rudder, dt)
     assert found.advance == pytest.approx(before + radius, rel=1e-3)
     assert found.transfer == pytest.approx(radius, rel=1e-3)
     assert found.tactical_diameter == pytest.approx(2 * radius, rel=1e-3)
@@ -158,7 +165,7 @@ def test_a_first_course_that_is_given_counts_for_the_first_samples_heading() -> 
     time = np.arange(0, 500, 1.0)
     heading = 0.01 * time
     outputs = np.column_stack((0 * time + 0.01, 5 + 0 * time, 0 * time, heading))
-    positions, rudder = made_good(outputs, 1.0), np.full(500, 0.6)
+    positions, rudder = dead_reckoning(outputs, 1.0), np.full(500, 0.6)
     noisy = outputs.copy()
     noisy[0, 3] += 0.05
     exact = turn(outputs, positions, rudder, 1.0)
@@ -169,7 +176,7 @@ def test_a_first_course_that_is_given_counts_for_the_first_samples_heading() -> 
 def test_a_ship_that_does_not_come_round_has_no_diameter() -> None:
     time = np.arange(0, 100, 1.0)
     outputs = np.column_stack((0.02 + 0 * time, 5 + 0 * time, 0 * time, 0.02 * time))
-    found = turn(outputs, made_good(outputs, 1.0), np.full(100, 0.6), 1.0)
+    found = turn(outputs, dead_reckoning(outputs, 1.0), np.full(100, 0.6), 1.0)
     assert np.isfinite(found.advance)
     assert np.isnan(found.tactical_diameter)
 

@@ -10,9 +10,9 @@ from places import KVLCC2, PROJECT
 from trial_logs import as_log
 
 from analysis.identification.output_error import OutputError, output_error
-from analysis.identification.runs import run_of
+from analysis.identification.runs import run_from_log
 from analysis.identification.validation import Validation, initial_heading, nan_rms, validate
-from analysis.manoeuvres.indices import Figure, _switch, first_order
+from analysis.manoeuvres.indices import ManoeuvreIndex, _switch, first_execute
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, load_vessel
@@ -36,16 +36,16 @@ def a_log(manoeuvre: str, seconds: float, noise_deg: float = 0.0, seed: int = 0)
 @cache
 def the_ship() -> OutputError:
     """The ship that sails, as if an identification had found her to the last digit."""
-    (trial,) = run_of(a_log("zigzag-20-20", 300.0)).segments
-    return output_error([trial], ship_model("burylin"), known=VESSEL.coefficients._asdict())
+    (trial,) = run_from_log(a_log("zigzag-20-20", 300.0)).segments
+    return output_error([trial], ship_model("burylin"), fixed=VESSEL.coefficients._asdict())
 
 
 def validated(log: TrialLog) -> Validation:
-    (found,) = validate(the_ship(), run_of(log))
+    (found,) = validate(the_ship(), run_from_log(log))
     return found
 
 
-def figures(log: TrialLog) -> dict[str, Figure]:
+def figures(log: TrialLog) -> dict[str, ManoeuvreIndex]:
     return {figure.name: figure for figure in validated(log).figures}
 
 
@@ -95,7 +95,7 @@ def test_without_heading_fixes_that_tell_no_course_are_left_alone() -> None:
     log = without(fixes(circle(), course_deg=90.0), "heading")
     late = validated(fixes(log, after_secs=30.0))  # the rudder moves at 10 s
     assert late.rms["track"] < 5  # by speed and yaw rate
-    (trial,), (places,) = run_of(log).segments, run_of(log).positions
+    (trial,), (places,) = run_from_log(log).segments, run_from_log(log).positions
     assert places is not None
     assert initial_heading(trial, places) == pytest.approx(radians(90), abs=1e-3)
     rough = places + np.random.default_rng(0).normal(0, 20, places.shape)
@@ -130,7 +130,7 @@ def test_a_run_without_heading_and_position_is_validated_all_the_same() -> None:
 def test_a_ship_that_runs_away_on_a_held_out_log_is_said() -> None:
     fit = the_ship()
     fast = replace(fit.problem, values=fit.problem.values * -40.0)
-    (found,) = validate(replace(fit, problem=fast), run_of(circle()))
+    (found,) = validate(replace(fit, problem=fast), run_from_log(circle()))
     assert found.diverged
     assert found.figures == ()
     assert np.isfinite(found.measured_track).all()
@@ -146,8 +146,8 @@ def test_the_rms_is_of_what_is_known() -> None:
 
 def test_figures_count_from_where_the_rudder_leaves_its_rest() -> None:
     rudder = np.radians(np.interp(np.arange(100.0), [0, 40, 54, 99], [0.1, 0.1, 35, 35]))
-    assert first_order(rudder, 1.0) == 40
-    assert first_order(np.zeros(100), 1.0) is None
+    assert first_execute(rudder, 1.0) == 40
+    assert first_execute(np.zeros(100), 1.0) is None
 
 
 # ---- a heading's noise

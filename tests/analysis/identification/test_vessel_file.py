@@ -11,7 +11,7 @@ from trial_logs import as_log
 from analysis.identification import vessel_file
 from analysis.identification.identify import IdentifiedShip, identify
 from analysis.identification.model_selection import Candidate
-from analysis.identification.output_error import fit
+from analysis.identification.output_error import fit_problem
 from analysis.identification.uncertainty import uncertainty
 from analysis.identification.vessel_file import vessel_toml
 from analysis.replay.plan import FITTED_MODEL
@@ -61,7 +61,7 @@ def truth(vessel: Vessel, run: str) -> dict[str, FloatArray]:
 def test_a_simulated_ship_of_any_model_is_found_within_her_intervals(name: str) -> None:
     found, _ = found_of(name)
     # in her own units: the speed of the straight run, as measured, is off by its noise
-    whole = fit(replace(found.fit.problem, scale=ship_from_vessel(vessel_of(name)).scale))
+    whole = fit_problem(replace(found.fit.problem, scale=ship_from_vessel(vessel_of(name)).scale))
     told = uncertainty(whole)
     true = np.array([SHIPS[name][parameter] for parameter in told.names])
     off = np.abs(told.values - true) / told.std

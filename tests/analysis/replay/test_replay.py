@@ -138,7 +138,7 @@ def test_a_contrary_rudder_is_said(zigzag_log: TrialLog) -> None:
         replace(c, values=-c.values) if c.name == "rudder" else c for c in zigzag_log.channels
     )
     found = analyse(replace(zigzag_log, channels=contrary))
-    assert any("rudder" in w and "contrary" in w for w in found.findings.warnings)
+    assert any("rudder" in w and "reversed" in w for w in found.findings.warnings)
 
 
 def test_a_vessel_with_faults_in_the_log_is_refused_with_all_of_them(zigzag_log: TrialLog) -> None:

@@ -372,7 +372,7 @@ def test_a_ship_without_a_steady_speed_is_refused() -> None:
     assert vessel.model is not None
     a, k, f, _, h = vessel.model.parameters
     free = replace(vessel, model=replace(vessel.model, parameters=(a, k, f, 0.0, h)))
-    with pytest.raises(UsageError, match="a nomoto finds no steady speed at 90 rpm"):
+    with pytest.raises(UsageError, match="a nomoto has no steady speed at 90 rpm"):
         sailed(free, "zigzag-20-20")
 
 
@@ -382,5 +382,5 @@ def test_a_ship_of_any_model_that_runs_away_is_refused() -> None:
     parameters = list(vessel.model.parameters)
     parameters[ship_model("slipstream").names.index("b2")] = 500.0
     wild = replace(vessel, model=replace(vessel.model, parameters=tuple(parameters)))
-    with pytest.raises(UsageError, match="a slipstream runs away in turning-circle"):
+    with pytest.raises(UsageError, match="of a slipstream diverges in turning-circle"):
         sailed(wild, "turning-circle")

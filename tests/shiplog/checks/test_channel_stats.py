@@ -1,4 +1,4 @@
-"""What a log holds, whatever the chunks it comes in."""
+"""Statistics of raw channels, whatever the chunks of the log."""
 
 from dataclasses import fields
 
@@ -19,43 +19,43 @@ def channel(name: str, seconds: list[float], values: list[float] | np.ndarray) -
     return Channel(name, "a", "1", at, at, np.array(values, float))
 
 
-def of(its: Channel, *, strict: bool = False) -> ChannelStats:
-    return compute_log_stats(TrialLog("x", (its,)), strict=strict)[its.name]
+def stats_of(channel: Channel, *, strict: bool = False) -> ChannelStats:
+    return compute_log_stats(TrialLog("x", (channel,)), strict=strict)[channel.name]
 
 
-def told(found: ChannelStats) -> dict[str, str]:
-    """All that is said of a channel, to the last digit."""
-    said = {field.name: repr(getattr(found, field.name)) for field in fields(found)}
-    return said | {"stuck": repr(found.stuck and vars(found.stuck))}
+def digits(stats: ChannelStats) -> dict[str, str]:
+    """All statistics of a channel, to the last digit."""
+    texts = {field.name: repr(getattr(stats, field.name)) for field in fields(stats)}
+    return texts | {"stuck": repr(stats.stuck and vars(stats.stuck))}
 
 
-def test_gaps_are_told_by_when_and_how_long() -> None:
-    silent = channel("speed", [0, 1, 2, 10, 11, 12, 30], np.zeros(7))
-    assert of(silent).gaps == ((2.0, 8.0), (12.0, 18.0))
-    assert of(channel("speed", [0, 1, 2], np.zeros(3))).gaps == ()
-    assert of(channel("speed", [], [])).gaps == ()
+def test_gaps_have_a_start_and_a_length() -> None:
+    sparse = channel("speed", [0, 1, 2, 10, 11, 12, 30], np.zeros(7))
+    assert stats_of(sparse).gaps == ((2.0, 8.0), (12.0, 18.0))
+    assert stats_of(channel("speed", [0, 1, 2], np.zeros(3))).gaps == ()
+    assert stats_of(channel("speed", [], [])).gaps == ()
 
 
-def test_a_channel_without_samples_is_there() -> None:
-    empty = of(channel("speed", [], []))
+def test_a_channel_without_samples_has_statistics() -> None:
+    empty = stats_of(channel("speed", [], []))
     assert (empty.samples, empty.valid, empty.interval_secs, empty.span_ns) == (0, 0, 0.0, (0, 0))
 
 
-def test_only_possible_values_are_known_where_it_is_strict() -> None:
+def test_only_possible_values_are_valid_if_strict() -> None:
     wild = channel("speed", [0, 1, 2, 3], [5, 1e9, 6, np.nan])
-    assert of(wild).valid == 3
-    assert of(wild, strict=True).valid == 2
-    assert of(wild, strict=True).value_range == (5.0, 6.0)
-    assert of(wild).impossible.count == 1
+    assert stats_of(wild).valid == 3
+    assert stats_of(wild, strict=True).valid == 2
+    assert stats_of(wild, strict=True).value_range == (5.0, 6.0)
+    assert stats_of(wild).impossible.count == 1
     np.testing.assert_array_equal(without_impossible(wild).values, [5, np.nan, 6, np.nan])
 
 
-def test_the_usual_period_of_what_is_known_leaves_out_what_is_not() -> None:
+def test_the_interval_between_valid_samples_leaves_out_the_others() -> None:
     values = np.full(100, np.nan)
     values[::10] = 1.0
-    found = of(channel("speed", list(0.1 * np.arange(100)), values))
-    assert found.interval_secs == pytest.approx(0.1)
-    assert found.valid_interval_secs == pytest.approx(1.0)
+    stats = stats_of(channel("speed", list(0.1 * np.arange(100)), values))
+    assert stats.interval_secs == pytest.approx(0.1)
+    assert stats.valid_interval_secs == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -69,6 +69,6 @@ def test_the_chunks_do_not_matter(zigzag_log: TrialLog, seed: int) -> None:
     cuts = np.sort(rng.uniform(0, 500, 40)).tolist()
     whole, parted = compute_log_stats(log), compute_log_stats(InChunks(log, cuts))
     for one, other in zip(whole, parted, strict=True):
-        assert told(one) == told(other)
+        assert digits(one) == digits(other)
     assert whole["speed"].stuck is not None
     assert whole["yaw_rate"].gaps

@@ -1,3 +1,5 @@
+"""The check of the gyro against the heading, on simulated and on real trials."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -22,40 +24,42 @@ def sailed(vessel: Vessel, seed: int = 0, **settings: float) -> TrialLog:
 
 
 @pytest.mark.parametrize("bias_deg", [-0.02, 0.01])
-def test_a_biased_gyro_is_found_with_its_bias(vessel: Vessel, bias_deg: float) -> None:
+def test_the_bias_of_a_gyro_is_estimated(vessel: Vessel, bias_deg: float) -> None:
     warning = gyro_bias_warning(sailed(vessel, yaw_rate__bias=np.radians(bias_deg)))
     assert warning is not None
-    assert float(warning.split("off by ")[1].split()[0]) == pytest.approx(bias_deg, abs=0.001)
+    assert float(warning.split("bias of ")[1].split()[0]) == pytest.approx(bias_deg, abs=0.001)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_gyro_that_is_right_is_passed_over(vessel: Vessel, seed: int) -> None:
+def test_an_unbiased_gyro_gives_no_warning(vessel: Vessel, seed: int) -> None:
     assert gyro_bias_warning(sailed(vessel, seed)) is None
 
 
-def test_dropouts_do_not_pass_for_a_bias(vessel: Vessel) -> None:
+def test_dropouts_are_not_mistaken_for_a_bias(vessel: Vessel) -> None:
     for seed in range(5):
         gaps = {"yaw_rate__dropout": 0.05, "yaw_rate__dropout_secs": 10.0}
         assert gyro_bias_warning(sailed(vessel, seed, **gaps)) is None
 
 
-def test_a_heading_that_counts_to_port_is_called_that(vessel: Vessel) -> None:
+def test_a_heading_that_increases_to_port_gives_a_warning(vessel: Vessel) -> None:
     log = sailed(vessel)
-    contrary = tuple(replace(c, values=-c.values) if c.name == "heading" else c for c in log)
-    warning = gyro_bias_warning(replace(log, channels=contrary))
+    reversed_heading = tuple(
+        replace(c, values=-c.values) if c.name == "heading" else c for c in log
+    )
+    warning = gyro_bias_warning(replace(log, channels=reversed_heading))
     assert warning is not None
-    assert "counts to port" in warning
+    assert "increases to port" in warning
 
 
-def test_without_a_heading_nothing_is_said(vessel: Vessel) -> None:
+def test_without_a_heading_there_is_no_warning(vessel: Vessel) -> None:
     log = sailed(vessel, yaw_rate__bias=1.0)
     assert gyro_bias_warning(replace(log, channels=log.channels[:4])) is None
 
 
 @pytest.mark.skipif(not KVLCC2.is_dir(), reason="the SIMMAN data are not in ../shared/data/kvlcc2")
 def test_the_gyros_of_hsva_agree_with_their_headings() -> None:
-    """There the heading is printed finely; MARIN's is itself rebuilt from the yaw rate."""
+    """HSVA's headings have many digits; those of MARIN are themselves rebuilt from the yaw rate."""
     layout = load_layout(LAYOUTS / "simman_hsva.toml")
     for run in sorted((KVLCC2 / "hsva").glob("*.dat")):
         warning = gyro_bias_warning(read_table(run, layout))
-        assert warning is None or abs(float(warning.split("off by ")[1].split()[0])) < 0.01
+        assert warning is None or abs(float(warning.split("bias of ")[1].split()[0])) < 0.01

@@ -1,4 +1,4 @@
-"""A rudder of contrary sign must be found; one that is right, or tells nothing, passed over."""
+"""A reversed rudder sign gives a warning; a right one, or too little motion, gives none."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -38,7 +38,7 @@ def sailed(
     return TrialLog("t", (channel(np.array(rates)), channel(np.array(rudders), name="rudder")))
 
 
-def contrary(log: TrialLog) -> TrialLog:
+def with_reversed_rudder(log: TrialLog) -> TrialLog:
     turned = [replace(c, values=-c.values) if c.name == "rudder" else c for c in log]
     return replace(log, channels=tuple(turned))
 
@@ -64,20 +64,20 @@ def autopilot(_: float, heading: float, rate: float) -> float:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_contrary_rudder_is_found_in_a_zigzag_and_the_right_one_is_not(seed: int) -> None:
+def test_a_reversed_rudder_is_found_in_a_zigzag_and_the_right_one_is_not(seed: int) -> None:
     log = sailed(zigzag(), seed=seed, waves=1e-5)
     assert rudder_sign_warning(log) is None
-    warning = rudder_sign_warning(contrary(log))
+    warning = rudder_sign_warning(with_reversed_rudder(log))
     assert warning is not None
-    assert "/rudder/a: its sign is contrary, positive turns the bow to port" in warning
+    assert "/rudder/a: its sign is reversed, a positive rudder turns the bow to port" in warning
     assert "sign = -1" in warning
     assert "\n" not in warning
 
 
-def test_a_contrary_rudder_is_found_in_a_turning_circle() -> None:
+def test_a_reversed_rudder_is_found_in_a_turning_circle() -> None:
     log = sailed(circle)
     assert rudder_sign_warning(log) is None
-    assert rudder_sign_warning(contrary(log)) is not None
+    assert rudder_sign_warning(with_reversed_rudder(log)) is not None
 
 
 @pytest.mark.parametrize("waves", [0.0, 1e-5, 1e-4])
@@ -85,7 +85,7 @@ def test_a_contrary_rudder_is_found_in_a_turning_circle() -> None:
 def test_a_straight_run_gives_no_warning_whichever_the_sign(seed: int, waves: float) -> None:
     log = sailed(lambda *_: 0.0, seed=seed, waves=waves)
     assert rudder_sign_warning(log) is None
-    assert rudder_sign_warning(contrary(log)) is None
+    assert rudder_sign_warning(with_reversed_rudder(log)) is None
 
 
 @pytest.mark.parametrize("waves", [1e-5, 1e-4, 3e-4])
@@ -97,7 +97,7 @@ def test_an_autopilot_in_waves_gives_no_warning_where_the_sign_is_right(
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_rudder_that_has_nothing_to_do_with_the_turning_gives_no_warning(seed: int) -> None:
+def test_a_rudder_unrelated_to_the_turning_gives_no_warning(seed: int) -> None:
     log = sailed(lambda *_: 0.0, seed=seed, waves=1e-4)
     rng = np.random.default_rng(100 + seed)
     wander = np.cumsum(rng.normal(0, 0.005, 6000))
@@ -109,8 +109,8 @@ def test_a_rudder_that_has_nothing_to_do_with_the_turning_gives_no_warning(seed:
     )
 
 
-def test_gaps_and_samples_not_measured_do_not_hide_a_contrary_rudder() -> None:
-    rate, rudder = contrary(sailed(zigzag())).channels
+def test_gaps_and_missing_samples_do_not_hide_a_reversed_rudder() -> None:
+    rate, rudder = with_reversed_rudder(sailed(zigzag())).channels
     values = rate.values.copy()
     values[1000:1300] = np.nan
     kept = np.r_[0:3000, 3300:6000]
@@ -123,8 +123,8 @@ def test_gaps_and_samples_not_measured_do_not_hide_a_contrary_rudder() -> None:
     assert rudder_sign_warning(TrialLog("t", (replace(rate, values=values), cut))) is not None
 
 
-def test_without_the_channels_or_their_samples_nothing_is_said() -> None:
-    rate, rudder = contrary(sailed(zigzag())).channels
+def test_without_the_channels_or_their_samples_there_is_no_warning() -> None:
+    rate, rudder = with_reversed_rudder(sailed(zigzag())).channels
     later = replace(rudder, measured_ns=rudder.measured_ns + 10**13)
     empty = channel(np.zeros(0), name="rudder")
     unmeasured = replace(rudder, values=np.full(len(rudder), np.nan))
@@ -132,8 +132,8 @@ def test_without_the_channels_or_their_samples_nothing_is_said() -> None:
         assert rudder_sign_warning(TrialLog("t", channels)) is None
 
 
-def test_a_speed_log_that_is_dead_does_not_hide_a_contrary_rudder() -> None:
-    log = contrary(sailed(zigzag()))
+def test_a_dead_speed_log_does_not_hide_a_reversed_rudder() -> None:
+    log = with_reversed_rudder(sailed(zigzag()))
     for dead in (np.zeros(6000), np.full(6000, np.nan)):
         speed = channel(dead, name="speed")
         assert rudder_sign_warning(replace(log, channels=(*log.channels, speed))) is not None
@@ -145,9 +145,9 @@ RUNS = [pytest.param(path, id=path.stem) for path in sorted(KVLCC2.glob("*/*.dat
 
 
 @pytest.mark.parametrize("path", RUNS)
-def test_the_contrary_sign_of_every_kvlcc2_run_is_found(path: Path) -> None:
+def test_the_reversed_sign_of_every_kvlcc2_run_is_found(path: Path) -> None:
     layout = load_layout(LAYOUTS / f"simman_{path.parent.name}.toml")
     assert rudder_sign_warning(read_table(path, layout)) is None
     as_printed = replace(layout.columns["rudder"], sign=1)
-    contrary_layout = replace(layout, columns={**layout.columns, "rudder": as_printed})
-    assert rudder_sign_warning(read_table(path, contrary_layout)) is not None
+    reversed_layout = replace(layout, columns={**layout.columns, "rudder": as_printed})
+    assert rudder_sign_warning(read_table(path, reversed_layout)) is not None

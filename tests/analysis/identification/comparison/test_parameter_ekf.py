@@ -89,7 +89,7 @@ def test_what_was_never_told_stays_what_it_was() -> None:
     quiet = replace(fit.problem, segments=(fit.problem.segments[0].part(0, 90),), waves=())
     short = replace(
         fit, problem=quiet, residual_stds=tuple(
-            type(s)(s.effective[:90], s.usual[:90]) for s in fit.residual_stds
+            type(s)(s.effective[:90], s.typical[:90]) for s in fit.residual_stds
         ),
     )  # fmt: skip
     found = parameter_ekf(short, two_priors(told, fit.problem.bounds))
