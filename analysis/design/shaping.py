@@ -6,7 +6,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, solve_continuous_lyapunov
-from scipy.signal import tf2ss
 
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
@@ -173,5 +172,7 @@ def _realised(shaping: TransferFunction) -> tuple[FloatArray, FloatArray, FloatA
             f"the shaping filter has a pole at {poles[np.argmax(poles.real)]:.4g}; expected a"
             " stable one"
         )
+    from scipy.signal import tf2ss  # noqa: PLC0415 - scipy.signal takes long to import
+
     Aw, Bw, Cw, Dw = tf2ss(numerator if len(numerator) else [0.0], denominator)
     return Aw, Bw, Cw, Dw
