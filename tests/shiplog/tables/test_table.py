@@ -202,7 +202,7 @@ def spoilt(tmp_path: Path, old: str, new: str) -> str:
         (",1700000000000000001,", ",-1,", "times before 1970"),
         (",1700000000000000001,", ",1.7e18,", "line 12 cannot be read (invalid literal"),
         ("# vessel", "# vassel", "'vassel' is not known"),
-        ('"fields": [],', '"fields": ["up"],', "no message carries"),
+        ('"fields": [],', '"fields": ["up"],', "no message schema has"),
         ('"unit": "rad/s", ', "", "missing 1 required"),
     ],
 )
