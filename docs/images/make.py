@@ -1,4 +1,3 @@
-# ruff: noqa: INP001 - a script, not a package
 """Make the picture of a review: `python docs/images/make.py trial.rrd review.png`.
 
 It needs no screen. Without a graphics card, Debian's `mesa-vulkan-drivers` draws in software.
