@@ -246,8 +246,8 @@ def log_all(found: Replay, out: Path) -> int:
             recording.log(f"{name}/measured", rr.Scalars(signals[name][k] * scale))
             recording.log(f"{name}/state", rr.Scalars(banded))
             disturbance = found.disturbance[k, output] * thousandths
-            recording.log(f"disturbance_{kind}/observed", rr.Scalars(disturbance))
-            recording.log(f"residual_{name}/normalised", rr.Scalars(normalised))
+            recording.log(f"disturbance_{kind}/estimate", rr.Scalars(disturbance))
+            recording.log(f"innovation_{name}/normalised", rr.Scalars(normalised))
         recording.log("rudder/measured", rr.Scalars(signals["rudder"][k] * DEGREES))
         recording.log("rpm/measured", rr.Scalars(signals["rpm"][k]))
         recording.log("track/now", rr.Points2D([[east[k], -north[k]]]))
@@ -265,7 +265,7 @@ def log_coefficients(recording: rr.RecordingStream, values: FloatArray, stds: Fl
     names = ("a", "b1", "b2", "b3", "d", "e", "f", "g", "h")
     for name, value, std in zip(names, values, stds, strict=True):
         banded = [value + 2 * std, value - 2 * std, value]
-        recording.log(f"coefficient_{name}/window", rr.Scalars(banded))
+        recording.log(f"coefficient_{name}/per_window", rr.Scalars(banded))
 
 
 def _extent(path: Path, minutes: float | None) -> tuple[int, int | None]:

@@ -25,7 +25,7 @@ from shiplog.ships import ship_model
 
 SMALL = ["--short", "--hours", "0.1", "--growth", "0.02,0.05", "--info-hours", "0.15"]
 MODEL = VESSEL.coefficients
-GUIDES = ("/bounds", "/over", "/model")  # straight lines: two points, whatever the log
+GUIDES = ("/bounds", "/sigma_limits", "/model")  # straight lines: two points, whatever the log
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ from shiplog.ships.paper import PAPER_INPUTS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, conversion_factor
 
+from .decimation import decimated
 from .panels import Panel, limits, rounded, thousands
 from .series import (
     BLUE,
@@ -29,7 +30,6 @@ from .series import (
     Line,
     Series,
     banded,
-    decimated,
     measured_line,
 )
 from .track_chart import TrackChart, make_chart

@@ -1,4 +1,4 @@
-"""A review in Rerun: the entities of an analysis, and one page on which to read them."""
+"""The review of a replay in Rerun: its entities, and one page that shows them."""
 
 import os
 import re
@@ -13,7 +13,8 @@ import rerun.blueprint as rrb
 from analysis.replay.plan import Plan
 from analysis.replay.replay import Analysis, Findings, ReplayChunk
 
-from .panels import Panel, equation_panels, history_panels
+from .panels import Panel
+from .replay_panels import equation_panels, history_panels
 from .rerun_io import (
     chart_view,
     make_blueprint,
@@ -24,47 +25,57 @@ from .rerun_io import (
     send_style,
     send_text,
 )
-from .series import SeriesBuilder
+from .series_builder import SeriesBuilder
 from .track_chart import TrackChart, draw_track
 
-ROWS = [1.3, 0.9, 1.0, 0.9]  # heights: outputs, inputs, disturbances, residuals
-KEY = """\
-*Grey: measured, or in the model. Blue, orange: estimated, of yaw and of surge, ±2σ. \
-Green: inputs. Red: disturbance; between the grey lines it may be sensor noise. Cyan: waves. \
-Coefficients: in the title over the whole trial, ±2σ; as a line at the end of each window; red, \
-if one changed, before and after. \
-A gap: not measured, or a window that cannot tell.*
+ROW_SHARES = [1.3, 0.9, 1.0, 0.9]  # heights: outputs, inputs, disturbances, innovations
+LEGEND = """
+## Legend
 
+- **grey**: measured; in coefficient panels, the value of the model
+- **blue**, **orange**: estimates of yaw and of surge, with ±2σ
+- **green**: inputs
+- **red**: disturbances (between the grey lines they may be sensor noise), and coefficients before \
+and after a change
+- **cyan**: waves
+- **coefficients**: in the title, the value over the whole trial with ±2σ; as a curve, that of the \
+sliding window that ends there
+- **gap in a curve**: nothing measured, or a window that does not determine the coefficient
 """
 
 
 class ReplayReview:
-    """A review that is drawn as the chunks of a replay come; made by `open_replay_review`."""
+    """A review drawn while the chunks of a replay come; made by `open_replay_review`."""
 
     def __init__(self, plan: Plan, recording: rr.RecordingStream, *, full: bool) -> None:
         self._recording, self._full = recording, full
         self._start_ns = plan.clock.start_ns
-        self._sketch = SeriesBuilder(plan.clock, plan.stats)
+        self._builder = SeriesBuilder(plan.clock, plan.stats)
 
     def add(self, chunk: ReplayChunk) -> None:
         """Draw the next chunk."""
-        dense = self._sketch.add(chunk)
+        dense = self._builder.add(chunk)
         if self._full:
             for entity, series in dense.items():
                 send_points(self._recording, entity, series, self._start_ns)
 
     def finish(self, findings: Findings, text: str) -> None:
-        """Draw what is known at the end; `text` is the page of words, in Markdown."""
+        """Draw what is known only at the end.
+
+        Parameters
+        ----------
+        findings
+            The findings of the replay.
+        text
+            The page of text, in Markdown; a legend is added to it.
+        """
         recording, start_ns = self._recording, self._start_ns
-        drawn = self._sketch.result()
+        drawn = self._builder.result()
         yaw, surge = equation_panels(findings, drawn)
-        coefficients, chart = (
-            history_panels(findings, drawn),
-            draw_track(findings, drawn),
-        )
+        coefficients, chart = history_panels(findings, drawn), draw_track(findings, drawn)
         rr.send_blueprint(_blueprint(yaw, surge, coefficients, chart), recording=recording)
         _send_properties(recording, findings)
-        send_text(recording, "summary", KEY + text)
+        send_text(recording, "summary", text + LEGEND)
         for panel in (*yaw, *surge, *coefficients):
             for series in panel.series:
                 entity = f"{panel.name}/{series.name}"
@@ -80,11 +91,22 @@ class ReplayReview:
 def open_replay_review(
     plan: Plan, path: str | os.PathLike[str], *, full: bool = False
 ) -> Iterator[ReplayReview]:
-    """A review that becomes the .rrd file `path` when it was finished.
+    """Open a review, which becomes an .rrd file once it is finished.
 
-    Of a long trial the series are thinned to what a screen can show, with every extreme kept;
-    `full` keeps every sample. Raises `ShiplogError` where `path` cannot be written to, or not to
-    the end.
+    Parameters
+    ----------
+    plan
+        The plan of the replay.
+    path
+        The file to write.
+    full
+        Whether to keep every sample; by default the series of a long trial are decimated to what a
+        screen can show, with every extreme kept.
+
+    Raises
+    ------
+    ShiplogError
+        Where `path` cannot be written to.
     """
     recording = _recording(plan)
     with save_recording(recording, path):
@@ -94,22 +116,22 @@ def open_replay_review(
 def write_replay_review(
     analysis: Analysis, path: str | os.PathLike[str], *, text: str, full: bool = False
 ) -> None:
-    """Write the review of a whole analysis to an .rrd file; as `open_replay_review`."""
+    """Write the review of an analysis to an .rrd file; see `open_replay_review`."""
     with open_replay_review(analysis.findings.plan, path, full=full) as review:
         review.add(analysis.as_chunk())
         review.finish(analysis.findings, text)
 
 
 def _recording(plan: Plan) -> rr.RecordingStream:
-    """A stream whose names depend on the log, the model and the noise alone.
+    """Return a stream whose names depend only on the log, the model and the noise.
 
     Each log is an application of its own to Rerun, which shares one layout among the recordings
     of an application; the axes of another ship would be wrong for this one.
     """
-    name, usual, noise = plan.name, plan.stats, plan.noise
-    known = (name, plan.clock.start_ns, plan.clock.count, plan.vessel, usual.measured)
-    digest = sha256(repr(known).encode())
-    for array in (usual.spread, noise.measurement_std, noise.process_ratio):
+    name, stats, noise = plan.name, plan.stats, plan.noise
+    identity = (name, plan.clock.start_ns, plan.clock.count, plan.vessel, stats.measured)
+    digest = sha256(repr(identity).encode())
+    for array in (stats.spread, noise.measurement_std, noise.process_ratio):
         digest.update(np.ascontiguousarray(array).tobytes())
     return rr.RecordingStream(
         re.sub(r"[^A-Za-z0-9_-]+", "-", f"shiplog {name}"),
@@ -119,6 +141,7 @@ def _recording(plan: Plan) -> rr.RecordingStream:
 
 
 def _send_properties(recording: rr.RecordingStream, findings: Findings) -> None:
+    """Send the recording's name, start and properties."""
     recording.send_recording_name(findings.plan.name)
     rr.send_recording_start_time_nanos(findings.plan.clock.start_ns, recording=recording)
     trial = rr.AnyValues(
@@ -133,19 +156,17 @@ def _send_properties(recording: rr.RecordingStream, findings: Findings) -> None:
 
 
 def _blueprint(
-    yaw: list[Panel], surge: list[Panel], coefficients: list[Panel], drawn: TrackChart | None
+    yaw: list[Panel], surge: list[Panel], coefficients: list[Panel], chart: TrackChart | None
 ) -> rrb.Blueprint:
+    """Lay out one page: yaw and surge on the left; track, summary and coefficients on the right."""
     plots = rrb.Horizontal(
-        *(rrb.Vertical(*map(plot_view, column), row_shares=ROWS) for column in (yaw, surge))
+        *(rrb.Vertical(*map(plot_view, column), row_shares=ROW_SHARES) for column in (yaw, surge))
     )
-    page: list[rrb.View | rrb.Container] = [rrb.TextDocumentView(origin="summary", name="summary")]
-    if drawn is not None:
-        page.insert(0, chart_view("track", drawn))
-    side: list[rrb.View | rrb.Container] = [rrb.Horizontal(*page)]
+    top: list[rrb.View | rrb.Container] = [rrb.TextDocumentView(origin="summary", name="summary")]
+    if chart is not None:
+        top.insert(0, chart_view("track", chart))
+    side: list[rrb.View | rrb.Container] = [rrb.Horizontal(*top)]
     if coefficients:
         side.append(rrb.Grid(*map(plot_view, coefficients), grid_columns=3, name="coefficients"))
-    return make_blueprint(
-        rrb.Horizontal(
-            plots, rrb.Vertical(*side, row_shares=[2, 3][: len(side)]), column_shares=[1, 1]
-        )
-    )
+    right = rrb.Vertical(*side, row_shares=[2, 3][: len(side)])
+    return make_blueprint(rrb.Horizontal(plots, right, column_shares=[1, 1]))

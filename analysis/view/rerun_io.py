@@ -1,4 +1,4 @@
-"""What every sheet in Rerun is made of: series, panels and charts, sent and laid out."""
+"""Rerun recordings: series, text and track charts sent to them, views and blueprints."""
 
 import os
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from .panels import Panel
 from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Series
 from .track_chart import TrackChart
 
-ROWS_SENT = 1 << 16  # at once
+MAX_ROWS = 1 << 16  # sent at once
 WHOLE_RUN = rrb.TimeAxis(
     view_range=rr.TimeRange(
         start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
@@ -26,22 +26,29 @@ WHOLE_RUN = rrb.TimeAxis(
 
 @contextmanager
 def save_recording(recording: rr.RecordingStream, path: str | os.PathLike[str]) -> Iterator[None]:
-    """What is sent to the recording becomes the .rrd file `path` when all was sent.
+    """Save to an .rrd file what is sent to a recording while the context lasts.
 
-    Raises `ShiplogError` where `path` cannot be written to, or not to the end.
+    The file appears only when it is complete.
+
+    Raises
+    ------
+    ShiplogError
+        Where `path` cannot be written to, or the disk is full.
     """
     with atomic_write(path) as part:
         try:
             recording.save(part)
             yield
-        except RuntimeError as error:  # what Rerun makes of a full disk
-            raise ShiplogError(f"cannot finish the review; is the disk full? {path}") from error
+        except RuntimeError as error:  # raised by Rerun where the disk is full
+            raise ShiplogError(
+                f"cannot write the review to the end; is the disk full? {path}"
+            ) from error
         finally:
             recording.disconnect()
 
 
 def send_style(recording: rr.RecordingStream, entity: str, series: Series) -> None:
-    """Say how the lines of a series look."""
+    """Send the names, colours and widths of a series' lines."""
     style = rr.SeriesLines(
         names=[line.name for line in series.lines],
         colors=[line.colour for line in series.lines],
@@ -52,15 +59,16 @@ def send_style(recording: rr.RecordingStream, entity: str, series: Series) -> No
 
 
 def send_points(recording: rr.RecordingStream, entity: str, series: Series, start_ns: int) -> None:
-    """Send a series in chunks of a size that Rerun likes."""
+    """Send the points of a series, in batches of `MAX_ROWS`."""
     values = np.column_stack([line.values for line in series.lines])
-    for start in range(0, len(values), ROWS_SENT):
-        part = slice(start, start + ROWS_SENT)
+    for start in range(0, len(values), MAX_ROWS):
+        part = slice(start, start + MAX_ROWS)
         times = _times(series.time_secs[part], start_ns)
         recording.send_columns(entity, times, rr.Scalars.columns(scalars=values[part]))
 
 
 def _times(time_secs: FloatArray, start_ns: int) -> list[rr.TimeColumn]:
+    """Return the two timelines: time since the start, and date and time."""
     since = np.round(time_secs * 1e9).astype(np.int64)
     return [
         rr.TimeColumn("time", duration=since.astype("m8[ns]")),
@@ -69,40 +77,40 @@ def _times(time_secs: FloatArray, start_ns: int) -> list[rr.TimeColumn]:
 
 
 def send_text(recording: rr.RecordingStream, entity: str, text: str) -> None:
-    """Send a page of words, in Markdown."""
+    """Send a page of text in Markdown."""
     page = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
     recording.log(entity, page, static=True)
 
 
 def send_chart(
-    recording: rr.RecordingStream, origin: str, drawn: TrackChart, start_ns: int
+    recording: rr.RecordingStream, origin: str, chart: TrackChart, start_ns: int
 ) -> None:
-    """Draw a track."""
+    """Send a track with its ships, ends and scale, and the position at each time."""
     thin, dot = rr.Radius.ui_points(0.8), rr.Radius.ui_points(5.0)
-    track = rr.LineStrips2D([drawn.track], colors=[GREY], radii=thin)
+    track = rr.LineStrips2D([chart.track], colors=[GREY], radii=thin)
     recording.log(f"{origin}/line", track, static=True)
-    ships = rr.LineStrips2D(drawn.ships, colors=[CYAN], radii=thin)
+    ships = rr.LineStrips2D(chart.ships, colors=[CYAN], radii=thin)
     recording.log(f"{origin}/ships", ships, static=True)
-    if drawn.simulated is not None:
-        simulated = rr.LineStrips2D([drawn.simulated], colors=[BLUE], radii=thin)
+    if chart.simulated is not None:
+        simulated = rr.LineStrips2D([chart.simulated], colors=[BLUE], radii=thin)
         recording.log(f"{origin}/simulated", simulated, static=True)
     ends = rr.Points2D(
-        drawn.track[[0, -1]], labels=["start", "end"], colors=[GREEN, RED], radii=dot
+        chart.track[[0, -1]], labels=["start", "end"], colors=[GREEN, RED], radii=dot
     )
     recording.log(f"{origin}/ends", ends, static=True)
-    scale = rr.LineStrips2D([drawn.scale], labels=[drawn.scale_label], colors=[GREY], radii=thin)
+    scale = rr.LineStrips2D([chart.scale], labels=[chart.scale_label], colors=[GREY], radii=thin)
     recording.log(f"{origin}/scale", scale, static=True)
     now = rr.Points2D.from_fields(colors=[ORANGE], radii=dot)
     recording.log(f"{origin}/now", now, static=True)
     recording.send_columns(
         f"{origin}/now",
-        _times(drawn.time_secs, start_ns),
-        rr.Points2D.columns(positions=drawn.track),
+        _times(chart.time_secs, start_ns),
+        rr.Points2D.columns(positions=chart.track),
     )
 
 
 def plot_view(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesView:
-    """A view of a panel, over the whole trial unless told otherwise."""
+    """Return a view of a panel, by default over the whole trial."""
     return rrb.TimeSeriesView(
         origin=panel.name,
         name=panel.title,
@@ -113,20 +121,20 @@ def plot_view(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesVie
 
 
 def axis_until(secs: float) -> rrb.TimeAxis:
-    """An axis from the start for so long."""
+    """Return a time axis from the start to `secs`."""
     ends = (rr.TimeRangeBoundary.absolute(seconds=at) for at in (0.0, secs))
     return rrb.TimeAxis(view_range=rr.TimeRange(*ends))
 
 
-def chart_view(origin: str, drawn: TrackChart) -> rrb.Spatial2DView:
-    """A view of a track."""
-    low, high = drawn.bounds
+def chart_view(origin: str, chart: TrackChart) -> rrb.Spatial2DView:
+    """Return a view of a track chart."""
+    low, high = chart.bounds
     bounds = rrb.VisualBounds2D(x_range=(low[0], high[0]), y_range=(low[1], high[1]))
-    return rrb.Spatial2DView(origin=origin, name=drawn.title, visual_bounds=bounds)
+    return rrb.Spatial2DView(origin=origin, name=chart.title, visual_bounds=bounds)
 
 
 def make_blueprint(content: rrb.View | rrb.Container) -> rrb.Blueprint:
-    """The content as all there is to be seen."""
+    """Return a blueprint that shows only this content; Rerun's own panels are collapsed."""
     return rrb.Blueprint(
         content,
         rrb.TimePanel(state="collapsed", timeline="time", play_state="Paused"),

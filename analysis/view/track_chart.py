@@ -1,6 +1,6 @@
-"""The track as a chart: east to the right, north up, ships along it and a scale.
+"""The track as a chart: north up, with outlines of the ship along it and a scale.
 
-Points are (x, y) of a drawing whose y points down: (east, -north), in m.
+Points are (x, y) of a drawing whose y axis points down: (east, -north), m.
 """
 
 from collections.abc import Mapping
@@ -14,29 +14,47 @@ from shiplog.types import FloatArray
 
 from .series import Series
 
-SHIPS = 10  # outlines along the track
-SYMBOL = 1 / 20  # of the chart's width: the length of a ship whose own is unknown or smaller
-HULL = np.array(  # forward and starboard, in lengths: bow, shoulders, stern
+MAX_OUTLINES = 10  # along the track
+MIN_OUTLINE_SHARE = 1 / 20  # of the chart's width: the least length of an outline
+HULL = np.array(  # forward and starboard, in ship lengths: bow, shoulders, stern
     [[0.5, 0.0], [0.25, 0.09], [-0.5, 0.09], [-0.5, -0.09], [0.25, -0.09], [0.5, 0.0]]
 )
 
 
 @dataclass(frozen=True, eq=False)
 class TrackChart:
-    """What is drawn of a track."""
+    """A track to be drawn.
+
+    Attributes
+    ----------
+    title
+        The title.
+    track
+        (k, 2) points.
+    time_secs
+        (k,) s since the start of the signals.
+    ships
+        Outlines of the ship, each (6, 2).
+    scale, scale_label
+        The ends of the scale, (2, 2), and its length in words.
+    bounds
+        The corners of the chart with the least and the greatest x and y, (2,) each.
+    simulated
+        (m, 2) the track of a simulated ship; None without one.
+    """
 
     title: str
-    track: FloatArray  # (k, 2)
-    time_secs: FloatArray  # (k,) since the signals' start
-    ships: list[FloatArray]  # outlines, each (6, 2)
-    scale: FloatArray  # (2, 2)
+    track: FloatArray
+    time_secs: FloatArray
+    ships: list[FloatArray]
+    scale: FloatArray
     scale_label: str
-    bounds: tuple[FloatArray, FloatArray]  # the corners with the least and the greatest x and y
-    simulated: FloatArray | None = None  # (m, 2) another track, of a simulated ship
+    bounds: tuple[FloatArray, FloatArray]
+    simulated: FloatArray | None = None
 
 
 def draw_track(findings: Findings, drawn: Mapping[str, Series]) -> TrackChart | None:
-    """The chart of a track; None where no position is known."""
+    """Return the chart of a replay's track; None where no position is known."""
     track, compass = drawn["track"], drawn.get("heading")
     north, east = (line.values for line in track.lines)
     heading = None
@@ -55,18 +73,30 @@ def make_chart(
     length: float | None,
     simulated: FloatArray | None = None,
 ) -> TrackChart | None:
-    """The chart of positions north and east, (k, 2) in m, at so many seconds, (k,).
+    """Return the chart of a track; None where no position is known.
 
-    `heading`, (k,) rad, turns the ships, else the track does; `simulated`, (m, 2), is another
-    track. None where no position is known.
+    Parameters
+    ----------
+    title
+        The title.
+    positions
+        (k, 2) north and east, m; NaN where not known.
+    at
+        (k,) s since the start of the signals.
+    heading
+        (k,) rad, of the outlines; None heads them along the track.
+    length
+        Of the ship, m; None where it is not known.
+    simulated
+        (m, 2) the track of a simulated ship, north and east, m.
     """
     known = np.isfinite(positions).all(axis=1)
-    points, at = _drawn(positions[known]), at[known]
+    points, at = _xy(positions[known]), at[known]
     if len(points) < 2:
         return None
-    other = None if simulated is None else _drawn(simulated[np.isfinite(simulated).all(axis=1)])
-    every = points if other is None else np.concatenate((points, other))
-    low, high = every.min(axis=0), every.max(axis=0)
+    other = None if simulated is None else _xy(simulated[np.isfinite(simulated).all(axis=1)])
+    all_points = points if other is None else np.concatenate((points, other))
+    low, high = all_points.min(axis=0), all_points.max(axis=0)
     width = max(float((high - low).max()), 1.0)
     bar = _round_length(width / 4)
     foot = np.array([low[0], high[1] + 0.12 * width])
@@ -74,7 +104,7 @@ def make_chart(
     return TrackChart(
         title, points, at,
         _ships(points, None if heading is None else heading[known],
-               max(length or 0.0, SYMBOL * width)),
+               max(length or 0.0, MIN_OUTLINE_SHARE * width)),
         foot + np.array([[0.0, 0.0], [bar, 0.0]]),
         f"{bar:g} m" if bar < 1000 else f"{bar / 1000:g} km",
         (low - margin, np.array([max(high[0], foot[0] + bar), foot[1]]) + margin),
@@ -82,15 +112,15 @@ def make_chart(
     )  # fmt: skip
 
 
-def _drawn(positions: FloatArray) -> FloatArray:
-    """North and east as (x, y) of the drawing."""
+def _xy(positions: FloatArray) -> FloatArray:
+    """Return north and east as (x, y) of the drawing."""
     return np.column_stack((positions[:, 1], -positions[:, 0]))
 
 
 def _ships(points: FloatArray, heading: FloatArray | None, length: float) -> list[FloatArray]:
-    """Outlines evenly along the way, headed as measured, or else along the track."""
-    sailed = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    rows = np.unique(np.searchsorted(sailed, np.linspace(0.0, sailed[-1], SHIPS)))
+    """Return outlines at equal distances, headed as measured, or else along the track."""
+    distance = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    rows = np.unique(np.searchsorted(distance, np.linspace(0.0, distance[-1], MAX_OUTLINES)))
     if heading is None:
         east, south = np.gradient(points, axis=0).T
         heading = np.arctan2(east, -south)
@@ -98,7 +128,7 @@ def _ships(points: FloatArray, heading: FloatArray | None, length: float) -> lis
 
 
 def _turned(hull: FloatArray, heading: float) -> FloatArray:
-    """Forward and starboard to (east, -north)."""
+    """Turn points forward and starboard to (east, -north)."""
     ahead = np.array([np.sin(heading), -np.cos(heading)])
     abeam = np.array([np.cos(heading), np.sin(heading)])
     turned: FloatArray = hull[:, :1] * ahead + hull[:, 1:] * abeam
@@ -106,6 +136,6 @@ def _turned(hull: FloatArray, heading: float) -> FloatArray:
 
 
 def _round_length(length: float) -> float:
-    """The nearest of 1, 2, 5 times a power of ten that is not longer."""
+    """Return the greatest of 1, 2, 5 times a power of ten that is not longer."""
     power = 10.0 ** floor(log10(length))
     return max(step for step in (1, 2, 5) if step * power <= length) * power

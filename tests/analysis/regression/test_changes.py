@@ -17,8 +17,8 @@ from analysis.regression.weak_form import (
 from analysis.replay.replay import Analysis, analyse
 from analysis.report.replay_json import replay_json
 from analysis.report.replay_tables import replay_markdown, replay_tables
-from analysis.view.panels import history_panels
-from analysis.view.series import SeriesBuilder
+from analysis.view.replay_panels import history_panels
+from analysis.view.series_builder import SeriesBuilder
 from benchmarks.changed_ship import changed_trial
 from benchmarks.changes import Case, halfway, told, unchanged
 from recorders.simulated.sensors import suite

@@ -17,9 +17,12 @@ from analysis.filters.base import Estimates
 from analysis.regression.sliding import History
 from analysis.replay.replay import Analysis, ReplayChunk, analyse
 from analysis.replay.track import EMPTY_TRACK
-from analysis.view.panels import Drawn, equation_panels, history_panels, limits
+from analysis.view.decimation import Decimator
+from analysis.view.panels import limits
+from analysis.view.replay_panels import Drawn, equation_panels, history_panels
 from analysis.view.replay_review import write_replay_review
-from analysis.view.series import Decimator, Line, Series, SeriesBuilder, _Samples
+from analysis.view.series import Line, MeasuredSamples, Series
+from analysis.view.series_builder import SeriesBuilder
 from analysis.view.track_chart import draw_track
 from analysis.view.viewer import view_review
 from recorders.simulated.sensors import suite
@@ -141,21 +144,21 @@ def test_inputs_disturbances_and_residuals(review: Path, analysis: Analysis) -> 
     _, _, rpm = columns(review, "rpm/measured")
     np.testing.assert_array_equal(rpm[:, 0], analysis.signals["rpm"])
     found = analysis.disturbance
-    _, _, yaw = columns(review, "disturbance_yaw/observed")
-    np.testing.assert_allclose(yaw[:, 0], np.degrees(found.yaw) * 1000, rtol=1e-12)
-    _, _, surge = columns(review, "disturbance_surge/observed")
+    _, _, yaw = columns(review, "disturbance_yaw/estimate")
+    np.testing.assert_allclose(yaw[:, 0], np.degrees(found.yaw) * 1e6, rtol=1e-12)
+    _, _, surge = columns(review, "disturbance_surge/estimate")
     np.testing.assert_allclose(surge[:, 0], found.surge * 1000, rtol=1e-12)
     _, _, band = columns(review, "disturbance_surge/bounds")
     np.testing.assert_allclose(
         band[0], np.array([2, -2]) * analysis.findings.disturbances["surge"].std * 1000, rtol=1e-12
     )
-    _, _, residual = columns(review, "residual_speed/normalised")
+    _, _, residual = columns(review, "innovation_speed/normalised")
     expected = analysis.estimates.innovations[:, 1] / analysis.estimates.innovation_stds[:, 1]
     np.testing.assert_allclose(residual[:, 0], expected, rtol=1e-12)
 
 
 def test_coefficients_stand_beside_the_model(review: Path, analysis: Analysis) -> None:
-    at, _, drawn = columns(review, "coefficient_d/window")
+    at, _, drawn = columns(review, "coefficient_d/per_window")
     history = analysis.yaw_history
     column = history.names.index("d")
     shown = np.isfinite(drawn[:, 2])
@@ -186,9 +189,9 @@ def test_measured_is_drawn_under_the_estimate(review: Path) -> None:
 def test_the_blueprint_holds_every_view(review: Path) -> None:
     names = layout(review, "ViewBlueprint:display_name")
     for expected in (
-        "yaw rate [deg/s]", "speed [kn]", "rudder [deg]", "rpm", "yaw disturbance [0.001 deg/s³]",
-        "surge disturbance [mm/s²]", "yaw rate residual [expected std]",
-        "speed residual [expected std]", "track, north up: recorded positions", "summary",
+        "yaw rate [deg/s]", "speed [kn]", "rudder [deg]", "rpm", "yaw disturbance [10⁻⁶ deg/s³]",
+        "surge disturbance [mm/s²]", "yaw rate innovation / expected σ",
+        "speed innovation / expected σ", "track, north up: recorded positions", "summary",
     ):  # fmt: skip
         assert expected in names
     coefficients = sorted(name.split()[0] for name in names if "±" in name)
@@ -199,7 +202,8 @@ def test_the_blueprint_holds_every_view(review: Path) -> None:
 
 def test_the_text_is_on_the_page(review: Path) -> None:
     (page,) = static(review, "summary", "TextDocument:text")
-    assert page.endswith("# What was found")
+    assert page.startswith("# What was found")
+    assert "## Legend" in page
     assert static(review, "summary", "TextDocument:media_type") == ["text/markdown"]
 
 
@@ -235,7 +239,7 @@ def test_a_gap_is_not_drawn(gappy: Analysis, tmp_path: Path) -> None:
     path = tmp_path / "gappy.rrd"
     write_replay_review(gappy, path, text="")
     known = np.isfinite(gappy.signals["yaw_rate"])
-    for entity in ("yaw_rate/measured", "residual_yaw_rate/normalised"):
+    for entity in ("yaw_rate/measured", "innovation_yaw_rate/normalised"):
         at, _, values = columns(path, entity)
         drawn = np.isfinite(values[:, 0])
         np.testing.assert_allclose(at[drawn], gappy.signals.time_secs[known], atol=1e-9)
@@ -252,7 +256,7 @@ def test_a_gap_is_not_drawn(gappy: Analysis, tmp_path: Path) -> None:
 def measured_only(values: np.ndarray, cuts: tuple[int, ...] = ()) -> tuple[list[int], list[float]]:
     """Instants and values that are drawn of a sensor, its values given in chunks."""
     steps = np.diff(np.flatnonzero(np.isfinite(values)))
-    samples = _Samples(max(5.0 * np.median(steps), 10.0) if len(steps) else 10.0)
+    samples = MeasuredSamples(max(5.0 * np.median(steps), 10.0) if len(steps) else 10.0)
     found = [
         samples.step(first, part[:, None])
         for first, part in zip((0, *cuts), np.split(values, cuts), strict=True)
@@ -312,7 +316,7 @@ def test_decimation_keeps_extremes_gaps_and_ends() -> None:
 def test_a_long_trial_is_thinned_and_in_full_it_is_not(
     analysis: Analysis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("analysis.view.series.POINTS", 500)
+    monkeypatch.setattr("analysis.view.decimation.POINTS", 500)
     for full in (False, True):
         path = tmp_path / f"{full}.rrd"
         write_replay_review(analysis, path, text="", full=full)

@@ -1,0 +1,178 @@
+"""The panels of a replay's review: outputs, inputs, disturbances, residuals, coefficients."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from analysis.regression.changes import Change
+from analysis.regression.coefficients import Coefficient
+from analysis.replay.replay import Findings
+from analysis.report.display import BAND_STDS, DISTURBANCES
+from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
+from shiplog.types import FloatArray
+from shiplog.units import CATALOGUE
+
+from .panels import Panel, limits, rounded, thousands
+from .series import BLUE, GREY, ORANGE, RED, Colour, Line, Series, banded
+
+Drawn = Mapping[str, Series]  # by entity, as `SeriesBuilder.result` returns them
+MAX_MODEL_DISTANCE = 10.0  # in half-heights of an axis: up to here it includes the model's value
+
+
+def equation_panels(findings: Findings, drawn: Drawn) -> tuple[list[Panel], list[Panel]]:
+    """Return the panels of yaw and of surge; each row belongs side by side."""
+    yaw, surge = (
+        [
+            _output(drawn, output),
+            _input(drawn, input_),
+            _disturbance(findings, drawn, disturbance),
+            _innovation(findings, drawn, output),
+        ]
+        for output, input_, disturbance in zip(
+            PAPER_OUTPUTS, PAPER_INPUTS, ("yaw", "surge"), strict=True
+        )
+    )
+    return yaw, surge
+
+
+def history_panels(findings: Findings, drawn: Drawn) -> list[Panel]:
+    """Return the history of each coefficient that any window determines, with the model's value."""
+    model = findings.plan.vessel.paper_coefficients._asdict()
+    panels = [
+        _history(findings, drawn, name, coefficient, model[name], colour)
+        for fit, colour in ((findings.yaw, BLUE), (findings.surge, ORANGE))
+        for name, coefficient in fit.coefficients.items()
+    ]
+    return [panel for panel in panels if panel is not None]
+
+
+def _output(drawn: Drawn, name: str) -> Panel:
+    measured, state = drawn[f"{name}/measured"], drawn[f"{name}/state"]
+    title = f"{_words(name)} [{CATALOGUE[name].display_unit}]"
+    axis = limits(measured.lines[0].values, state.lines[-1].values)
+    return Panel(name, title, (measured, state, *_optional(drawn, f"{name}/wave")), axis)
+
+
+def _optional(drawn: Drawn, entity: str) -> tuple[Series, ...]:
+    """Return a series that exists only where it was asked for."""
+    return (drawn[entity],) if entity in drawn else ()
+
+
+def _input(drawn: Drawn, name: str) -> Panel:
+    measured, unit = drawn[f"{name}/measured"], CATALOGUE[name].display_unit
+    title = name if name == unit else f"{name} [{unit}]"
+    return Panel(name, title, (measured,), limits(measured.lines[0].values))
+
+
+def _disturbance(findings: Findings, drawn: Drawn, name: str) -> Panel:
+    """Draw a disturbance on an axis that leaves out the observer's own transient."""
+    estimate, summary = drawn[f"disturbance_{name}/estimate"], findings.disturbances[name]
+    _, unit, scale = DISTURBANCES[name]
+    values = estimate.lines[0].values
+    settled = estimate.time_secs >= summary.settling_secs
+    kept = values[settled] if settled.mean() > 0.5 else values
+    noise, waves = BAND_STDS * summary.std * scale, _optional(drawn, f"disturbance_{name}/wave")
+    return Panel(
+        f"disturbance_{name}",
+        f"{name} disturbance [{unit}]",
+        (_guides(findings, "±2σ of sensor noise", noise, "bounds"), estimate, *waves),
+        limits(kept, np.array([-1.5, 1.5]) * noise, *(w.lines[0].values for w in waves)),
+    )
+
+
+def _innovation(findings: Findings, drawn: Drawn, name: str) -> Panel:
+    normalised = drawn[f"innovation_{name}/normalised"]
+    return Panel(
+        f"innovation_{name}",
+        f"{_words(name)} innovation / expected σ",
+        (normalised, _guides(findings, "±2σ", BAND_STDS, "sigma_limits")),
+        limits(normalised.lines[0].values, np.array([-2.0, 2.0]) * BAND_STDS),
+    )
+
+
+def _history(
+    findings: Findings, drawn: Drawn, name: str, whole: Coefficient, model: float, colour: Colour
+) -> Panel | None:
+    """Draw a coefficient's windows, its model value and its changes; None if nothing is known.
+
+    `whole` is its value over the whole trial, `model` that of the model, both in SI.
+    """
+    windows, span = drawn[f"coefficient_{name}/per_window"], _span(findings)
+    at, value, std = windows.time_secs, *(line.values for line in windows.lines)
+    known = np.isfinite(value)
+    if not known.any():
+        return None
+    size = max(abs(model), float(np.median(np.abs(value[known]))))
+    prefix, scale = thousands(size)
+    value, half_width = value * scale, BAND_STDS * std * scale
+    result, result_half_width = whole.value * scale, BAND_STDS * whole.std * scale
+    changes = [change for change in findings.changes if change.name == name]
+    steps = [_steps(changes, scale)] if changes else []
+    axis = _history_limits(
+        value[known], half_width[known], result, result_half_width, model * scale
+    )
+    axis = limits(np.array(axis), *(line.values for step in steps for line in step.lines))
+    # a window whose interval is higher than the panel would only be a vertical stroke
+    value = np.where(half_width > axis[1] - axis[0], np.nan, value)
+    if len(at) == 1:  # a point has no length: the one window is the whole trial
+        at, value, half_width = span, np.repeat(value, 2), np.repeat(half_width, 2)
+    reference = Line("model", np.full(2, model * scale), GREY, 1.5)
+    series = (
+        Series("model", span, (reference,)),
+        Series("per_window", at, banded("window", value, half_width, colour)),
+        *steps,
+    )
+    text = rounded(result, result_half_width) if whole.determined else "not determined"
+    if changes:  # the whole trial's is a mixture
+        text = ", ".join(f"{c.before * scale:.4g} → {c.after * scale:.4g}" for c in changes)
+    title = f"{name} = {text} [{prefix}{whole.unit}]"
+    return Panel(f"coefficient_{name}", title, series, axis)
+
+
+def _steps(changes: Sequence[Change], scale: float) -> Series:
+    """Draw a coefficient's values before and after each of its changes; they meet at its time."""
+    times = np.unique([(c.from_secs, c.at_secs, c.until_secs) for c in changes])
+    lines = []
+    for c in changes:
+        spans = (c.from_secs, c.at_secs, c.before), (c.at_secs, c.until_secs, c.after)
+        for first, last, value in spans:
+            inside = (times >= first) & (times <= last)
+            lines.append(Line("change", np.where(inside, value * scale, np.nan), RED, 2.5))
+    return Series("steps", times, tuple(lines))
+
+
+def _history_limits(
+    value: FloatArray,
+    half_width: FloatArray,
+    result: float,
+    result_half_width: float,
+    model: float,
+) -> tuple[float, float]:
+    """Return an axis about the whole trial's result, for the more certain half of the windows."""
+    certain = np.isfinite(value)
+    if np.isfinite(half_width).any():
+        certain = ~(half_width > np.nanmedian(half_width))
+    centre = result if np.isfinite(result) else float(np.median(value[certain]))
+    reach = 2 * float(np.median(np.abs(value[certain] - centre)))
+    spread = np.nanmax([np.median(half_width[certain]), 0.0])
+    reach = np.nanmax([reach + spread, 2 * result_half_width])
+    marks = [centre - reach, centre + reach]
+    if abs(model - centre) < MAX_MODEL_DISTANCE * reach:
+        marks.append(model)
+    return limits(np.array(marks))
+
+
+def _guides(findings: Findings, name: str, bound: float, series: str) -> Series:
+    """Draw horizontal lines at plus and minus `bound`."""
+    lines = (Line(name, np.full(2, sign * bound), GREY) for sign in (1, -1))
+    return Series(series, _span(findings), tuple(lines))
+
+
+def _span(findings: Findings) -> FloatArray:
+    """Return the start and the end of the clock, s."""
+    clock = findings.plan.clock
+    return np.array([0.0, (clock.count - 1) * clock.dt_secs])
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
