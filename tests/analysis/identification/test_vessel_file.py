@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from ladder import LENGTH, SHIPS, toml_of, vessel_of
+from model_ships import LENGTH, SHIPS, toml_of, vessel_of
 from trial_logs import as_log
 
 from analysis.identification import vessel_file

@@ -16,7 +16,7 @@ def test_every_named_manoeuvre_begins_at_once_and_in_order(name: str) -> None:
     assert max(times) < 900.0
 
 
-def test_a_turning_circle_is_35_degrees_to_starboard_unless_said() -> None:
+def test_a_turning_circle_is_35_degrees_to_starboard_by_default() -> None:
     assert manoeuvre("turning-circle", 100.0, 80.0).orders[1].rudder == pytest.approx(radians(35))
     assert manoeuvre("turning-circle-20", 100.0, 80.0).orders[1].rudder == pytest.approx(
         radians(20)
@@ -26,7 +26,7 @@ def test_a_turning_circle_is_35_degrees_to_starboard_unless_said() -> None:
     )
 
 
-def test_a_zigzag_has_its_rudder_and_its_heading() -> None:
+def test_a_zigzag_takes_its_rudder_and_its_heading_from_the_name() -> None:
     zigzag = manoeuvre("zigzag-10-5.5", 100.0, 80.0).zigzag
     assert zigzag is not None
     assert (zigzag.rudder, zigzag.heading) == pytest.approx((radians(10), radians(5.5)))
@@ -71,6 +71,6 @@ def test_an_unknown_manoeuvre_is_refused_with_the_known_ones(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["zigzag-0-20", "turning-circle-95", "pull-out-0"])
-def test_an_angle_no_rudder_has_is_refused(name: str) -> None:
+def test_a_rudder_angle_out_of_range_is_refused(name: str) -> None:
     with pytest.raises(UsageError, match="cannot be ordered"):
         manoeuvre(name, 100.0, 80.0)

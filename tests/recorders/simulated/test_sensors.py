@@ -14,7 +14,7 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(3)
 
 
-def test_a_perfect_sensor_tells_the_truth_at_its_rate() -> None:
+def test_a_perfect_sensor_measures_the_true_values_at_its_rate() -> None:
     times = sample_times(Sensor(rate_hz=4.0), 10.0, rng())
     assert times == pytest.approx(np.arange(41) / 4)
     truth = np.sin(times)
@@ -28,12 +28,12 @@ def test_jitter_moves_the_instants_by_its_standard_deviation() -> None:
     assert np.std(moved[1:-1]) == pytest.approx(0.005, rel=0.02)
 
 
-@pytest.mark.parametrize(("share", "length"), [(0.05, 0.0), (0.2, 3.0), (0.08, 20.0)])
-def test_dropouts_lose_the_share_asked_for_in_runs_of_the_length(
-    share: float, length: float
+@pytest.mark.parametrize(("fraction", "length"), [(0.05, 0.0), (0.2, 3.0), (0.08, 20.0)])
+def test_dropouts_lose_the_given_fraction_in_gaps_of_the_given_length(
+    fraction: float, length: float
 ) -> None:
-    times = sample_times(Sensor(dropout=share, dropout_secs=length), N / 10, rng())
-    assert 1 - len(times) / (N + 1) == pytest.approx(share, rel=0.1)
+    times = sample_times(Sensor(dropout=fraction, dropout_secs=length), N / 10, rng())
+    assert 1 - len(times) / (N + 1) == pytest.approx(fraction, rel=0.1)
     holes = np.diff(times)
     assert holes[holes > 0.15].min() >= max(length, 0.1)
 
@@ -46,7 +46,7 @@ def test_white_noise_is_gaussian_of_its_standard_deviation_and_bias_of_its_size(
     assert np.mean(((noise - 0.5) / 0.1) ** 4) == pytest.approx(3.0, rel=0.03)
 
 
-def test_the_papers_law_is_the_papers() -> None:
+def test_the_papers_noise_follows_its_formulas() -> None:
     sensors = suite("paper", angle_unit="rad")
     times, truth = np.arange(N) / 10.0, np.full(N, 0.01)
     yaw = corrupt(sensors["yaw_rate"], times, truth, rng()) - 5e-5 * np.sin(times / 10)
@@ -57,7 +57,7 @@ def test_the_papers_law_is_the_papers() -> None:
     assert np.std(speed) == pytest.approx(0.2 / np.sqrt(3), rel=0.01)
 
 
-def test_the_papers_wave_is_in_the_unit_in_which_its_table_is_read() -> None:
+def test_the_papers_slow_error_is_in_the_angle_unit_of_its_table() -> None:
     assert suite("paper", angle_unit="rad")["yaw_rate"].wave == 5e-5
     assert suite("paper", angle_unit="deg")["yaw_rate"].wave == pytest.approx(radians(5e-5))
 
@@ -74,24 +74,24 @@ def test_a_position_has_noise_in_both_components() -> None:
     assert abs(np.corrcoef(noise.T)[0, 1]) < 0.01
 
 
-@pytest.mark.parametrize("share", [0.001, 0.05, 1.0])
-def test_spikes_have_the_share_and_size_asked_for_to_either_side(share: float) -> None:
-    sensor = Sensor(spikes=share, spike_size=0.05)
+@pytest.mark.parametrize("fraction", [0.001, 0.05, 1.0])
+def test_spikes_have_the_given_fraction_and_size_and_both_signs(fraction: float) -> None:
+    sensor = Sensor(spikes=fraction, spike_size=0.05)
     noise = corrupt(sensor, np.arange(N) / 10.0, np.zeros(N), rng())
-    off = noise[noise != 0]
-    assert len(off) / N == pytest.approx(share, rel=4 / np.sqrt(share * N))
-    assert set(off) == {-0.05, 0.05}
-    assert np.mean(off > 0) == pytest.approx(0.5, abs=2 / np.sqrt(len(off)))
+    hit = noise[noise != 0]
+    assert len(hit) / N == pytest.approx(fraction, rel=4 / np.sqrt(fraction * N))
+    assert set(hit) == {-0.05, 0.05}
+    assert np.mean(hit > 0) == pytest.approx(0.5, abs=2 / np.sqrt(len(hit)))
 
 
-def test_spikes_come_alone_as_often_as_chance_has_it() -> None:
+def test_spikes_are_independent_of_each_other() -> None:
     sensor = Sensor(spikes=0.05, spike_size=1.0)
-    off = corrupt(sensor, np.arange(N) / 10.0, np.zeros(N), rng()) != 0
-    assert abs(np.corrcoef(off[1:], off[:-1])[0, 1]) < 4 / np.sqrt(N)
+    hit = corrupt(sensor, np.arange(N) / 10.0, np.zeros(N), rng()) != 0
+    assert abs(np.corrcoef(hit[1:], hit[:-1])[0, 1]) < 4 / np.sqrt(N)
 
 
 @pytest.mark.parametrize("shape", [(N,), (N, 2)])
-def test_all_but_the_spikes_is_as_without_them(shape: tuple[int, ...]) -> None:
+def test_spikes_leave_the_other_noise_unchanged(shape: tuple[int, ...]) -> None:
     plain = Sensor(white=0.1, uniform=0.2)
     spiky = replace(plain, spikes=0.01, spike_size=3.0)
     times, truth, one, other = np.arange(N) / 10.0, np.zeros(shape), rng(), rng()
@@ -100,23 +100,23 @@ def test_all_but_the_spikes_is_as_without_them(shape: tuple[int, ...]) -> None:
     assert np.array_equal(delays(spiky, N, one), delays(plain, N, other))
 
 
-def test_a_size_without_a_share_leaves_all_as_it_was() -> None:
+def test_a_spike_size_without_a_fraction_changes_nothing() -> None:
     times, truth = np.arange(N) / 10.0, np.zeros(N)
     sized = suite("white", {"yaw_rate.spikes": 0.0, "yaw_rate.spike_size": 0.05})["yaw_rate"]
     plain = suite("white")["yaw_rate"]
     assert np.array_equal(corrupt(sized, times, truth, rng()), corrupt(plain, times, truth, rng()))
 
 
-def test_a_spike_puts_all_of_a_position_off() -> None:
+def test_a_spike_of_a_position_has_all_components() -> None:
     sensor = Sensor(spikes=0.02, spike_size=30.0)
     noise = corrupt(sensor, np.arange(N) / 10.0, np.zeros((N, 2)), rng())
-    off = noise != 0
-    assert np.array_equal(off[:, 0], off[:, 1])
-    assert np.mean(off[:, 0]) == pytest.approx(0.02, rel=0.07)
+    hit = noise != 0
+    assert np.array_equal(hit[:, 0], hit[:, 1])
+    assert np.mean(hit[:, 0]) == pytest.approx(0.02, rel=0.07)
 
 
 @pytest.mark.parametrize(
-    ("settings", "said"),
+    ("settings", "message"),
     [
         ({"yawrate.bias": 1.0}, "no sensor 'yawrate'; did you mean 'yaw_rate'"),
         ({"yaw_rate.bais": 1.0}, "no 'bais'; did you mean 'bias'"),
@@ -131,12 +131,12 @@ def test_a_spike_puts_all_of_a_position_off() -> None:
         ({"yaw_rate.spikes": 0.1}, "no size; give yaw_rate.spike_size"),
     ],
 )
-def test_a_setting_that_makes_no_sense_is_refused(settings: dict[str, float], said: str) -> None:
-    with pytest.raises(UsageError, match=said):
+def test_an_invalid_setting_is_refused(settings: dict[str, float], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
         suite("paper", settings)
 
 
-def test_a_sway_is_measured_where_it_is_asked_for() -> None:
+def test_sway_is_measured_where_a_setting_names_it() -> None:
     assert "sway" not in suite("paper")
     assert suite("paper", {"sway.white": 0.05, "sway.rate_hz": 2.0})["sway"] == Sensor(
         rate_hz=2.0, white=0.05

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ladder import vessel_of
+from model_ships import vessel_of
 from places import SAMPLE_DATA
 
 from recorders.record import record
@@ -13,7 +13,7 @@ from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import RandomForcing
 from shiplog import UsageError, Vessel, read
 
-UNREST = RandomForcing(rudder=radians(0.5), force=0.01)
+FORCING = RandomForcing(rudder=radians(0.5), force=0.01)
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(
@@ -47,7 +47,7 @@ def test_changing_one_sensor_leaves_the_others_noise_alone(vessel: Vessel) -> No
         ("pseudo_random", "pseudo-random", 600.0, 4),
     ],
 )
-def test_what_a_seed_gave_when_the_sample_data_were_made_it_still_gives(
+def test_a_seed_still_gives_the_samples_of_the_sample_data(
     vessel: Vessel, name: str, ordered: str, duration: float, seed: int
 ) -> None:
     trial = simulate(vessel, ordered, duration_secs=duration, seed=seed)
@@ -60,7 +60,7 @@ def test_what_a_seed_gave_when_the_sample_data_were_made_it_still_gives(
             assert one.values == pytest.approx(other.values, rel=1e-9, abs=1e-9)
 
 
-def test_an_unrest_repeats_with_its_seed_and_leaves_the_sensors_noise_alone(
+def test_a_random_forcing_repeats_with_its_seed_and_leaves_sensor_noise_alone(
     vessel: Vessel,
 ) -> None:
     def given(seed: int, random_forcing: RandomForcing | None) -> dict[str, np.ndarray]:
@@ -74,7 +74,12 @@ def test_an_unrest_repeats_with_its_seed_and_leaves_the_sensors_noise_alone(
         pushed = trial.truth()["yaw_disturbance"].values
         return {"pushed": pushed, "speed": noise["speed"], "rudder": noise["rudder"]}
 
-    one, again, other, calm = given(3, UNREST), given(3, UNREST), given(4, UNREST), given(3, None)
+    one, again, other, calm = (
+        given(3, FORCING),
+        given(3, FORCING),
+        given(4, FORCING),
+        given(3, None),
+    )
     assert np.array_equal(one["pushed"], again["pushed"])
     assert not np.isin(one["pushed"], other["pushed"]).any()
     assert np.ptp(calm["pushed"]) == 0
@@ -82,35 +87,35 @@ def test_an_unrest_repeats_with_its_seed_and_leaves_the_sensors_noise_alone(
     assert one["rudder"] == pytest.approx(calm["rudder"], abs=1e-12)
 
 
-def test_an_unrests_bytes_are_those_of_its_seed(vessel: Vessel, tmp_path: Path) -> None:
+def test_a_random_forcing_gives_the_same_bytes_for_a_seed(vessel: Vessel, tmp_path: Path) -> None:
     def bytes_of(seed: int) -> bytes:
         path = tmp_path / "a.mcap"
         record(
-            simulate(vessel, "spiral", duration_secs=60.0, seed=seed, random_forcing=UNREST), path
+            simulate(vessel, "spiral", duration_secs=60.0, seed=seed, random_forcing=FORCING), path
         )
         return path.read_bytes()
 
     assert bytes_of(7) == bytes_of(7) != bytes_of(8)
 
 
-def test_an_unrest_of_nothing_changes_no_sample(vessel: Vessel) -> None:
+def test_a_random_forcing_of_zero_changes_no_sample(vessel: Vessel) -> None:
     calm = simulate(vessel, "zigzag-20-20", duration_secs=150.0)
     still = simulate(vessel, "zigzag-20-20", duration_secs=150.0, random_forcing=RandomForcing())
     for one, other in zip(calm.channels, still.channels, strict=True):
         assert np.array_equal(one.values, other.values)
 
 
-def test_the_truth_tells_of_a_surge_force_only_where_there_was_an_unrest(vessel: Vessel) -> None:
+def test_the_truth_has_a_surge_force_only_with_a_random_forcing(vessel: Vessel) -> None:
     calm = simulate(vessel, "spiral", duration_secs=20.0).truth()
-    pushed = simulate(vessel, "spiral", duration_secs=20.0, random_forcing=UNREST).truth()
+    pushed = simulate(vessel, "spiral", duration_secs=20.0, random_forcing=FORCING).truth()
     assert "surge_disturbance" not in [c.name for c in calm]
     assert pushed["surge_disturbance"].unit == "m/s²"
     assert len(pushed["surge_disturbance"]) == 201
 
 
-def test_a_longer_trial_begins_with_the_unrest_of_the_shorter(vessel: Vessel) -> None:
+def test_a_longer_trial_starts_with_the_random_forcing_of_the_shorter(vessel: Vessel) -> None:
     short, long = (
-        simulate(vessel, "spiral", duration_secs=duration, random_forcing=UNREST).truth()
+        simulate(vessel, "spiral", duration_secs=duration, random_forcing=FORCING).truth()
         for duration in (30.0, 60.0)
     )
     for name in ("yaw_disturbance", "surge_disturbance"):
@@ -118,7 +123,7 @@ def test_a_longer_trial_begins_with_the_unrest_of_the_shorter(vessel: Vessel) ->
 
 
 @pytest.mark.parametrize("size", [-0.1, nan, inf])
-def test_an_unrest_that_is_none_is_refused(vessel: Vessel, size: float) -> None:
+def test_an_invalid_random_forcing_is_refused(vessel: Vessel, size: float) -> None:
     for random_forcing in (RandomForcing(rudder=size), RandomForcing(force=size)):
         with pytest.raises(UsageError, match="must be finite and not negative"):
             simulate(vessel, "spiral", duration_secs=10.0, random_forcing=random_forcing)
@@ -137,18 +142,18 @@ def test_chunks_hold_every_sample_once_in_the_order_of_reception(
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_duration_that_is_none_is_refused(vessel: Vessel, duration: float) -> None:
+def test_an_invalid_duration_is_refused(vessel: Vessel, duration: float) -> None:
     with pytest.raises(UsageError, match="duration must be positive"):
         simulate(vessel, "spiral", duration_secs=duration)
 
 
-def test_a_ship_that_runs_away_is_refused_by_name(vessel: Vessel) -> None:
+def test_a_diverging_simulation_is_refused_with_the_ships_name(vessel: Vessel) -> None:
     wild = replace(vessel, name="wild", coefficients=vessel.coefficients._replace(b3=1e4, a=0.5))
     with pytest.raises(UsageError, match="simulation of wild diverges"):
         simulate(wild, "turning-circle", duration_secs=500.0)
 
 
-def test_a_ship_with_a_sway_tells_it_where_she_is_asked(vessel: Vessel) -> None:
+def test_sway_is_measured_and_true_only_for_a_model_with_sway(vessel: Vessel) -> None:
     asked = suite("none", {"sway.white": 0.0})
     rich, plain = (
         simulate(ship, "zigzag-20-20", duration_secs=60.0, sensors=asked)

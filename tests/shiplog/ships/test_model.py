@@ -1,4 +1,4 @@
-"""Ship models: one interface, right motion, exact sensitivities."""
+"""Ship models: simulated runs and sensitivities against independent references."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -26,7 +26,7 @@ LENGTH, SPEED, RPM = 160.0, 8.0, 90.0
 TOLERANCES = {"yaw_rate": 1e-7, "speed": 1e-5, "sway": 1e-5, "heading": 1e-5}
 
 
-# ---- the models once more, from their descriptions: rates of the state, and what is observed
+# ---- the models written again from their descriptions: rates of the state, and outputs
 
 
 Oracle = Callable[[SimpleNamespace, FloatArray, float, float, float], tuple[list[float], ...]]
@@ -123,14 +123,14 @@ ORACLES: dict[str, Oracle] = {
 
 
 def a_run(seconds: float = 120.0) -> Signals:
-    """A rudder to one side and to the other, in straight lines with knots on samples."""
+    """A rudder to both sides, in straight lines with knots on samples."""
     time = np.arange(round(seconds / DT) + 1) * DT
     rudder = np.interp(time, [5.0, 15.0, 40.0, 60.0], np.radians([0.0, 15.0, 15.0, -15.0]))
     return Signals(0, DT, {"rudder": rudder, "rpm": np.where(time < 70, 90.0, 80.0)})
 
 
 def a_ship(name: str) -> tuple[Model, FloatArray, FloatArray, Scale]:
-    """A model, parameters at which all of it acts, an initial state, and its scale."""
+    """A model, parameters at which every term acts, an initial state, and the scale."""
     model = ship_model(name)
     start = model.start_values()
     parameters = start + 0.1 * np.where(start == 0, 1.0, np.abs(start))
@@ -145,7 +145,7 @@ def a_ship(name: str) -> tuple[Model, FloatArray, FloatArray, Scale]:
 def integrated(
     name: str, parameters: FloatArray, state: FloatArray, signals: Signals, offset: float
 ) -> FloatArray:
-    """(n, 4) the outputs by scipy: the rudder in straight lines, revolutions until the next."""
+    """(n, 4) the outputs by scipy: a linear rudder between samples, constant revolutions."""
     model, secs = ship_model(name), LENGTH / SPEED
     units = (1.0, 1.0, 1.0) if "burylin" in name else (secs, SPEED, RPM)
     c = SimpleNamespace(**dict(zip(model.names, parameters.tolist(), strict=True)))
@@ -166,7 +166,7 @@ def integrated(
 
 
 @pytest.mark.parametrize("name", model_names())
-def test_every_model_moves_as_scipy_integrates_its_equations(name: str) -> None:
+def test_every_model_agrees_with_scipys_integration_of_its_equations(name: str) -> None:
     model, parameters, state, scale = a_ship(name)
     signals = a_run()
     found = model.simulate(
@@ -179,7 +179,7 @@ def test_every_model_moves_as_scipy_integrates_its_equations(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", model_names())
-def test_sensitivities_are_the_derivatives(name: str) -> None:
+def test_sensitivities_are_the_derivatives_of_the_outputs(name: str) -> None:
     model, parameters, state, scale = a_ship(name)
     signals = a_run()
     path, n, p = input_path(signals), len(signals), len(parameters)
@@ -199,24 +199,24 @@ def test_sensitivities_are_the_derivatives(name: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def voyage(vessel: Vessel) -> SimulatedTrial:
+def trial(vessel: Vessel) -> SimulatedTrial:
     return simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=suite("none"))
 
 
-def test_the_papers_model_is_the_one_that_is_simulated(
-    voyage: SimulatedTrial, vessel: Vessel
+def test_the_papers_model_reproduces_the_recorder_simulation(
+    trial: SimulatedTrial, vessel: Vessel
 ) -> None:
-    signals = resample(as_log(voyage), channels=("yaw_rate", "speed", "rudder", "rpm"))
+    signals = resample(as_log(trial), channels=("yaw_rate", "speed", "rudder", "rpm"))
     model = ship_model("burylin")
     state = np.array([0.0, 0.0, signals["speed"][0], 0.0])
     parameters = np.array(vessel.coefficients)
     out = model.simulate(parameters, state, input_path(signals), len(signals))
-    # the rudder's knots lie between samples: without them these would be off by 3e-6
+    # the rudder's knots lie between samples: without them the error would be 3e-6
     np.testing.assert_allclose(out[:, 0], signals["yaw_rate"], atol=2e-9)
     np.testing.assert_allclose(out[:, 1], signals["speed"], atol=1e-7)
 
 
-def test_knots_between_samples_are_put_back() -> None:
+def test_knots_between_samples_are_restored() -> None:
     time = np.arange(0.0, 40.0, 1.0)
     knots, angles = [10.3, 14.7, 25.45, 33.2], [0.0, 0.2, 0.2, -0.1]
     rudder = np.interp(time, knots, angles)
@@ -227,28 +227,28 @@ def test_knots_between_samples_are_put_back() -> None:
     assert path.sample[path.sample >= 0].tolist() == list(range(1, 40))
 
 
-def test_a_rudder_that_is_not_straight_is_left_as_it_was_measured() -> None:
+def test_a_rudder_without_straight_lines_keeps_its_samples() -> None:
     rudder = np.random.default_rng(1).normal(size=50)
     path = input_path(Signals(0, 1.0, {"rudder": rudder, "rpm": np.full(50, 80.0)}))
     assert len(path.secs) == 49
     np.testing.assert_array_equal(path.delta, rudder[:-1])
 
 
-def test_a_slow_clock_is_walked_in_short_steps() -> None:
+def test_a_slow_clock_is_divided_into_short_steps() -> None:
     path = input_path(Signals(0, 10.0, {"rudder": np.linspace(0, 1, 4), "rpm": np.full(4, 80.0)}))
     assert path.secs.max() <= 2.0
     assert path.sample[path.sample >= 0].tolist() == [1, 2, 3]
     np.testing.assert_allclose(path.secs.sum(), 30.0)
 
 
-def test_the_ties_leave_the_papers_own_coefficients(vessel: Vessel) -> None:
+def test_the_tied_model_expands_to_the_papers_coefficients(vessel: Vessel) -> None:
     model, c = ship_model("burylin-tied"), vessel.coefficients
     values = c._asdict() | {"T3": c.e / c.d}
     tied = model.expand(np.array([values[name] for name in model.names], complex))
     np.testing.assert_allclose(np.real(tied), c, rtol=1e-12)
 
 
-def test_a_ship_that_runs_away_ends_in_nan() -> None:
+def test_a_diverging_run_ends_in_nan() -> None:
     model, parameters, state, scale = a_ship("slipstream")
     parameters[model.names.index("b2")] = 50.0
     out = model.simulate(parameters, state, input_path(a_run()), 121, scale=scale)
@@ -263,6 +263,6 @@ def test_a_type_without_equations_is_reported() -> None:
         observed((), ())
 
 
-def test_outputs_of_a_model_are_known_ones() -> None:
+def test_the_outputs_of_a_model_are_among_those_of_all_models() -> None:
     for name in model_names():
         assert set(ship_model(name).outputs) <= set(MODEL_OUTPUTS)

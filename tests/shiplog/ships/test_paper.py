@@ -48,7 +48,7 @@ def test_port_mirrors_starboard() -> None:
 
 @pytest.mark.parametrize("n_dot", [0.0, 0.5])
 @pytest.mark.parametrize("v_dot", [0.0, -0.02])
-def test_the_rate_of_the_rudder_effect_is_its_derivative(v_dot: float, n_dot: float) -> None:
+def test_the_rate_of_the_rudder_effectiveness_is_its_derivative(v_dot: float, n_dot: float) -> None:
     v, n, h = 9.0, 80.0, 1e-3
     ahead = rudder_effect(TABLE1, v + v_dot * h, n + n_dot * h)
     behind = rudder_effect(TABLE1, v - v_dot * h, n - n_dot * h)

@@ -1,11 +1,11 @@
-"""A ship under way: every model's equations in SI, what pushes her, and where she goes."""
+"""A ship of any model in SI: its equations, disturbances and position."""
 
 from itertools import pairwise
 from math import radians
 
 import numpy as np
 import pytest
-from ladder import RPM, SHIPS, SPEED, approach, rates_in_si, vessel_of
+from model_ships import RPM, SHIPS, SPEED, approach, rates_in_si, vessel_of
 from scipy.integrate import solve_ivp
 
 from shiplog import Vessel, load_vessel
@@ -31,7 +31,7 @@ def papers(c: Coefficients = TABLE1) -> Ship:
 # ---- the paper's ship
 
 
-def test_the_papers_ship_moves_by_the_equations_filters_have_to_the_last_bit() -> None:
+def test_the_papers_ship_has_the_equations_of_the_filters_to_the_last_bit() -> None:
     rng, ship = np.random.default_rng(0), papers()
     constants = ship.constants(9.0, 80.0)
     for w, w_dot, v, delta, rate in rng.normal(size=(100, 5)) * (0.01, 1e-4, 3.0, 0.3, 0.04):
@@ -45,7 +45,7 @@ def test_the_papers_ship_moves_by_the_equations_filters_have_to_the_last_bit() -
         assert found[4:] == pytest.approx((9 + v) * np.array([np.cos(0.3), np.sin(0.3)]))
 
 
-def test_a_moment_of_the_papers_ship_stands_in_her_yaw_alone() -> None:
+def test_a_moment_acts_on_the_yaw_of_the_papers_ship_alone() -> None:
     constants = papers().constants(9.0, 80.0)
     size = TABLE1.d * rudder_effect(TABLE1, 9.0, 80.0)
     assert constants.per_rudder.tolist() == [0.0, size, 0.0, 0.0]
@@ -61,7 +61,7 @@ def test_a_moment_and_a_force_add_to_yaw_and_surge_alone() -> None:
     assert pushed - free == pytest.approx([0, size, 0.03, 0, 0, 0], abs=1e-15)
 
 
-def test_a_ship_that_nothing_holds_back_gains_what_the_forces_give() -> None:
+def test_a_ship_without_hull_forces_accelerates_by_the_disturbances() -> None:
     free = papers(Coefficients(*[0.0] * 12))
     constants = free.constants(1.0, 0.0)._replace(per_rudder=np.array([0.0, 1.0, 0.0, 0.0]))
     pushed = straight_run(0)._replace(moment=2e-5, force=0.03)
@@ -71,15 +71,15 @@ def test_a_ship_that_nothing_holds_back_gains_what_the_forces_give() -> None:
     assert after[:3] == pytest.approx([4e-5, 4e-5, 1.06])
 
 
-def test_the_papers_ship_begins_at_her_speed_in_closed_form(vessel: Vessel) -> None:
+def test_the_papers_ship_starts_at_the_steady_speed_in_closed_form(vessel: Vessel) -> None:
     assert ship_from_vessel(vessel).steady_speed(80.0) == steady_speed(TABLE1, 80.0)
 
 
-# ---- any model's
+# ---- any model
 
 
 @pytest.mark.parametrize("name", SHIPS)
-def test_a_straight_run_settles_where_nothing_changes_the_speed(name: str) -> None:
+def test_at_the_steady_speed_the_speed_does_not_change(name: str) -> None:
     ship = ship_from_vessel(vessel_of(name))
     speed = ship.steady_speed(RPM)
     assert speed == pytest.approx(approach(name), rel=1e-12)
@@ -97,14 +97,14 @@ def test_a_straight_run_settles_where_nothing_changes_the_speed(name: str) -> No
 
 
 @pytest.mark.parametrize("changes", [{"h": -0.01}, {"g": 0.0}])
-def test_a_ship_without_a_steady_speed_has_none(changes: dict[str, float]) -> None:
+def test_without_thrust_or_resistance_the_steady_speed_is_zero(changes: dict[str, float]) -> None:
     ship = ship_from_vessel(vessel_of("nomoto"))
     other = Ship(ship.model, ship.coefficients._replace(**changes), ship.scale)
     assert other.steady_speed(RPM) == 0.0
 
 
 @pytest.mark.parametrize("name", SHIPS)
-def test_the_rates_in_si_are_those_of_the_equations_as_printed(name: str) -> None:
+def test_the_rates_in_si_are_those_of_the_documented_equations(name: str) -> None:
     ship, rng = ship_from_vessel(vessel_of(name)), np.random.default_rng(1)
     speed = approach(name)
     constants, straight_state = ship.constants(speed, RPM), ship.straight_state(speed)
@@ -116,12 +116,12 @@ def test_the_rates_in_si_are_those_of_the_equations_as_printed(name: str) -> Non
         found = rates_si(ship.coefficients, constants, x, acting, 3.0, 0.5)
         moment = 0.02 + 0.01 * np.sin(0.7 * 3.5)
         rudder = acting.delta + 0.5 * acting.delta_dot, acting.delta_dot
-        expected = rates_in_si(name, x, rudder, 80.0, worth=moment, force=0.03)
+        expected = rates_in_si(name, x, rudder, 80.0, moment=moment, force=0.03)
         assert found == pytest.approx(expected, rel=1e-11, abs=1e-13)
 
 
 @pytest.mark.parametrize("name", SHIPS)
-def test_a_moment_pushes_to_its_side_and_slows_nobody(name: str) -> None:
+def test_a_moment_turns_to_its_side_and_leaves_the_speed(name: str) -> None:
     ship = ship_from_vessel(vessel_of(name))
     constants = ship.constants(SPEED, RPM)
     size, unit = ship.moment_per_rudder(constants)
@@ -130,16 +130,16 @@ def test_a_moment_pushes_to_its_side_and_slows_nobody(name: str) -> None:
     assert constants.per_rudder[constants.ahead] == 0
 
 
-# ---- Runge and Kutta's error
+# ---- the error of Runge-Kutta
 
 
 def hard_over(t: float, start: float, rate: float) -> float:
-    """The rudder on its way to 35°."""
+    """The rudder while it moves to 35°."""
     return min(max(t - start, 0.0) * rate, radians(35))
 
 
 def stepped(start: float, rate: float) -> np.ndarray:
-    """w, w' and v every 0.1 s of 200 s, (2000, 3): a step a sample, whatever the rudder does."""
+    """w, w' and v every 0.1 s for 200 s, (2000, 3), one step a sample without regard to knots."""
     ship, found, work = papers(), [], np.empty((3, 6))
     state = ship.straight_state(steady_speed(TABLE1, 80.0))
     constants = ship.constants(state[2], 80.0)
@@ -152,7 +152,7 @@ def stepped(start: float, rate: float) -> np.ndarray:
 
 
 def exact(start: float, rate: float) -> np.ndarray:
-    """The same by another integrator, from knot to knot of the rudder."""
+    """The same by an independent integrator, from knot to knot of the rudder."""
     c, x, parts = TABLE1, np.array([0.0, 0.0, steady_speed(TABLE1, 80.0)]), []
 
     def moving(t: float, x: np.ndarray, delta_dot: float) -> list[float]:
@@ -173,13 +173,13 @@ def exact(start: float, rate: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    # identification, section 3: 4e-11 with knots on the grid, 3e-6 off it, of each state's size
+    # of the size of each state: 4e-11 with knots on the steps, 3e-6 with knots between them
     ("start", "rate_deg", "least", "most"),
     [(10.0, 2.5, 0.0, 5e-11), (10.0, 2.3456, 2.5e-6, 3.5e-6), (10.03, 2.3456, 2.5e-6, 4e-6)],
 )
-def test_runge_kutta_at_a_tenth_of_a_second_wants_the_rudders_knots_on_its_grid(
+def test_runge_kutta_at_a_tenth_of_a_second_needs_the_rudders_knots_on_its_steps(
     start: float, rate_deg: float, least: float, most: float
 ) -> None:
     true = exact(start, radians(rate_deg))
-    off = np.abs(stepped(start, radians(rate_deg)) - true) / np.abs(true).max(axis=0)
-    assert least <= off.max() < most
+    error = np.abs(stepped(start, radians(rate_deg)) - true) / np.abs(true).max(axis=0)
+    assert least <= error.max() < most

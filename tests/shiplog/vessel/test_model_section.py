@@ -3,7 +3,7 @@
 from math import radians
 
 import pytest
-from ladder import LENGTH, RPM, SHIPS, SPEED, toml_of
+from model_ships import LENGTH, RPM, SHIPS, SPEED, toml_of
 from places import PROJECT
 
 from shiplog import VesselError, load_vessel

@@ -1,4 +1,4 @@
-"""A ship of each model of the ladder, as a vessel file, and her equations written out once more."""
+"""A ship of each dimensionless model: its vessel file, and its equations written a second time."""
 
 from collections.abc import Callable, Mapping
 
@@ -28,7 +28,7 @@ SHIPS: dict[str, dict[str, float]] = {
 
 
 def toml_of(name: str, parameters: Mapping[str, float] | None = None, head: str = "") -> str:
-    """The vessel file of a ship of that model, `[model]` alone."""
+    """The text of the vessel file of a ship of a model, with the section `[model]` alone."""
     values = SHIPS[name] if parameters is None else parameters
     lines = [f'name = "a {name}"', f"length = {LENGTH}", f"approach_rpm = {RPM}", head]
     lines += ["[model]", f'name = "{name}"', f"speed = {SPEED}", f"rpm = {RPM}"]
@@ -39,40 +39,40 @@ def vessel_of(name: str) -> Vessel:
     return parse_vessel(toml_of(name), f"{name}.toml")
 
 
-# ---- the equations as the models' files print them: (rates, speed ahead, sway), no dimensions
+# ---- the equations as the models' files document them: rates, speed ahead and sway
 
-Moving = tuple[list[float], float, float]
+Motion = tuple[list[float], float, float]
 
 
-def _first_order(p: Mapping[str, float], x: FloatArray, d: float, _: float, n: float) -> Moving:
+def _first_order(p: Mapping[str, float], x: FloatArray, d: float, _: float, n: float) -> Motion:
     r, u = x[:2]
-    turning = p["a"] * r + p.get("a3", 0.0) * r**3 + p["k"] * d
-    return [turning, p["f"] * r**2 + p["g"] * u**2 + p["h"] * n, r], u, 0.0
+    yaw = p["a"] * r + p.get("a3", 0.0) * r**3 + p["k"] * d
+    return [yaw, p["f"] * r**2 + p["g"] * u**2 + p["h"] * n, r], u, 0.0
 
 
-def _turning(p: Mapping[str, float], r: float, r_dot: float, u: float, d: float, d_dot: float,
+def _yaw(p: Mapping[str, float], r: float, r_dot: float, u: float, d: float, d_dot: float,
              n: float) -> float:  # fmt: skip
     ks = p["k"] * ((1 - p["m"]) * u**2 + p["m"] * n**2)
     hull = p["a"] * u * r_dot + p["b1"] * u**2 * r + p["b2"] * u * r * abs(r)
     return hull + ks * (u * d + p["T3"] * d_dot)
 
 
-def _slipstream(p: Mapping[str, float], x: FloatArray, d: float, d_dot: float, n: float) -> Moving:
+def _slipstream(p: Mapping[str, float], x: FloatArray, d: float, d_dot: float, n: float) -> Motion:
     r, r_dot, u = x[:3]
     v = p["c1"] * r + p["c2"] * r * abs(r) / u
     surge = p["f"] * r**2 + p["g"] * u**2 + p["h"] * n
-    return [r_dot, _turning(p, r, r_dot, u, d, d_dot, n), surge, r], np.sqrt(u**2 - v**2), v
+    return [r_dot, _yaw(p, r, r_dot, u, d, d_dot, n), surge, r], np.sqrt(u**2 - v**2), v
 
 
-def _drift_lag(p: Mapping[str, float], x: FloatArray, d: float, d_dot: float, n: float) -> Moving:
+def _drift_lag(p: Mapping[str, float], x: FloatArray, d: float, d_dot: float, n: float) -> Motion:
     r, r_dot, u, v = x[:4]
     surge = p["f"] * r**2 + p["f1"] * r * v + p["f2"] * v**2 + p["g"] * u**2 + p["h"] * n
     drift = (p["c1"] * u * r + p["c2"] * r * abs(r) - u * v) / p["Td"]
-    turning = _turning(p, r, r_dot, u, d, d_dot, n) + p["e0"] * u * n**2
-    return [r_dot, turning, surge, drift, r], np.sqrt(u**2 - v**2), v
+    yaw = _yaw(p, r, r_dot, u, d, d_dot, n) + p["e0"] * u * n**2
+    return [r_dot, yaw, surge, drift, r], np.sqrt(u**2 - v**2), v
 
 
-def _three_dof(p: Mapping[str, float], x: FloatArray, d: float, _: float, n: float) -> Moving:
+def _three_dof(p: Mapping[str, float], x: FloatArray, d: float, _: float, n: float) -> Motion:
     r, v, u = x[:3]
     at, weights = np.polynomial.legendre.leggauss(5)
     flow = v + at / 2 * r
@@ -82,12 +82,12 @@ def _three_dof(p: Mapping[str, float], x: FloatArray, d: float, _: float, n: flo
     force = s * d + p["w"] * np.sqrt(s) * (v - 0.8 * r)
     surge = p["h"] * (n * (n + p["p"] * (n - u)) - (1 + p["g"]) * u**2) + p["xd"] * force * d
     surge += p["xvr"] * v * r + p["x4"] * v**4 / (u**2 + v**2)
-    turning = p["nv"] * u * v + p["nr"] * u * r - p["cn"] * moment + p["nd"] * force
+    yaw = p["nv"] * u * v + p["nr"] * u * r - p["cn"] * moment + p["nd"] * force
     drift = p["yv"] * u * v + p["yr"] * u * r - p["cy"] * y + p["yd"] * force
-    return [turning, drift, surge, r], u, v
+    return [yaw, drift, surge, r], u, v
 
 
-MOVING: dict[str, Callable[..., Moving]] = {
+EQUATIONS: dict[str, Callable[..., Motion]] = {
     "nomoto": _first_order,
     "norrbin": _first_order,
     "slipstream": _slipstream,
@@ -98,16 +98,16 @@ AHEAD = {"nomoto": 1, "norrbin": 1, "slipstream": 2, "drift-lag": 2, "three-dof"
 
 
 def rates_in_si(name: str, x: FloatArray, rudder: tuple[float, float], rpm: float,
-                *, worth: float = 0.0, force: float = 0.0) -> FloatArray:  # fmt: skip
-    """Of a state without dimensions and, after it, metres made good: what changes them, per s.
+                *, moment: float = 0.0, force: float = 0.0) -> FloatArray:  # fmt: skip
+    """The rates per s of a dimensionless state, and after it of the position in metres.
 
-    `worth` is a yaw moment as the rudder that turns as much in an approach at `RPM`.
+    `moment` is a yaw moment as the rudder that turns the ship as much on its approach at `RPM`.
     """
     p, secs, (d, d_dot) = SHIPS[name], LENGTH / SPEED, rudder
-    own, ahead, sway = MOVING[name](p, x, d, d_dot * secs, rpm / RPM)
-    begun = np.zeros(len(own))
-    begun[AHEAD[name]] = approach(name) / SPEED
-    sides = [np.array(MOVING[name](p, begun, side * worth, 0.0, 1.0)[0]) for side in (1, -1)]
+    own, ahead, sway = EQUATIONS[name](p, x, d, d_dot * secs, rpm / RPM)
+    straight = np.zeros(len(own))
+    straight[AHEAD[name]] = approach(name) / SPEED
+    sides = [np.array(EQUATIONS[name](p, straight, side * moment, 0.0, 1.0)[0]) for side in (1, -1)]
     rates = (np.array(own) + (sides[0] - sides[1]) / 2) / secs
     rates[AHEAD[name]] += force / SPEED
     heading = x[len(own) - 1]
@@ -116,7 +116,7 @@ def rates_in_si(name: str, x: FloatArray, rudder: tuple[float, float], rpm: floa
 
 
 def approach(name: str) -> float:
-    """The steady speed at `RPM`, m/s; the surge equations above solved by hand."""
+    """The steady speed at `RPM`, m/s: the surge equations above solved by hand."""
     p = SHIPS[name]
     if name != "three-dof":
         return SPEED * float(np.sqrt(p["h"] / -p["g"]))
