@@ -13,7 +13,7 @@ from shiplog.errors import LogError
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model, ship_model
 from shiplog.ships.paper import COEFFICIENT_UNITS, YAW_COEFFICIENTS, Coefficients, rudder_effect
-from shiplog.vessel.model_section import PAPERS
+from shiplog.vessel.model_section import PAPER_MODELS
 from shiplog.vessel.vessel import Vessel
 
 from .identify import ALPHAS, IdentifiedShip
@@ -45,7 +45,7 @@ def vessel_toml(found: IdentifiedShip, on_progress: ProgressCallback = no_progre
             f"nothing of the {part} is identifiable from these logs, and a vessel file "
             "would hold numbers nobody knows; give a log of a zig-zag as well"
         )
-    if found.model.name in PAPERS:
+    if found.model.name in PAPER_MODELS:
         own = [*_head(found), *_paper(found.fit, found.uncertainty, _angle_unit(found.vessel))]
         return _text([*own, *_rudder(found.vessel, found.fit)])
     own = [*_head(found), *_model(found)]

@@ -1,5 +1,7 @@
-"""The vessel file: a ship's coefficients, steering gear, model and replay settings.
+"""Vessel files: a ship's coefficients, steering gear, simulation model and replay settings.
 
-`vessel` parses the file and reports all its errors at once, `settings` defines every key of
-`[filter]`, `[disturbance]` and `[identifier]`, `model_section` the `[model]`.
+`vessel_parser` reads a file and reports all its errors at once, `presets` has the files that come
+with shiplog, `settings` defines the keys of `[filter]`, `[disturbance]` and `[identifier]`,
+`model_section` those of `[model]`, `ship` makes the ship for simulation. This folder must not
+import `shiplog.mcap`, `shiplog.tables`, recorders or estimators.
 """

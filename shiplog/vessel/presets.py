@@ -1,4 +1,9 @@
-"""Texts of the vessel files that come with shiplog."""
+"""Vessel files that come with shiplog, as texts: the ship of the identification paper.
+
+`table1` reads the angles of the paper's Table 1 in degrees, `table1-rad` in radians. The same files
+are in `sample_data/vessels`. A log carries its vessel file, so that a change of these texts would
+change recorded logs.
+"""
 
 from math import pi
 

@@ -1,6 +1,6 @@
-"""How a log is replayed: `[filter]`, `[disturbance]` and `[identifier]` of a vessel file.
+"""Replay settings: the keys of `[filter]`, `[disturbance]` and `[identifier]` of a vessel file.
 
-Each key is a field; its kind and its limits stand beside it.
+Each key is a field of a dataclass; the field's metadata has its type and its limits.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,11 +11,11 @@ from typing import Any, TypeVar
 from shiplog.units import did_you_mean
 
 FILTERS = ("pseudo-input", "steady-state", "quality", "per-tick", "extended")
-SMOOTHED = ("pseudo-input", "extended")  # whose gain is the one that a smoother goes back from
+SMOOTHED = ("pseudo-input", "extended")  # optimal gain, which the smoother's equations assume
 DISTURBANCES = ("constant", "ramp", "wave")
 SPECTRA = ("butterworth", "binomial")
 
-MIN_WINDOW_SECS = 60.0  # one bump of the equations in integral form
+MIN_WINDOW_SECS = 60.0  # length of one test function of the equations in integral form
 
 Settings = TypeVar("Settings", "FilterSettings", "DisturbanceSettings", "IdentifierSettings")
 
@@ -39,55 +39,104 @@ def _choice(
 
 @dataclass(frozen=True)
 class FilterSettings:
-    """What a vessel file says of the filter; None where the log itself shall tell."""
+    """Settings of the state estimator, `[filter]`; None where the value follows from the log.
+
+    Attributes
+    ----------
+    kind
+        Name of the filter; None selects `pseudo-input`, or `extended` if `wave` is set.
+    smooth
+        Smooth the estimates backwards from the end of the log.
+    gate
+        Innovations larger than this many standard deviations are rejected.
+    yaw_rate_std
+        Standard deviation of the white noise of one sample of the yaw rate, rad/s.
+    speed_std
+        The same of the speed, m/s.
+    process_ratio
+        Intensity of the process noise over that of the measurement noise, 1/s^2: Q/R of the
+        identification paper.
+    as_printed
+        pseudo-input only: use the paper's equations as printed, without the jumps of the yaw
+        acceleration when the rudder moves.
+    yaw_bandwidth, surge_bandwidth
+        All filters but pseudo-input: bandwidth of the estimates in yaw and in surge, rad/s, in
+        place of `process_ratio`.
+    shift
+        quality only: every pole lies left of minus half this value, 1/s.
+    damping
+        quality only: weight G of the yaw acceleration, over the intensity R of the measurement
+        noise.
+    yaw_decay, surge_decay
+        per-tick only: minus the double pole of yaw and minus the pole of surge, 1/s.
+    wave
+        Separate waves in the yaw rate from the ship's own turning.
+    wave_frequency, wave_damping, wave_std
+        Frequency in rad/s, damping ratio, and standard deviation in rad/s of the wave model.
+    """
 
     kind: str | None = _choice(FILTERS, None)
-    smooth: bool = _flag()  # back from the end, too
-    gate: float = _number(6.0, positive=True, most=1e9)  # standard deviations a sample may be off
-    yaw_rate_std: float | None = _number(positive=True, most=10.0)  # rad/s, white, of one sample
-    speed_std: float | None = _number(positive=True, most=100.0)  # m/s
-    process_ratio: float | None = _number(positive=True, most=1e12)  # 1/s^2, the paper's Q/R
-    as_printed: bool = _flag()  # pseudo-input: without the jumps that the rudder makes
-    # the others: how fast the estimate follows what is measured, rad/s
+    smooth: bool = _flag()
+    gate: float = _number(6.0, positive=True, most=1e9)
+    yaw_rate_std: float | None = _number(positive=True, most=10.0)
+    speed_std: float | None = _number(positive=True, most=100.0)
+    process_ratio: float | None = _number(positive=True, most=1e12)
+    as_printed: bool = _flag()
     yaw_bandwidth: float | None = _number(positive=True, most=1e3)
     surge_bandwidth: float | None = _number(positive=True, most=1e3)
-    # quality: every pole is left of half the shift, 1/s; its G on the yaw acceleration, over R
     shift: float = _number(0.1, least=0.0, most=1e3)
     damping: float = _number(0.0, least=0.0, most=1e6)
-    # per-tick: minus the poles of yaw, a double one, and of surge, 1/s
     yaw_decay: float | None = _number(positive=True, most=1e3)
     surge_decay: float | None = _number(positive=True, most=1e3)
-    wave: bool = _flag()  # waves in the yaw rate are told from the ship's own turning
-    wave_frequency: float | None = _number(positive=True, most=1e3)  # rad/s
+    wave: bool = _flag()
+    wave_frequency: float | None = _number(positive=True, most=1e3)
     wave_damping: float | None = _number(positive=True, most=1.0)
-    wave_std: float | None = _number(positive=True, most=10.0)  # rad/s
+    wave_std: float | None = _number(positive=True, most=10.0)
 
     @property
     def chosen(self) -> str:
-        """The filter's name; without one given, the paper's, which has no room for a wave."""
+        """Name of the filter in use; the default pseudo-input cannot model a wave."""
         return self.kind or ("extended" if self.wave else "pseudo-input")
 
 
 @dataclass(frozen=True)
 class DisturbanceSettings:
-    """What a vessel file says of the disturbances to be observed."""
+    """Settings of the disturbance observer, `[disturbance]`.
+
+    Attributes
+    ----------
+    models
+        Disturbance models of the yaw moment and the surge force: some of `DISTURBANCES`.
+    spectrum
+        Pattern of the observer's poles: one of `SPECTRA`.
+    yaw_frequency, surge_frequency
+        Frequency of these poles, rad/s. That of yaw is the paper's; that of surge is lower because
+        surge is slower and its sensor noisier.
+    wave_frequency
+        Frequency of the `wave` model, rad/s; None takes the peak of the residual's spectrum.
+    """
 
     models: tuple[str, ...] = _choice(DISTURBANCES, ("constant",), several=True)
-    spectrum: str = _choice(SPECTRA, "butterworth")  # of the observer's poles
-    # rad/s, of these: yaw's is the paper's; surge is slower, and its sensor noisier
+    spectrum: str = _choice(SPECTRA, "butterworth")
     yaw_frequency: float = _number(0.05, positive=True, most=1e3)
     surge_frequency: float = _number(0.02, positive=True, most=1e3)
-    wave_frequency: float | None = _number(positive=True, most=1e3)  # None: the residual tells
+    wave_frequency: float | None = _number(positive=True, most=1e3)
 
 
 @dataclass(frozen=True)
 class IdentifierSettings:
-    """What a vessel file says of the windows in which coefficients are identified."""
+    """Settings of the coefficients over time, `[identifier]`.
+
+    Attributes
+    ----------
+    window_secs
+        Length of the windows in which the coefficients are identified, s.
+    """
 
     window_secs: float = _number(200.0, least=MIN_WINDOW_SECS, most=1e9)
 
 
-ONLY_OF = {  # what the settings of single filters do nothing without
+ONLY_OF = {  # filters that use a setting; all filters use the others
     "as_printed": ("pseudo-input",),
     "yaw_bandwidth": FILTERS[1:],
     "surge_bandwidth": FILTERS[1:],
@@ -99,95 +148,142 @@ ONLY_OF = {  # what the settings of single filters do nothing without
 
 
 def unused_settings(filtering: FilterSettings, observing: DisturbanceSettings) -> list[str]:
-    """The settings, by their names, that are not as by default and do nothing."""
-    usual, names = settings_dict(FilterSettings()), []
-    changed = [key for key, value in settings_dict(filtering).items() if usual.get(key) != value]
+    """Return the names of settings that differ from their defaults and have no effect.
+
+    Examples
+    --------
+    >>> unused_settings(FilterSettings(kind="extended", shift=0.2), DisturbanceSettings())
+    ['filter.shift']
+    """
+    defaults, names = settings_dict(FilterSettings()), []
+    changed = [key for key, value in settings_dict(filtering).items() if defaults.get(key) != value]
     names += [key for key in changed if filtering.chosen not in ONLY_OF.get(key, FILTERS)]
-    of_wave = ("wave_frequency", "wave_damping", "wave_std")
-    observes = "wave" in observing.models
-    for key in of_wave if not filtering.wave else ():
-        if key in changed and not (key == "wave_frequency" and observes):
-            names.append(key)
-    idle = [f"filter.{name}" for name in names]
-    if observing.wave_frequency is not None and not observes:
-        idle.append("disturbance.wave_frequency")
-    return idle
+    observes_wave = "wave" in observing.models
+    if not filtering.wave:
+        for key in ("wave_frequency", "wave_damping", "wave_std"):
+            # the observer takes the filter's wave frequency for its own wave model
+            if key in changed and not (key == "wave_frequency" and observes_wave):
+                names.append(key)
+    unused = [f"filter.{name}" for name in names]
+    if observing.wave_frequency is not None and not observes_wave:
+        unused.append("disturbance.wave_frequency")
+    return unused
 
 
-def filter_settings(table: Mapping[str, object], faults: list[str]) -> FilterSettings:
-    """The settings of a `[filter]` section; what is wrong with it goes to `faults`."""
-    found = _parsed("filter", FilterSettings, table, faults)
-    if found.wave and found.kind == "pseudo-input":
-        faults.append("filter.kind = 'pseudo-input' has no room for a wave; take 'extended'")
-    if found.smooth and found.chosen not in SMOOTHED:
-        faults.append(
-            f"filter.smooth goes back from an optimal gain, and that of {found.chosen!r} is not;"
-            f" take {' or '.join(map(repr, SMOOTHED))}"
+def filter_settings(table: Mapping[str, object], errors: list[str]) -> FilterSettings:
+    """Parse a `[filter]` section.
+
+    Parameters
+    ----------
+    table
+        Keys and values of the section.
+    errors
+        Messages are appended for everything that is wrong.
+
+    Examples
+    --------
+    >>> errors = []
+    >>> filter_settings({"kind": "extended", "gate": 0}, errors).kind, errors
+    ('extended', ['filter.gate must be positive, got 0'])
+    """
+    settings = _parse_section("filter", FilterSettings, table, errors)
+    if settings.wave and settings.kind == "pseudo-input":
+        errors.append("filter.kind = 'pseudo-input' cannot model a wave; use 'extended'")
+    if settings.smooth and settings.chosen not in SMOOTHED:
+        errors.append(
+            f"filter.smooth needs a filter with optimal gain, which {settings.chosen!r} is not;"
+            f" use {' or '.join(map(repr, SMOOTHED))}"
         )
-    return found
+    return settings
 
 
-def disturbance_settings(table: Mapping[str, object], faults: list[str]) -> DisturbanceSettings:
-    """The settings of a `[disturbance]` section; what is wrong with it goes to `faults`."""
-    return _parsed("disturbance", DisturbanceSettings, table, faults)
+def disturbance_settings(table: Mapping[str, object], errors: list[str]) -> DisturbanceSettings:
+    """Parse a `[disturbance]` section; messages about it are appended to `errors`."""
+    return _parse_section("disturbance", DisturbanceSettings, table, errors)
 
 
-def identifier_settings(table: Mapping[str, object], faults: list[str]) -> IdentifierSettings:
-    """The settings of an `[identifier]` section; what is wrong with it goes to `faults`."""
-    return _parsed("identifier", IdentifierSettings, table, faults)
+def identifier_settings(table: Mapping[str, object], errors: list[str]) -> IdentifierSettings:
+    """Parse an `[identifier]` section; messages about it are appended to `errors`."""
+    return _parse_section("identifier", IdentifierSettings, table, errors)
 
 
 def settings_dict(
     settings: FilterSettings | DisturbanceSettings | IdentifierSettings,
 ) -> dict[str, object]:
-    """The section that gives these settings."""
+    """Return the section of a vessel file that gives these settings."""
     return {key: value for key, value in asdict(settings).items() if value is not None}
 
 
-def _parsed(
-    section: str, kind: type[Settings], table: Mapping[str, object], faults: list[str]
+def _parse_section(
+    section: str, kind: type[Settings], table: Mapping[str, object], errors: list[str]
 ) -> Settings:
-    known = {f.name: f for f in fields(kind)}
+    """Parse the keys of a section; a key with an error keeps its default."""
+    allowed = {f.name: f for f in fields(kind)}
     values: dict[str, Any] = {}
     for key, value in table.items():
         label = f"{section}.{key}"
-        if key not in known:
-            faults.append(f"unknown key {label!r}{did_you_mean(key, known).replace(';', ',')}")
+        if key not in allowed:
+            errors.append(f"unknown key {label!r}{did_you_mean(key, allowed).replace(';', ',')}")
             continue
-        fault = _fault(label, value, known[key].metadata)
-        if fault:
-            faults.append(fault)
+        error = _value_error(label, value, allowed[key].metadata)
+        if error:
+            errors.append(error)
         else:
-            values[key] = _plain(value)
+            values[key] = _converted(value)
     return kind(**values)
 
 
-def _plain(value: object) -> object:
+def _converted(value: object) -> object:
+    """Lists as tuples and whole numbers as floats."""
     if isinstance(value, list):
         return tuple(value)
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
-def _fault(label: str, value: object, wanted: Mapping[str, Any]) -> str | None:
-    """What is wrong with a value, if anything."""
-    kind = wanted["kind"]
+def _value_error(label: str, value: object, expected: Mapping[str, Any]) -> str | None:
+    """Describe what is wrong with a value; None if nothing is."""
+    kind = expected["kind"]
     if kind is bool:
         return None if isinstance(value, bool) else f"{label} must be true or false, got {value!r}"
     if kind is float:
         return number_error(
-            label, value, wanted["least"], wanted["most"], positive=wanted["positive"]
+            label, value, expected["least"], expected["most"], positive=expected["positive"]
         )
-    among = f"{', '.join(wanted['of'])}"
+    choices = ", ".join(expected["of"])
     if kind is str:
-        return None if value in wanted["of"] else f"{label} must be one of {among}, got {value!r}"
-    several = isinstance(value, list | tuple) and value and all(v in wanted["of"] for v in value)
-    return None if several else f"{label} must be a list of some of {among}, got {value!r}"
+        ok = value in expected["of"]
+        return None if ok else f"{label} must be one of {choices}, got {value!r}"
+    ok = isinstance(value, list | tuple) and bool(value)
+    ok = ok and all(each in expected["of"] for each in value)  # type: ignore[attr-defined]
+    return None if ok else f"{label} must be a list of some of {choices}, got {value!r}"
 
 
 def number_error(
     label: str, value: object, least: float, most: float, *, positive: bool = False
 ) -> str | None:
-    """What is wrong with a number of a vessel file, if anything."""
+    """Describe what is wrong with a number of a vessel file.
+
+    Parameters
+    ----------
+    label
+        Name of the key, for the message.
+    value
+        The value, of any type.
+    least, most
+        Limits of the value, inclusive.
+    positive
+        Whether the value must be greater than zero.
+
+    Returns
+    -------
+    str or None
+        The message; None where the number is right.
+
+    Examples
+    --------
+    >>> number_error("filter.gate", -1.0, 0.0, 1e9)
+    'filter.gate must lie between 0 and 1e+09, got -1'
+    """
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"{label} must be a number, got {value!r}"
     if not isfinite(value):

@@ -1,4 +1,4 @@
-"""The simulated ship of a vessel file."""
+"""The simulated ship that a vessel file describes."""
 
 from shiplog.ships import ship_model
 from shiplog.ships.model import SI
@@ -8,10 +8,21 @@ from .vessel import Vessel
 
 
 def ship_from_vessel(vessel: Vessel) -> Ship:
-    """The ship of a vessel file: of its `[model]` if it has one, else the paper's."""
-    own = vessel.model
-    if own is None:
+    """Make the ship of a vessel file for simulation.
+
+    It has the model of `[model]` if the file has this section, otherwise the identification
+    paper's model with the coefficients of `[yaw]`, `[surge]` and `[rudder]`.
+
+    Examples
+    --------
+    >>> import shiplog
+    >>> vessel, _ = shiplog.load_vessel("table1")
+    >>> ship_from_vessel(vessel).model.name
+    'burylin'
+    """
+    section = vessel.model
+    if section is None:
         return Ship(ship_model("burylin"), vessel.paper_coefficients, SI)
-    model = ship_model(own.name)
-    scale = model.scale(own.length, own.speed, own.rpm)
-    return Ship(model, model.coefficients(own.parameters), scale)
+    model = ship_model(section.name)
+    scale = model.scale(section.length, section.speed, section.rpm)
+    return Ship(model, model.coefficients(section.parameters), scale)

@@ -1,4 +1,4 @@
-"""`Vessel`: a ship with its model, steering gear and replay settings."""
+"""A ship: its coefficients, steering gear, simulation model and replay settings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -19,48 +19,94 @@ from .settings import (
     unused_settings,
 )
 
-if TYPE_CHECKING:  # ship.py brings numba; only verbs that compute need it
+if TYPE_CHECKING:  # it brings numba; only verbs that compute need it
     from shiplog.ships.paper import Coefficients
 
-SECTIONS = ("filter", "disturbance", "identifier")
+SECTIONS = ("filter", "disturbance", "identifier")  # of settings, in a vessel file
 
 
 @dataclass(frozen=True)
 class Vessel:
-    """A ship: its model's coefficients, its steering gear, and how its logs are filtered."""
+    """A ship as its vessel file describes it.
+
+    Attributes
+    ----------
+    name
+        Name of the ship.
+    coefficients
+        Coefficients of the identification paper's model, in SI units and radians, on which the
+        filters are built; None where the file has only a `[model]`.
+    length
+        Length between perpendiculars, m.
+    approach_rpm
+        Revolutions at which a simulated trial begins.
+    rudder_max
+        Largest rudder angle, rad.
+    rudder_rate
+        Rate of the steering gear, rad/s.
+    filter, disturbance, identifier
+        Settings of a replay.
+    angle_unit
+        Unit of the angles in the file, "deg" or "rad"; here all angles are in radians.
+    model
+        Ship model of a simulation, where it is not the paper's.
+    """
 
     name: str
-    coefficients: "Coefficients | None"  # the paper's; None where the file has a `[model]` alone
-    length: float | None = None  # m, between perpendiculars
+    coefficients: "Coefficients | None"
+    length: float | None = None
     approach_rpm: float = 80.0
-    rudder_max: float = 35 * pi / 180  # rad
-    rudder_rate: float = 2.5 * pi / 180  # rad/s
+    rudder_max: float = 35 * pi / 180
+    rudder_rate: float = 2.5 * pi / 180
     filter: FilterSettings = field(default_factory=FilterSettings)
     disturbance: DisturbanceSettings = field(default_factory=DisturbanceSettings)
     identifier: IdentifierSettings = field(default_factory=IdentifierSettings)
-    angle_unit: str = "rad"  # of its file; inside all angles are radians
-    model: ModelSection | None = None  # that she is sailed by, if not by the paper's
+    angle_unit: str = "rad"
+    model: ModelSection | None = None
 
     @property
     def paper_coefficients(self) -> "Coefficients":
-        """The paper's coefficients; raises `VesselError` where the file has none."""
+        """Coefficients of the identification paper's model.
+
+        Raises
+        ------
+        VesselError
+            The file has only a `[model]`.
+        """
         if self.coefficients is None:
             raise VesselError(
-                f"the vessel file has a [model] alone, and what is asked for is built on the "
-                f"paper's; give [yaw], [surge] and [rudder], too: {self.name}"
+                "the vessel file has only a [model], but filters need the coefficients of the "
+                f"paper's model; add [yaw], [surge] and [rudder]: {self.name}"
             )
         return self.coefficients
 
 
 def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
-    """The vessel with settings of its own replaced, such as {"filter.kind": "extended"}.
+    """Return the vessel with some of its replay settings replaced.
 
-    The names are those of its file's `[filter]`, `[disturbance]` and `[identifier]`; "auto" is as
-    if it stated nothing. Raises `UsageError` with all the faults at once.
+    Parameters
+    ----------
+    vessel
+        The vessel.
+    settings
+        Values by section and key, such as ``{"filter.kind": "extended"}``. The keys are those of
+        `[filter]`, `[disturbance]` and `[identifier]`; the value "auto" restores the default.
+
+    Raises
+    ------
+    UsageError
+        A setting is unknown or has a wrong value; the message lists all of them.
+
+    Examples
+    --------
+    >>> import shiplog
+    >>> vessel, _ = shiplog.load_vessel("table1")
+    >>> with_settings(vessel, {"filter.gate": 4.0}).filter.gate
+    4.0
     """
     if not settings:
         return vessel
-    faults: list[str] = []
+    errors: list[str] = []
     tables = {section: settings_dict(getattr(vessel, section)) for section in SECTIONS}
     for name, value in settings.items():
         section, _, key = name.partition(".")
@@ -69,17 +115,23 @@ def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
         elif section in tables:
             tables[section][key] = value
         else:
-            begin = ", ".join(f"{section}." for section in SECTIONS)
-            faults.append(f"unknown setting {name!r}, they begin with one of {begin}")
-    filtering = filter_settings(tables["filter"], faults)
-    observing = disturbance_settings(tables["disturbance"], faults)
-    identifying = identifier_settings(tables["identifier"], faults)
-    if faults:
-        raise UsageError(f"these settings do not work: {'; '.join(faults)}")
+            prefixes = ", ".join(f"{section}." for section in SECTIONS)
+            errors.append(f"unknown setting {name!r}, it must begin with one of {prefixes}")
+    filtering = filter_settings(tables["filter"], errors)
+    observing = disturbance_settings(tables["disturbance"], errors)
+    identifying = identifier_settings(tables["identifier"], errors)
+    if errors:
+        raise UsageError(f"wrong settings: {'; '.join(errors)}")
     return replace(vessel, filter=filtering, disturbance=observing, identifier=identifying)
 
 
 def unused_setting_warnings(vessel: Vessel) -> list[str]:
-    """Which of a vessel's settings do nothing, in words."""
+    """Warn about settings of a vessel that have no effect; at most one line."""
     names = ", ".join(unused_settings(vessel.filter, vessel.disturbance))
-    return [f"nothing comes of {names}: filter.kind is {vessel.filter.chosen!r}"] if names else []
+    if not names:
+        return []
+    warning = (
+        f"settings without effect: {names}; filter.kind is {vessel.filter.chosen!r}: "
+        "remove them or choose another filter or disturbance model"
+    )
+    return [warning]

@@ -1,4 +1,4 @@
-"""The parser of vessel files, which reports all errors of a file at once."""
+"""Parser of vessel files; reports all errors of a file at once."""
 
 import os
 import tomllib
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from shiplog.errors import VesselError
 from shiplog.units import did_you_mean
 
-from .model_section import model_section
+from .model_section import parse_model_section
 from .presets import PRESETS
 from .settings import (
     disturbance_settings,
@@ -24,31 +24,51 @@ from .vessel import SECTIONS, Vessel
 if TYPE_CHECKING:  # it brings numba; only verbs that compute need it
     from shiplog.ships.paper import Coefficients
 
+TEXT_KEYS = ("name", "angle_unit")
+TIME_CONSTANTS = ("T1", "T2", "T3", "c2", "c3")
+PRODUCTS = ("a", "b1", "b2", "b3", "d", "e")
+ALPHAS = ("alpha1", "alpha2", "alpha3")
+SURGE_KEYS = ("f", "g", "h")
+POSITIVE_KEYS = {"T1", "T2", "approach_rpm", "length", "max", "rate"}
+
+ANY = (-inf, inf)
 # section -> key -> (lowest, highest) of the value; "" is the top level
-_TIME_CONSTANTS = {"T1": (1e-3, 1e6), "T2": (1e-3, 1e6), "T3": (-inf, inf)}
-_NONLINEAR = {"c2": (-inf, inf), "c3": (-inf, inf)}
-_PRODUCTS = dict.fromkeys(("a", "b1", "b2", "b3", "d", "e"), (-inf, inf))
-_KEYS: dict[str, dict[str, tuple[float, float]]] = {
+LIMITS: dict[str, dict[str, tuple[float, float]]] = {
     "": {"length": (0.0, 1000.0), "approach_rpm": (0.0, 3000.0)},
-    "yaw": _TIME_CONSTANTS | _NONLINEAR | _PRODUCTS,
-    "rudder": {
-        "alpha1": (-inf, inf),
-        "alpha2": (-inf, inf),
-        "alpha3": (-inf, inf),
-        "max": (0.0, inf),
-        "rate": (0.0, inf),
-    },
-    "surge": dict.fromkeys(("f", "g", "h"), (-inf, inf)),
+    "yaw": dict.fromkeys((*TIME_CONSTANTS, *PRODUCTS), ANY)
+    | {"T1": (1e-3, 1e6), "T2": (1e-3, 1e6)},
+    "rudder": dict.fromkeys(ALPHAS, ANY) | {"max": (0.0, inf), "rate": (0.0, inf)},
+    "surge": dict.fromkeys(SURGE_KEYS, ANY),
 }
-_ALPHAS = ("alpha1", "alpha2", "alpha3")
-_TEXTS = ("name", "angle_unit")
-_POSITIVE = {"T1", "T2", "approach_rpm", "length", "max", "rate"}
+
+Numbers = Mapping[str, Mapping[str, float]]  # by section and key
 
 
 def load_vessel(preset_or_path: str | os.PathLike[str]) -> tuple[Vessel, str]:
-    """A vessel by the name of a preset or from a file, and its text to be kept with a log.
+    """Load a vessel from a preset or from a file.
 
-    Raises `VesselError` with all the faults of the file at once.
+    Parameters
+    ----------
+    preset_or_path
+        `table1`, `table1-rad` or the path of a vessel file.
+
+    Returns
+    -------
+    vessel
+        The vessel.
+    text
+        The text of its file, which a log can carry.
+
+    Raises
+    ------
+    VesselError
+        The file cannot be read or has errors; the message lists all of them.
+
+    Examples
+    --------
+    >>> vessel, text = load_vessel("table1")
+    >>> vessel.name
+    "Burylin's Table 1, angles in degrees"
     """
     name = os.fspath(preset_or_path)
     if name in PRESETS:
@@ -70,40 +90,43 @@ def load_vessel(preset_or_path: str | os.PathLike[str]) -> tuple[Vessel, str]:
 
 
 def parse_vessel(text: str, where: str) -> Vessel:
-    """A vessel from the text of its file; `where` names it in errors.
+    """Parse the text of a vessel file.
 
-    Raises `VesselError` with all the faults at once.
+    Parameters
+    ----------
+    text
+        TOML; docs/vessel.md describes the keys.
+    where
+        Name of the file, for messages.
+
+    Raises
+    ------
+    VesselError
+        The text has errors; the message lists all of them.
     """
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise VesselError(f"not a TOML file ({error}); mend that line: {where}") from error
-    faults: list[str] = []
-    own = table.pop("model", None)
-    sections = {key: _section(key, table.pop(key, {}), faults) for key in SECTIONS}
-    filtering = filter_settings(sections["filter"], faults)
-    observing = disturbance_settings(sections["disturbance"], faults)
-    identifying = identifier_settings(sections["identifier"], faults)
-    numbers = _numbers(table, faults)
-    length = numbers[""].get("length", nan if "length" in table else None)  # one fault is enough
-    model = None if own is None else model_section(own, length, faults)
-    is_papers = own is None or _names_papers(table)
-    if is_papers:
-        _require(numbers, _yaw_form(numbers["yaw"], faults), faults)
-    faults += [f"{key} must be a text" for key in _TEXTS if not isinstance(table.get(key, ""), str)]
-    angle_unit = table.get("angle_unit", "rad")
-    if angle_unit not in ("deg", "rad"):
-        faults.append(f"angle_unit must be 'deg' or 'rad', got {angle_unit!r}")
-    rudder_max = numbers["rudder"].get("max", 0.0)
-    if angle_unit == "rad" and rudder_max > pi / 2:
-        faults.append(
-            f"rudder.max = {rudder_max:g} rad is no rudder's; is angle_unit = 'deg' meant?"
-        )
-    if faults:
-        count = f"{len(faults)} faults" if len(faults) > 1 else "one fault"
-        raise VesselError(f"{count} in the vessel file: {'; '.join(faults)}: {where}")
+        raise VesselError(f"not a TOML file ({error}); correct that line: {where}") from error
+    errors: list[str] = []
+    model_table = table.pop("model", None)
+    sections = {key: _section(key, table.pop(key, {}), errors) for key in SECTIONS}
+    filtering = filter_settings(sections["filter"], errors)
+    observing = disturbance_settings(sections["disturbance"], errors)
+    identifying = identifier_settings(sections["identifier"], errors)
+    numbers = _numbers(table, errors)
+    # a length with an error is nan: it must not be reported as missing, too
+    length = numbers[""].get("length", nan if "length" in table else None)
+    model = None if model_table is None else parse_model_section(model_table, length, errors)
+    has_paper_model = model_table is None or _has_paper_model(table)
+    if has_paper_model:
+        _require(numbers, _yaw_keys(numbers["yaw"], errors), errors)
+    angle_unit = _angle_unit(table, numbers, errors)
+    if errors:
+        count = "one error" if len(errors) == 1 else f"{len(errors)} errors"
+        raise VesselError(f"{count} in the vessel file: {'; '.join(errors)}: {where}")
     per_rad = 180 / pi if angle_unit == "deg" else 1.0
-    coefficients = _coefficients(numbers, per_rad) if is_papers else None
+    coefficients = _coefficients(numbers, per_rad) if has_paper_model else None
     vessel = _vessel(str(table.get("name", Path(where).stem)), coefficients, numbers, per_rad)
     return replace(
         vessel,
@@ -115,80 +138,96 @@ def parse_vessel(text: str, where: str) -> Vessel:
     )
 
 
-def _section(name: str, section: object, faults: list[str]) -> Mapping[str, object]:
+def _section(name: str, section: object, errors: list[str]) -> Mapping[str, object]:
     if isinstance(section, dict):
         return section
-    faults.append(f"[{name}] must be a section")
+    errors.append(f"[{name}] must be a section")
     return {}
 
 
-def _numbers(table: Mapping[str, Any], faults: list[str]) -> dict[str, dict[str, float]]:
-    """Every number of the file, section by section; what is wrong goes to `faults`."""
-    numbers: dict[str, dict[str, float]] = {section: {} for section in _KEYS}
+def _numbers(table: Mapping[str, Any], errors: list[str]) -> dict[str, dict[str, float]]:
+    """Parse every number of the file, by section and key; "" is the top level."""
+    numbers: dict[str, dict[str, float]] = {section: {} for section in LIMITS}
     for key, value in table.items():
-        if key in _KEYS and key:
+        if key in LIMITS and key:
             if isinstance(value, dict):
                 for inner, number in value.items():
-                    _number(key, inner, number, numbers[key], faults)
+                    _parse_number(key, inner, number, numbers[key], errors)
             else:
-                faults.append(f"[{key}] must be a section")
-        elif key not in _TEXTS:
-            _number("", key, value, numbers[""], faults)
+                errors.append(f"[{key}] must be a section")
+        elif key not in TEXT_KEYS:
+            _parse_number("", key, value, numbers[""], errors)
     return numbers
 
 
-def _number(
-    section: str, key: str, value: object, into: dict[str, float], faults: list[str]
+def _parse_number(
+    section: str, key: str, value: object, numbers: dict[str, float], errors: list[str]
 ) -> None:
+    """Add one number of a section to `numbers`."""
     label = f"{section}.{key}" if section else key
-    if key not in _KEYS[section]:
-        others = (*_TEXTS, *filter(None, _KEYS), *SECTIONS, "model")
-        known = [*_KEYS[section], *(() if section else others)]
-        faults.append(f"unknown key {label!r}{did_you_mean(key, known).replace(';', ',')}")
+    if key not in LIMITS[section]:
+        sections = (*TEXT_KEYS, *filter(None, LIMITS), *SECTIONS, "model")
+        allowed = [*LIMITS[section], *(() if section else sections)]
+        errors.append(f"unknown key {label!r}{did_you_mean(key, allowed).replace(';', ',')}")
         return
-    low, high = _KEYS[section][key]
-    fault = number_error(label, value, low, high, positive=key in _POSITIVE)
-    if fault:
-        faults.append(fault)
+    error = number_error(label, value, *LIMITS[section][key], positive=key in POSITIVE_KEYS)
+    if error:
+        errors.append(error)
     else:
-        into[key] = float(value)  # type: ignore[arg-type]
+        numbers[key] = float(value)  # type: ignore[arg-type]
 
 
-def _names_papers(table: Mapping[str, Any]) -> bool:
-    """Whether a file means to give the paper's model, whole or not; steering gear is none of it."""
+def _angle_unit(table: Mapping[str, Any], numbers: Numbers, errors: list[str]) -> str:
+    """Parse the texts of the file; return the unit of its angles."""
+    errors += [
+        f"{key} must be a string" for key in TEXT_KEYS if not isinstance(table.get(key, ""), str)
+    ]
+    angle_unit = table.get("angle_unit", "rad")
+    if angle_unit not in ("deg", "rad"):
+        errors.append(f"angle_unit must be 'deg' or 'rad', got {angle_unit!r}")
+    rudder_max = numbers["rudder"].get("max", 0.0)
+    if angle_unit == "rad" and rudder_max > pi / 2:
+        errors.append(
+            f"rudder.max = {rudder_max:g} rad is more than a right angle; "
+            "is angle_unit = 'deg' meant?"
+        )
+    return str(angle_unit)
+
+
+def _has_paper_model(table: Mapping[str, Any]) -> bool:
+    """Whether a file gives any part of the paper's model; the steering gear is not part of it."""
     rudder = table.get("rudder", {})
-    alphas = isinstance(rudder, dict) and any(key in rudder for key in _ALPHAS)
-    return "yaw" in table or "surge" in table or alphas
+    has_alphas = isinstance(rudder, dict) and any(key in rudder for key in ALPHAS)
+    return "yaw" in table or "surge" in table or has_alphas
 
 
-def _yaw_form(yaw: Mapping[str, float], faults: list[str]) -> tuple[str, ...]:
-    """Whether [yaw] gives the paper's time constants or the products; never a mixture."""
-    times = {*_TIME_CONSTANTS, *_NONLINEAR} & set(yaw)
-    products = set(_PRODUCTS) & set(yaw)
+def _yaw_keys(yaw: Mapping[str, float], errors: list[str]) -> tuple[str, ...]:
+    """Keys that [yaw] must have: the paper's time constants or the products, never a mixture."""
+    times, products = set(TIME_CONSTANTS) & set(yaw), set(PRODUCTS) & set(yaw)
     if times and products:
-        faults.append(
+        errors.append(
             f"[yaw] mixes time constants ({', '.join(sorted(times))}) "
             f"with products ({', '.join(sorted(products))}); give one or the other"
         )
-    return tuple(_PRODUCTS) if products else (*_TIME_CONSTANTS, *_NONLINEAR)
+    return PRODUCTS if products else TIME_CONSTANTS
 
 
-def _require(
-    numbers: Mapping[str, Mapping[str, float]], form: tuple[str, ...], faults: list[str]
-) -> None:
-    named = " ".join(faults)
-    for section, keys in (
-        ("yaw", form),
-        ("rudder", _ALPHAS),
-        ("surge", ("f", "g", "h")),
-    ):
-        missing = [k for k in keys if k not in numbers[section] and f"{section}.{k} " not in named]
+def _require(numbers: Numbers, yaw_keys: tuple[str, ...], errors: list[str]) -> None:
+    """Report missing coefficients, but not those that have an error already."""
+    reported = " ".join(errors)
+    for section, keys in (("yaw", yaw_keys), ("rudder", ALPHAS), ("surge", SURGE_KEYS)):
+        missing = [
+            key
+            for key in keys
+            if key not in numbers[section] and f"{section}.{key} " not in reported
+        ]
         if missing:
-            faults.append(f"[{section}] lacks {', '.join(missing)}")
+            errors.append(f"[{section}] lacks {', '.join(missing)}")
 
 
-def _coefficients(numbers: Mapping[str, Mapping[str, float]], per_rad: float) -> "Coefficients":
-    from shiplog.ships.paper import Coefficients  # noqa: PLC0415 - numba, see above
+def _coefficients(numbers: Numbers, per_rad: float) -> "Coefficients":
+    """Coefficients in radians; `per_rad` is the number of the file's angle units in a radian."""
+    from shiplog.ships.paper import Coefficients  # noqa: PLC0415 - see above
 
     yaw, rudder, surge = (numbers[s] for s in ("yaw", "rudder", "surge"))
     if "T1" in yaw:
@@ -196,7 +235,7 @@ def _coefficients(numbers: Mapping[str, Mapping[str, float]], per_rad: float) ->
         a, b1, e = -(yaw["T1"] + yaw["T2"]) * d, -d, yaw["T3"] * d
         b2, b3 = -yaw["c2"] * d, -yaw["c3"] * d
     else:
-        a, b1, b2, b3, d, e = (yaw[key] for key in _PRODUCTS)
+        a, b1, b2, b3, d, e = (yaw[key] for key in PRODUCTS)
     return Coefficients(
         a=a,
         b1=b1,
@@ -214,11 +253,9 @@ def _coefficients(numbers: Mapping[str, Mapping[str, float]], per_rad: float) ->
 
 
 def _vessel(
-    name: str,
-    coefficients: "Coefficients | None",
-    numbers: Mapping[str, Mapping[str, float]],
-    per_rad: float,
+    name: str, coefficients: "Coefficients | None", numbers: Numbers, per_rad: float
 ) -> Vessel:
+    """Vessel with its steering gear, and without its settings."""
     rudder, top, defaults = numbers["rudder"], numbers[""], Vessel(name, coefficients)
     return Vessel(
         name,

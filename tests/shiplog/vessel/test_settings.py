@@ -1,4 +1,4 @@
-"""The settings of filter and observer, from a vessel file, the command line and Python alike."""
+"""Replay settings from a vessel file, the command line and Python."""
 
 from argparse import ArgumentParser
 from dataclasses import fields
@@ -35,10 +35,10 @@ PARSERS = {
 }
 
 
-def faults_of(section: str, table: dict[str, object]) -> str:
-    faults: list[str] = []
-    PARSERS[section](table, faults)
-    return "; ".join(faults)
+def errors_of(section: str, table: dict[str, object]) -> str:
+    errors: list[str] = []
+    PARSERS[section](table, errors)
+    return "; ".join(errors)
 
 
 def given(*arguments: str) -> dict[str, object]:
@@ -47,7 +47,7 @@ def given(*arguments: str) -> dict[str, object]:
     return replay_settings(parser.parse_args(["x.mcap", *arguments]))
 
 
-def test_what_a_vessel_file_leaves_out_is_the_papers() -> None:
+def test_the_defaults_are_those_of_the_paper() -> None:
     vessel, _ = load_vessel("table1")
     assert vessel.filter.chosen == "pseudo-input"
     assert not vessel.filter.smooth
@@ -69,7 +69,7 @@ def test_every_disturbance_can_be_named_in_a_vessel_file(models: list[str]) -> N
     assert vessel.disturbance.models == tuple(models)
 
 
-def test_windows_are_what_a_file_and_the_command_line_say(vessel: Vessel) -> None:
+def test_the_window_is_set_by_the_file_and_the_command_line(vessel: Vessel) -> None:
     assert vessel.identifier.window_secs == WINDOW_SECS
     assert MIN_WINDOW_SECS == BUMP_SECS
     stated = parse_vessel(f"{PRESETS['table1']}[identifier]\nwindow_secs = 300\n", "ship.toml")
@@ -81,28 +81,30 @@ def test_windows_are_what_a_file_and_the_command_line_say(vessel: Vessel) -> Non
 
 
 @pytest.mark.parametrize("settings", [FilterSettings(kind="quality"), DisturbanceSettings()])
-def test_settings_are_their_table_and_back(settings: FilterSettings | DisturbanceSettings) -> None:
-    faults: list[str] = []
+def test_settings_survive_the_way_to_a_section_and_back(
+    settings: FilterSettings | DisturbanceSettings,
+) -> None:
+    errors: list[str] = []
     parse = filter_settings if isinstance(settings, FilterSettings) else disturbance_settings
-    assert parse(settings_dict(settings), faults) == settings
-    assert not faults
+    assert parse(settings_dict(settings), errors) == settings
+    assert not errors
 
 
-def test_a_wave_is_told_by_a_filter_that_has_room_for_it() -> None:
+def test_a_wave_needs_a_filter_that_can_model_it() -> None:
     assert FilterSettings(wave=True).chosen == "extended"
-    said = faults_of("filter", {"kind": "pseudo-input", "wave": True})
-    assert said == "filter.kind = 'pseudo-input' has no room for a wave; take 'extended'"
+    message = errors_of("filter", {"kind": "pseudo-input", "wave": True})
+    assert message == "filter.kind = 'pseudo-input' cannot model a wave; use 'extended'"
 
 
 @pytest.mark.parametrize("kind", [kind for kind in FILTERS if kind not in SMOOTHED])
-def test_what_has_not_the_best_gain_is_not_smoothed(kind: str) -> None:
-    said = faults_of("filter", {"kind": kind, "smooth": True})
-    assert said.endswith("take 'pseudo-input' or 'extended'")
-    assert kind in said
+def test_a_filter_without_optimal_gain_cannot_be_smoothed(kind: str) -> None:
+    message = errors_of("filter", {"kind": kind, "smooth": True})
+    assert message.endswith("use 'pseudo-input' or 'extended'")
+    assert kind in message
 
 
 @pytest.mark.parametrize(
-    ("section", "key", "value", "said"),
+    ("section", "key", "value", "message"),
     [
         ("filter", "kind", "kalman", "filter.kind must be one of pseudo-input, steady-state"),
         ("filter", "smooth", 1, "filter.smooth must be true or false, got 1"),
@@ -122,18 +124,16 @@ def test_what_has_not_the_best_gain_is_not_smoothed(kind: str) -> None:
         ("identifier", "window", 300, "did you mean 'window_secs'?"),
     ],
 )
-def test_a_value_that_does_not_do_is_named(
-    section: str, key: str, value: object, said: str
-) -> None:
-    assert said in faults_of(section, {key: value})
+def test_a_wrong_value_is_named(section: str, key: str, value: object, message: str) -> None:
+    assert message in errors_of(section, {key: value})
 
 
-def test_a_section_that_is_none_and_other_faults_are_told_together() -> None:
-    with pytest.raises(VesselError, match=r"2 faults.*\[filter\] must be a section"):
+def test_a_section_that_is_not_a_table_is_reported_with_the_other_errors() -> None:
+    with pytest.raises(VesselError, match=r"2 errors.*\[filter\] must be a section"):
         parse_vessel('filter = 3\nlength = "long"\n' + PRESETS["table1"].split("[filter]")[0], "x")
 
 
-def test_settings_given_stand_above_the_vessels_own(vessel: Vessel) -> None:
+def test_given_settings_override_those_of_the_vessel(vessel: Vessel) -> None:
     changed = with_settings(vessel, {"filter.kind": "extended", "disturbance.models": ["ramp"]})
     assert changed.filter.kind == "extended"
     assert changed.filter.process_ratio == vessel.filter.process_ratio
@@ -142,7 +142,7 @@ def test_settings_given_stand_above_the_vessels_own(vessel: Vessel) -> None:
     assert with_settings(vessel, {}) is vessel
 
 
-def test_a_setting_is_left_to_the_log_again(vessel: Vessel) -> None:
+def test_auto_restores_the_default_of_a_setting(vessel: Vessel) -> None:
     assert vessel.filter.process_ratio == 2.5e-5
     assert with_settings(vessel, {"filter.process_ratio": "auto"}).filter.process_ratio is None
     with_gate = with_settings(vessel, {"filter.gate": 3.0})
@@ -162,7 +162,7 @@ def test_a_setting_is_left_to_the_log_again(vessel: Vessel) -> None:
         ({"disturbance.models": ["wave"], "disturbance.wave_frequency": 0.6}, []),
     ],
 )
-def test_a_setting_of_which_nothing_comes_is_told(
+def test_a_setting_without_effect_gives_a_warning(
     vessel: Vessel, settings: dict[str, object], names: list[str]
 ) -> None:
     changed = with_settings(vessel, settings)
@@ -171,14 +171,14 @@ def test_a_setting_of_which_nothing_comes_is_told(
     assert bool(unused_setting_warnings(changed)) == bool(names)
 
 
-def test_settings_of_another_kind_are_refused_all_at_once(vessel: Vessel) -> None:
+def test_wrong_settings_are_reported_all_at_once(vessel: Vessel) -> None:
     with pytest.raises(UsageError) as caught:
         with_settings(vessel, {"yaw.T1": 3.0, "filter.gate": -1.0, "disturbance.modles": ["wave"]})
-    for said in ("'yaw.T1'", "filter.gate must be positive", "did you mean 'models'?"):
-        assert said in str(caught.value)
+    for part in ("'yaw.T1'", "filter.gate must be positive", "did you mean 'models'?"):
+        assert part in str(caught.value)
 
 
-def test_the_command_line_gives_them_by_name() -> None:
+def test_the_command_line_gives_settings_by_name() -> None:
     assert given() == {}
     assert given("--filter", "quality", "--set", "filter.shift=0.2") == {
         "filter.kind": "quality",
@@ -193,11 +193,11 @@ def test_the_command_line_gives_them_by_name() -> None:
 
 
 @pytest.mark.parametrize("text", ["filter.gate", "=3", "filter.gate="])
-def test_a_setting_that_is_none_is_refused(text: str) -> None:
+def test_a_malformed_setting_is_an_error(text: str) -> None:
     with pytest.raises(UsageError, match="--set takes KEY=VALUE"):
         given("--set", text)
 
 
-def test_every_field_states_what_it_may_be() -> None:
+def test_every_field_has_a_type_and_limits() -> None:
     for kind in (FilterSettings, DisturbanceSettings, IdentifierSettings):
         assert all("kind" in field.metadata for field in fields(kind))

@@ -1,3 +1,5 @@
+"""Vessel files: coefficients and their units, presets, and the errors of a file."""
+
 from math import pi, radians
 from pathlib import Path
 
@@ -39,7 +41,7 @@ e = 0.06
 """
 
 
-def fault_of(text: str) -> str:
+def error_of(text: str) -> str:
     with pytest.raises(VesselError) as caught:
         parse_vessel(text, "ship.toml")
     return str(caught.value)
@@ -90,7 +92,7 @@ def test_a_file_is_read_with_its_text(tmp_path: Path) -> None:
     assert vessel.filter == FilterSettings()
 
 
-def test_products_are_taken_as_they_are() -> None:
+def test_products_are_read_unchanged() -> None:
     c = parse_vessel(PRODUCTS + REST, "ship.toml").coefficients
     assert c[:6] == (-0.1, -0.002, -0.3, -4.0, 0.005, 0.06)
 
@@ -102,7 +104,7 @@ def test_products_in_degrees_scale_as_the_time_constants_do() -> None:
     assert c.d == 0.005
 
 
-def test_the_two_forms_of_one_ship_are_one_ship() -> None:
+def test_time_constants_and_products_give_the_same_ship() -> None:
     given = parse_vessel(TIMES + REST, "ship.toml").coefficients
     products = "".join(
         f"{k} = {v!r}\n" for k, v in given._asdict().items() if k in "a b1 b2 b3 d e"
@@ -111,10 +113,10 @@ def test_the_two_forms_of_one_ship_are_one_ship() -> None:
     assert again == given
 
 
-def test_all_faults_are_named_at_once_in_one_line() -> None:
+def test_all_errors_are_reported_at_once_in_one_line() -> None:
     text = (TIMES + REST).replace("T1 = 100.0", "T1 = -5.0").replace("h = 0.0005", 'h = "fast"')
-    message = fault_of(text + "[filter]\nspeed_sdt = 0.1\n")
-    assert message.startswith("3 faults in the vessel file: ")
+    message = error_of(text + "[filter]\nspeed_sdt = 0.1\n")
+    assert message.startswith("3 errors in the vessel file: ")
     assert "yaw.T1 must be positive, got -5" in message
     assert "surge.h must be a number, got 'fast'" in message
     assert "unknown key 'filter.speed_sdt', did you mean 'speed_std'?" in message
@@ -122,25 +124,25 @@ def test_all_faults_are_named_at_once_in_one_line() -> None:
     assert "\n" not in message
 
 
-def test_one_fault_is_called_one() -> None:
-    assert fault_of((TIMES + REST).replace("h = 0.0005", "")) == (
-        "one fault in the vessel file: [surge] lacks h: ship.toml"
+def test_a_single_error_is_counted_as_one() -> None:
+    assert error_of((TIMES + REST).replace("h = 0.0005", "")) == (
+        "one error in the vessel file: [surge] lacks h: ship.toml"
     )
 
 
-def test_a_mixture_of_forms_is_refused_naming_both_sides() -> None:
-    message = fault_of(TIMES + "a = -0.1\n" + REST)
+def test_a_mixture_of_both_forms_is_an_error_that_lists_both() -> None:
+    message = error_of(TIMES + "a = -0.1\n" + REST)
     assert "[yaw] mixes time constants (T1, T2, T3, c2, c3) with products (a)" in message
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
-def test_a_number_that_is_none_is_refused(number: str) -> None:
+def test_a_number_that_is_not_finite_is_an_error(number: str) -> None:
     text = (TIMES + REST).replace("c2 = 1.0", f"c2 = {number}")
-    assert f"yaw.c2 must be finite, got {number}" in fault_of(text)
+    assert f"yaw.c2 must be finite, got {number}" in error_of(text)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("old", "new", "message"),
     [
         ("T2 = 20.0", "T2 = 0", "yaw.T2 must be positive, got 0"),
         ("T2 = 20.0", "T2 = 1e-200", "yaw.T2 must lie between"),
@@ -149,25 +151,25 @@ def test_a_number_that_is_none_is_refused(number: str) -> None:
         ("[yaw]", "length = 2000\n[yaw]", "length must lie between 0 and 1000, got 2000"),
         ("[yaw]", 'angle_unit = "grad"\n[yaw]', "angle_unit must be 'deg' or 'rad', got 'grad'"),
         ("[yaw]", "angle_unit = [1]\n[yaw]", "angle_unit must be 'deg' or 'rad'"),
-        ("[yaw]", "name = 3\n[yaw]", "name must be a text"),
+        ("[yaw]", "name = 3\n[yaw]", "name must be a string"),
         ("[yaw]", "aproach_rpm = 3\n[yaw]", "unknown key 'aproach_rpm', did you mean"),
         ("[surge]", "[surges]", "unknown key 'surges', did you mean 'surge'?"),
         ("[yaw]", "filter = 1\n[yaw]", "[filter] must be a section"),
         ("[surge]", "[filter]\nspeed_std = -1\n[surge]", "filter.speed_std must be positive"),
     ],
 )
-def test_what_is_wrong_is_named(old: str, new: str, says: str) -> None:
-    assert says in fault_of((TIMES + REST).replace(old, new))
+def test_an_error_names_the_key_and_the_value(old: str, new: str, message: str) -> None:
+    assert message in error_of((TIMES + REST).replace(old, new))
 
 
 def test_an_empty_file_lacks_every_section() -> None:
-    message = fault_of("")
-    assert "3 faults" in message
+    message = error_of("")
+    assert "3 errors" in message
     assert all(f"[{section}] lacks" in message for section in ("yaw", "rudder", "surge"))
 
 
-def test_what_is_no_toml_says_where() -> None:
-    assert "line 2" in fault_of("[yaw]\nT1 = = 3")
+def test_a_text_that_is_not_toml_is_an_error_with_its_line() -> None:
+    assert "line 2" in error_of("[yaw]\nT1 = = 3")
 
 
 def test_a_missing_file_offers_the_nearest_preset() -> None:
@@ -175,7 +177,7 @@ def test_a_missing_file_offers_the_nearest_preset() -> None:
         load_vessel("tabel1")
 
 
-def test_what_cannot_be_read_as_text_is_an_error(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_as_text_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(VesselError, match="cannot read the vessel file"):
         load_vessel(tmp_path)
     (tmp_path / "ship.toml").write_bytes(b"\xff\xfe\x00")
