@@ -11,9 +11,8 @@ from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
 from analysis.identification.validation import Validation
 from analysis.manoeuvres.indices import ManoeuvreIndex
 from shiplog.ships.motion import MODEL_OUTPUTS
+from shiplog.text_table import TextTable
 from shiplog.units import CATALOGUE, conversion_factor
-
-from .section import Section
 
 FITTED = "output error"
 PEOPLES = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}
@@ -21,7 +20,7 @@ ALIKE, MOST_PAIRS = 0.97, 3  # of correlations that are told
 UNIT = {name: CATALOGUE[name].unit for name in MODEL_OUTPUTS} | {"track": "m"}
 
 
-def identification_tables(found: IdentifiedShip) -> tuple[Section, ...]:
+def identification_tables(found: IdentifiedShip) -> tuple[TextTable, ...]:
     """Tables in the units people use, and what is to be said of them."""
     made = [_coefficients(found), _prior_shares(found), _runs(found)]
     if found.validations:
@@ -31,7 +30,7 @@ def identification_tables(found: IdentifiedShip) -> tuple[Section, ...]:
     return tuple(made)
 
 
-def _comparison(found: IdentifiedShip) -> Section:
+def _comparison(found: IdentifiedShip) -> TextTable:
     rows = []
     for candidate in found.candidates:
         told = candidate.fit is not None
@@ -51,7 +50,7 @@ def _comparison(found: IdentifiedShip) -> Section:
         "deviation of what was measured. The least is taken."
     )
     title = f"Models by cross-validation: {found.model.name}"
-    return Section(title, columns, tuple(rows), (remark,))
+    return TextTable(title, columns, tuple(rows), (remark,))
 
 
 def mean_misfits(candidate: Candidate) -> list[float]:
@@ -60,7 +59,7 @@ def mean_misfits(candidate: Candidate) -> list[float]:
     return [float(np.mean(column)) if len(column) else np.nan for column in columns]
 
 
-def _coefficients(found: IdentifiedShip) -> Section:
+def _coefficients(found: IdentifiedShip) -> TextTable:
     told, rows = found.uncertainty, []
     for i, name in enumerate(told.names):
         value, half, bound = told.values[i], 1.96 * told.std[i], 1.96 * told.bound[i]
@@ -74,7 +73,7 @@ def _coefficients(found: IdentifiedShip) -> Section:
         rows.append((name, f"{value:.5g}", "stated", "", "", found.model.parameter(name).unit))
     columns = ("coefficient", "value", "95 %", "bound", "echo", "unit")
     title = f"Coefficients: {found.model.title}"
-    return Section(title, columns, tuple(rows), tuple(_remarks(found)))
+    return TextTable(title, columns, tuple(rows), tuple(_remarks(found)))
 
 
 def _remarks(found: IdentifiedShip) -> Iterator[str]:
@@ -119,7 +118,7 @@ def _by_advice(found: IdentifiedShip) -> dict[str, list[str]]:
     return grouped
 
 
-def _prior_shares(found: IdentifiedShip) -> Section:
+def _prior_shares(found: IdentifiedShip) -> TextTable:
     """How much of each coefficient is prior, by each method that begins with one."""
     by_method = prior_shares_by_method(found)
     rows = tuple(
@@ -132,7 +131,7 @@ def _prior_shares(found: IdentifiedShip) -> Section:
         f"priors to either side, {100 * OFF:.0f} % off or more, over the latter half of the runs. "
         "100 % is a copy of the prior; beyond it errors grow."
     )
-    return Section(
+    return TextTable(
         "PriorSensitivity of what was believed before", ("coefficient", *by_method), rows, (remark,)
     )
 
@@ -152,7 +151,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f} %" if isfinite(share) else ""
 
 
-def _runs(found: IdentifiedShip) -> Section:
+def _runs(found: IdentifiedShip) -> TextTable:
     outputs, rows = found.fit.problem.outputs, []
     for run in found.runs:
         biases = [_shown(value, UNIT[name]) for name, value in run.biases.items()]
@@ -169,10 +168,10 @@ def _runs(found: IdentifiedShip) -> Section:
         *(_headed(name, " bias") for name in found.runs[0].biases), "swell",
     )  # fmt: skip
     remark = "Residuals' rms, and what each run has of its own, fitted with it."
-    return Section("Fit", columns, tuple(rows), (remark,))
+    return TextTable("Fit", columns, tuple(rows), (remark,))
 
 
-def _held_out(found: IdentifiedShip) -> Section:
+def _held_out(found: IdentifiedShip) -> TextTable:
     names = [n for n in (*MODEL_OUTPUTS, "track") if any(n in v.rms for v in found.validations)]
     rows = []
     for each in found.validations:
@@ -186,14 +185,14 @@ def _held_out(found: IdentifiedShip) -> Section:
         "Simulated open loop from how each run began, under its rudder and revolutions: the rms of "
         "what is off."
     )
-    return Section("Validation", columns, tuple(rows), (remark,))
+    return TextTable("Validation", columns, tuple(rows), (remark,))
 
 
-def _figures(validation: Validation) -> Section:
+def _figures(validation: Validation) -> TextTable:
     rows = tuple(_figure(figure) for figure in validation.figures)
     columns = ("figure", "measured", "simulated", "off", "off [%]")
     remark = "Counted from where the rudder leaves its rest by 0.5°."
-    return Section(f"Figures of {validation.segment.name}", columns, rows, (remark,))
+    return TextTable(f"Figures of {validation.segment.name}", columns, rows, (remark,))
 
 
 def _figure(figure: ManoeuvreIndex) -> tuple[str, ...]:

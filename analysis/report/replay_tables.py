@@ -7,18 +7,19 @@ import numpy as np
 
 from analysis.replay.replay import Findings
 from analysis.replay.residuals import ResidualSummary
+from shiplog.text_table import TextTable
 from shiplog.units import CATALOGUE, conversion_factor
 
 from .display import BAND_STDS, DISTURBANCES
-from .section import Section, markdown_page
+from .markdown import markdown_page
 
 
-def replay_tables(findings: Findings) -> tuple[Section, ...]:
+def replay_tables(findings: Findings) -> tuple[TextTable, ...]:
     """Return the results of a replay as tables in the units people use.
 
     Returns
     -------
-    tuple of Section
+    tuple of TextTable
         The log, the filter's residuals, the disturbances and the coefficients; then the changes of
         coefficients within the trial, where there are any.
     """
@@ -37,7 +38,7 @@ def replay_markdown(findings: Findings) -> str:
     return markdown_page(findings.plan.name, (*results, log), findings.warnings)
 
 
-def _log_table(findings: Findings) -> Section:
+def _log_table(findings: Findings) -> TextTable:
     log_stats, rows = findings.plan.log_stats, []
     for channel in log_stats:
         rate = f"{1 / channel.interval_secs:.3g} Hz" if channel.interval_secs else ""
@@ -48,10 +49,10 @@ def _log_table(findings: Findings) -> Section:
         rows.append((channel.topic, f"{channel.samples}", rate, gaps))
     start = np.datetime64(log_stats.span_ns[0], "ns").astype("M8[s]")
     title = f"Log: {log_stats.duration_secs:.0f} s from {start} UTC"
-    return Section(title, ("channel", "samples", "rate", "gaps"), tuple(rows))
+    return TextTable(title, ("channel", "samples", "rate", "gaps"), tuple(rows))
 
 
-def _residual_table(findings: Findings) -> Section:
+def _residual_table(findings: Findings) -> TextTable:
     rows = []
     for residuals in findings.residuals:
         unit = CATALOGUE[residuals.name].display_unit
@@ -70,7 +71,7 @@ def _residual_table(findings: Findings) -> Section:
         "innovation of", "rms", "mean NIS", "expected\n(99 %)", "whiteness\np-value", "rejected",
     )  # fmt: skip
     remarks = (*_filter_remarks(findings), *map(_residual_remark, findings.residuals))
-    return Section("Filter residuals", columns, tuple(rows), remarks)
+    return TextTable("Filter residuals", columns, tuple(rows), remarks)
 
 
 def _filter_remarks(findings: Findings) -> Iterator[str]:
@@ -110,7 +111,7 @@ def _residual_remark(residuals: ResidualSummary) -> str:
     )
 
 
-def _disturbance_table(findings: Findings) -> Section:
+def _disturbance_table(findings: Findings) -> TextTable:
     settings, rows = findings.plan.disturbance_settings, []
     slow = {"constant", "ramp"} & set(settings.models)
     for key, (name, unit, scale) in DISTURBANCES.items():
@@ -131,10 +132,10 @@ def _disturbance_table(findings: Findings) -> Section:
     remarks = [f"Disturbance models: {', '.join(models)}.", explanation]
     if findings.plan.model_is_fitted:
         remarks.append("The model was fitted to this log: this is what it does not explain.")
-    return Section("Disturbances", columns, tuple(rows), tuple(remarks))
+    return TextTable("Disturbances", columns, tuple(rows), tuple(remarks))
 
 
-def _coefficient_table(findings: Findings) -> Section:
+def _coefficient_table(findings: Findings) -> TextTable:
     plan, rows = findings.plan, []
     model = plan.vessel.paper_coefficients._asdict()
     for fit in (findings.yaw, findings.surge):
@@ -145,7 +146,7 @@ def _coefficient_table(findings: Findings) -> Section:
             in_model = "" if plan.model_is_fitted else f"{model[name]:.4g}"
             rows.append((name, value, std, coefficient.unit, in_model))
     columns = ("coefficient", "from this log", "std", "unit", "in the model")
-    return Section("Coefficients", columns, tuple(rows), tuple(_coefficient_remarks(findings)))
+    return TextTable("Coefficients", columns, tuple(rows), tuple(_coefficient_remarks(findings)))
 
 
 def _coefficient_remarks(findings: Findings) -> Iterator[str]:
@@ -169,7 +170,7 @@ def _coefficient_remarks(findings: Findings) -> Iterator[str]:
         )
 
 
-def _change_tables(findings: Findings) -> tuple[Section, ...]:
+def _change_tables(findings: Findings) -> tuple[TextTable, ...]:
     """Return a table of the coefficients that changed within the trial; none if none did."""
     if not findings.changes:
         return ()
@@ -196,7 +197,7 @@ def _change_tables(findings: Findings) -> tuple[Section, ...]:
         if change.instead
     ]
     columns = ("coefficient", "at", "before", "after", "difference")
-    return (Section("Changes within the trial", columns, rows, tuple(remarks)),)
+    return (TextTable("Changes within the trial", columns, rows, tuple(remarks)),)
 
 
 def _words(name: str) -> str:

@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 from analysis.identification.comparison.history import run_secs
 from analysis.identification.identify import IdentifiedShip
 from analysis.report.identification_tables import identification_tables
-from analysis.report.section import markdown_page
+from analysis.report.markdown import markdown_page
 
 from .identification_panels import RunSheet, parameter_panels, run_sheets
 from .panels import Panel

@@ -6,27 +6,14 @@ import textwrap
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
 
 from shiplog.files import atomic_write
 from shiplog.progress import ProgressCallback
+from shiplog.text_table import TextTable
 
 MIN_NAME_WIDTH = 12  # characters of a shortened cell in the first column
 EDGES, GAP = 4, 3  # of a printed table, in characters
 FIRST_ESTIMATE_SECS = 2.0  # of work, before the remaining time is estimated
-
-
-class Table(Protocol):
-    """A table for people: a title, columns, rows of text, and remarks below."""
-
-    @property
-    def title(self) -> str: ...  # noqa: D102
-    @property
-    def columns(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def rows(self) -> tuple[tuple[str, ...], ...]: ...  # noqa: D102
-    @property
-    def remarks(self) -> tuple[str, ...]: ...  # noqa: D102
 
 
 @contextmanager
@@ -79,7 +66,7 @@ def _remaining(elapsed_secs: float, share: float | None) -> str:
     return f", about {secs:.0f} s left" if secs < 100 else f", about {secs / 60:.0f} min left"
 
 
-def print_tables(tables: Sequence[Table], *, to_stderr: bool = False) -> None:
+def print_tables(tables: Sequence[TextTable], *, to_stderr: bool = False) -> None:
     """Print tables and their remarks, in the width of the console.
 
     No word and no number is broken: headings wrap between words, long names in the first column
@@ -87,13 +74,13 @@ def print_tables(tables: Sequence[Table], *, to_stderr: bool = False) -> None:
     """
     from rich.box import SIMPLE
     from rich.console import Console
-    from rich.table import Table as RichTable
+    from rich.table import Table
 
     console = Console(stderr=to_stderr, highlight=False, markup=False)  # [deg] is a unit
     for table in tables:
         for number, part in enumerate(_fitted(table.columns, table.rows, console.width)):
             title = table.title if number == 0 else f"{table.title} (continued)"
-            shown = RichTable(title=title, title_justify="left", title_style="bold", box=SIMPLE)
+            shown = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE)
             for i, heading in enumerate(part[0]):
                 shown.add_column(heading, justify="left" if i == 0 else "right", no_wrap=True)
             for row in part[1:]:

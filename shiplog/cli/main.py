@@ -6,12 +6,13 @@ Results go to stdout, everything else to stderr. Only the verb that is asked for
 import argparse
 import os
 import sys
-from collections.abc import Mapping, Sequence
-from importlib.metadata import EntryPoint, entry_points
+from collections.abc import Sequence
+from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 
 from shiplog.errors import ShiplogError, UsageError
+from shiplog.extensions import extension_names, load_extension
 from shiplog.version import __version__
 
 from .verb import ExitCode, Verb
@@ -63,8 +64,8 @@ def _fail(error: object, code: ExitCode) -> ExitCode:
 
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser: of the verb that is asked for, or, to list them, of all."""
-    found = _verb_entries()
-    asked = next((text for text in arguments if text in found), None)
+    names = _verb_names()
+    asked = next((text for text in arguments if text in names), None)
     parser = argparse.ArgumentParser(
         prog="shiplog",
         description="Record, convert, replay, identify and check sea trials.",
@@ -72,8 +73,8 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"shiplog {__version__}")
     parsers = parser.add_subparsers(metavar="VERB")
-    for name in (asked,) if asked else found:
-        verb = _load(found[name]) if asked else _load_or_describe(found[name])
+    for name in (asked,) if asked else names:
+        verb = _load(name) if asked else _load_for_list(name)
         text = f"{verb.help[0].upper()}{verb.help[1:]}."
         own = parsers.add_parser(
             name,
@@ -87,43 +88,30 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     return parser
 
 
-def _verb_entries() -> Mapping[str, EntryPoint]:
-    found = {entry.name: entry for entry in entry_points(group=GROUP)}
-    if not found:
+def _verb_names() -> list[str]:
+    """List the installed verbs: ours in the order of a trial's way, then the others by name."""
+    names = extension_names(GROUP)
+    if not names:
         raise ShiplogError("no verb is installed; install shiplog with: pip install -e .")
-    ours = {name: found.pop(name) for name in ORDER if name in found}
-    return ours | dict(sorted(found.items()))
+    return sorted(
+        names, key=lambda name: (ORDER.index(name) if name in ORDER else len(ORDER), name)
+    )
 
 
-def _load(entry: EntryPoint) -> Verb:
+def _load(name: str) -> Verb:
     """Import a verb; raises `ShiplogError` that names the package where that fails."""
-    _require_not_shadowed(entry.module.partition(".")[0])
-    try:
-        verb = entry.load()
-    except Exception as error:
-        raise ShiplogError(
-            f"the verb {entry.name!r} cannot be loaded from {entry.value} "
-            f"({type(error).__name__}: {error}); reinstall or remove {_distribution(entry)}"
-        ) from error
-    if not isinstance(verb, Verb):
-        raise ShiplogError(
-            f"the verb {entry.name!r} is not a Verb but a {type(verb).__name__}: {entry.value} "
-            f"of {_distribution(entry)}"
-        )
-    return verb
+    for entry in entry_points(group=GROUP, name=name):
+        _require_not_shadowed(entry.module.partition(".")[0])
+    return load_extension(GROUP, name, Verb, "verb")
 
 
-def _load_or_describe(entry: EntryPoint) -> Verb:
-    """Import a verb for the list of verbs; one that cannot be loaded is listed as such."""
+def _load_for_list(name: str) -> Verb:
+    """Import a verb; one that cannot be loaded is listed with the reason."""
     try:
-        return _load(entry)
+        return _load(name)
     except ShiplogError as error:
-        text = f"(cannot be loaded: {error})".replace("%", "%%")
-        return Verb(text, lambda _: None, lambda _: ExitCode.FAILURE, ())
-
-
-def _distribution(entry: EntryPoint) -> str:
-    return entry.dist.name if entry.dist else "its package"
+        reason = str(error).replace("%", "%%")  # argparse formats help texts
+        return Verb(f"({reason})", lambda _: None, lambda _: ExitCode.FAILURE, ())
 
 
 def _require_not_shadowed(package: str) -> None:

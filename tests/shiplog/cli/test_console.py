@@ -1,26 +1,20 @@
 """Printed tables fit the console without breaking a word or a number."""
 
 import re
-from dataclasses import dataclass
 
 import pytest
 
 from shiplog.cli.console import print_tables, progress, shortened
-
-
-@dataclass(frozen=True)
-class Table:
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    remarks: tuple[str, ...] = ()
-
+from shiplog.text_table import TextTable
 
 NUMBERS = ("-2.22e-05", "0.00478", "62.7 s", "123.456", "± 0.0029")
 
 
 def printed(
-    table: Table, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    table: TextTable,
+    width: int,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> list[str]:
     monkeypatch.setenv("COLUMNS", str(width))
     print_tables([table])
@@ -37,7 +31,7 @@ def test_no_number_and_no_word_of_a_heading_is_broken(
         (f"zigzag_of_a_long_trial_{row}.mcap", *(NUMBERS[i % 5] for i in range(1, count)))
         for row in range(3)
     )
-    lines = printed(Table("Fit", headings, rows), width, capsys, monkeypatch)
+    lines = printed(TextTable("Fit", headings, rows), width, capsys, monkeypatch)
     assert all(len(line) <= width for line in lines)
     text = "\n".join(lines)
     assert all(number in text for number in NUMBERS[1 : min(count, 5)])
@@ -59,7 +53,9 @@ def test_a_long_name_keeps_its_beginning_and_its_end() -> None:
 def test_a_table_without_rows_is_its_headings(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert "heading" in "\n".join(printed(Table("T", ("heading",), ()), 80, capsys, monkeypatch))
+    assert "heading" in "\n".join(
+        printed(TextTable("T", ("heading",), ()), 80, capsys, monkeypatch)
+    )
 
 
 def test_without_a_terminal_each_step_is_a_line_where_it_is_asked_for(

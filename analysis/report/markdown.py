@@ -1,37 +1,16 @@
-"""Tables for people, and pages of tables in Markdown."""
+"""Pages of tables in Markdown."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from shiplog.text_table import TextTable
 
 
-@dataclass(frozen=True)
-class Section:
-    """A table with a title and remarks, in the units people use.
-
-    Attributes
-    ----------
-    title
-        The title of the table.
-    columns
-        The heading of each column; a newline in it is a good place to break the line.
-    rows
-        The cells of each row, as many as there are columns.
-    remarks
-        Sentences below the table.
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    remarks: tuple[str, ...] = ()
-
-
-def markdown_page(title: str, sections: Iterable[Section], warnings: Iterable[str]) -> str:
+def markdown_page(title: str, sections: Iterable[TextTable], warnings: Iterable[str]) -> str:
     """Format tables, their remarks and warnings as a page in Markdown.
 
     Examples
     --------
-    >>> table = Section("Track", ("north", "east"), (("1", "2"),))
+    >>> table = TextTable("Track", ("north", "east"), (("1", "2"),))
     >>> print(markdown_page("zigzag", [table], ["no compass"]))
     # zigzag
     <BLANKLINE>
