@@ -236,9 +236,9 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
     if arguments.json:
         write_json(identification_json(ship), arguments.json)
     if review:
-        from analysis.view.identification_review import write_review
+        from analysis.view.identification_review import write_identification_review
 
-        write_review(ship, review)
+        write_identification_review(ship, review)
     print_tables(identification_tables(ship), to_stderr=arguments.json == "-")
     print_warnings(ship.warnings)
     if review:

@@ -118,7 +118,7 @@ def _circle(found: IdentifiedShip) -> Validation:
 
 
 def _circle_rows(found: dict[str, IdentifiedShip]) -> Iterator[tuple[str, ...]]:
-    figures = {said: _circle(each).figures for said, each in found.items()}
+    figures = {said: _circle(each).indices for said, each in found.items()}
     shown = {"rad/s": (degrees(1), "°/s"), "m": (1.0, "m"), "s": (1.0, "s"), "m/s": (1.0, "m/s")}
     for marin, hsva, both in zip(*figures.values(), strict=True):
         factor, unit = shown[marin.unit]
@@ -143,7 +143,7 @@ def _sailed_rows(
     for angle, log in zip(OVERSHOOTS, zigzags, strict=True):
         run = run_from_log(log)
         figures = [
-            {figure.name: figure for figure in validate(each.fit, run)[0].figures}
+            {figure.name: figure for figure in validate(each.fit, run)[0].indices}
             for each in found.values()
         ]
         for k, name in enumerate(("first", "second")):

@@ -70,11 +70,11 @@ _delete_outdated_caches(CACHE_FOLDER)
 
 
 def compiled(function: F) -> F:
-    """Compile a function on its first call and keep the machine code for later runs.
+    """Compile `function` on its first call, and keep the machine code for later runs.
 
-    Division by zero gives infinity or NaN, as in numpy.
+    It releases the GIL, so that threads run it at the same time.
     """
-    return cast("F", numba.njit(cache=True, error_model="numpy")(function))
+    return cast("F", numba.njit(cache=True, error_model="numpy", nogil=True)(function))
 
 
 def is_compiled(package: str) -> bool:
@@ -90,7 +90,7 @@ def compiled_in_caller(function: F) -> F:
     a cache entry of its own, the machine code would outlive a change of the module for which it
     was compiled.
     """
-    return cast("F", numba.njit(error_model="numpy")(function))
+    return cast("F", numba.njit(error_model="numpy", nogil=True)(function))
 
 
 def overload_for(generic: Callable[..., object], kind: type) -> Callable[[F], F]:

@@ -524,7 +524,7 @@ def test_a_ship_is_identified_validated_written_sailed_and_replayed(
     assert "tactical diameter [m]" in said.out
     assert "vessel file: found.toml" in said.err
     found = json.loads(Path("f.json").read_text())
-    assert found["coefficients"]["d"]["value"] == pytest.approx(1 / 7500, rel=3e-3)
+    assert found["parameters"]["d"]["value"] == pytest.approx(1 / 7500, rel=3e-3)
     assert found["fixed"]["T3"] == 0.5
     (validation,) = found["validation"]
     assert validation["rms"]["yaw_rate"] < np.radians(0.02)

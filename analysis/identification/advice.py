@@ -1,4 +1,4 @@
-"""What would tell a parameter that these data cannot tell, and whether to tie the paper's."""
+"""Which manoeuvres identify a parameter, and whether the ties of the paper's model hold."""
 
 from dataclasses import dataclass
 
@@ -9,84 +9,114 @@ from shiplog.ships import ship_model
 from .output_error import OutputError, output_error
 from .uncertainty import uncertainty
 
-CONTRADICTED = 3.0  # standard deviations by which a tie is off
-UNDECIDED = 1.0  # half an interval of (b1 + d)/d: between a tie and a ship at the margin
-_SMALL = "a 10/10 zig-zag or a pull-out: a slow turn that grows or dies by itself"
-_HARD = "a 20/20 zig-zag or a 35° turning circle: a fast turn"
-_QUICK = "a zig-zag or a pseudo-random run: the rudder often reversed"
+MAX_TIE_DEVIATION = 3.0  # standard deviations of (b1 + d)/d from zero: beyond, the tie fails
+MAX_TIE_HALF_INTERVAL = 1.0  # of (b1 + d)/d at 95 %: beyond, the data do not decide
+RUDDER_PARAMETERS = ("alpha1", "alpha2", "alpha3")  # the paper's, given by a vessel file
+_SLOW_TURN = "a 10/10 zig-zag or a pull-out, which hold a slow turn that grows or decays by itself"
+_FAST_TURN = "a 20/20 zig-zag or a 35° turning circle, which hold a fast turn"
+_REVERSALS = "a zig-zag or a pseudo-random run, in which the rudder is often reversed"
 _CIRCLE = "a 35° turning circle, held until the speed is steady"
-_SPEEDS = "straight runs or turns at two rates of revolutions or more"
-_DRIFT = "a zig-zag and a circle with the sway measured too (layouts derive it from velocities)"
-TOLD_BY = {
-    **dict.fromkeys(("a", "d", "e", "T3", "k", "yd", "nd"), _QUICK),
-    **dict.fromkeys(("b1", "nr", "nv"), _SMALL),
-    **dict.fromkeys(("b2", "b3", "a3", "cy", "cn"), _HARD),
+_TWO_SPEEDS = "straight runs or turns at two or more rates of revolutions"
+_SWAY = "a zig-zag and a turning circle with the sway velocity measured too"
+MANOEUVRES = {
+    **dict.fromkeys(("a", "d", "e", "T3", "k", "yd", "nd"), _REVERSALS),
+    **dict.fromkeys(("b1", "nr", "nv"), _SLOW_TURN),
+    **dict.fromkeys(("b2", "b3", "a3", "cy", "cn"), _FAST_TURN),
     **dict.fromkeys(("f", "f1", "f2", "xvr", "x4", "xd"), _CIRCLE),
-    **dict.fromkeys(("g", "h", "p", "m", "w", "alpha1", "alpha2", "alpha3"), _SPEEDS),
-    **dict.fromkeys(("c1", "c2", "Td", "yv", "yr"), _DRIFT),
-    "e0": "the same manoeuvre to both sides",
+    **dict.fromkeys(("g", "h", "p", "m", "w", *RUDDER_PARAMETERS), _TWO_SPEEDS),
+    **dict.fromkeys(("c1", "c2", "Td", "yv", "yr"), _SWAY),
+    "e0": "the same manoeuvre to port and to starboard",
 }
 
 
 def manoeuvres_to_identify(name: str) -> str:
-    """The manoeuvre that would tell a parameter of any model, in words."""
-    return TOLD_BY.get(name, "a manoeuvre that moves what it multiplies")
+    """Name the manoeuvre whose log would determine a parameter of any ship model.
+
+    Examples
+    --------
+    >>> manoeuvres_to_identify("f")
+    'a 35° turning circle, held until the speed is steady'
+    """
+    return MANOEUVRES.get(name, "a manoeuvre that excites the term of this parameter")
 
 
 @dataclass(frozen=True)
 class TieCheck:
-    """Whether b1 = -d holds, by a fit in the free form."""
+    """Whether b1 = -d holds, by a fit of the paper's model with b1 and d both free.
 
-    sum_over_d: float  # (b1 + d) / d: zero where it holds
-    std: float  # of it
-    marginal: bool  # whether b1 may be zero or positive, where the tie is singular
+    Attributes
+    ----------
+    sum_over_d
+        (b1 + d)/d, zero where the tie holds.
+    std
+        Its standard deviation.
+    marginal
+        Whether b1 may be zero or positive, where the tied form is singular.
+    """
+
+    sum_over_d: float
+    std: float
+    marginal: bool
 
     @property
     def contradicted(self) -> bool:
-        """Whether the data speak against it."""
-        return abs(self.sum_over_d) > CONTRADICTED * self.std
+        """Whether the data contradict the tie."""
+        return abs(self.sum_over_d) > MAX_TIE_DEVIATION * self.std
 
     def advice(self, *, tied: bool) -> str:
-        """In words: for the tie, or against it; `tied` where it is made already."""
-        off = f"(b1 + d)/d = {self.sum_over_d:.2g} ± {1.96 * self.std:.2g} in the free form"
-        if 1.96 * self.std > UNDECIDED:
-            return f"Ties b1 = −d, e = T3·d: the data cannot tell, {off}; tied, they are believed."
+        """Recommend the tied or the free form; `tied` where the fit is of the tied form."""
+        half = 1.96 * self.std
+        result = f"(b1 + d)/d = {self.sum_over_d:.2g} ± {half:.2g} (95 %) in the free form"
+        ties = "Ties b1 = −d and e = T3·d"
+        if half > MAX_TIE_HALF_INTERVAL:
+            return f"{ties}: undecided, {result}; the tied form assumes them."
         if self.contradicted:
-            return f"Ties b1 = −d, e = T3·d: the data speak against them, {off}; leave it free."
+            return f"{ties}: contradicted by the data, {result}; use the free form, burylin."
         if self.marginal:
             return (
-                f"Ties b1 = −d, e = T3·d: not contradicted ({off}), but b1 may be zero, where they "
-                "are singular; leave it free, or add a manoeuvre that tells b1."
+                f"{ties}: not contradicted, {result}, but b1 may be zero, where they are singular; "
+                "use the free form, burylin, or add a 10/10 zig-zag or a pull-out."
             )
-        more = "" if tied else "; --model burylin-tied tells b1 and e more surely"
+        more = "" if tied else "; the model burylin-tied gives narrower intervals of b1 and e"
         return (
-            f"Ties b1 = −d, e = T3·d: the data allow them, {off}{more}, "
-            "if the ship's gear is as the α's say."
+            f"{ties}: consistent with the data, {result}{more}, "
+            "provided that the rudder parameters α are right."
         )
 
 
 def check_ties(fit: OutputError) -> TieCheck | None:
-    """Whether the paper's ties hold for the ship of a fit to either of its forms; else None."""
+    """Test the ties of the paper's model.
+
+    Parameters
+    ----------
+    fit
+        A fit of either form; the tied form is fitted again in the free form.
+
+    Returns
+    -------
+    check
+        None for any other model, or where b1 or d is fixed.
+    """
     if fit.problem.model.name not in ("burylin", "burylin-tied"):
         return None
-    free = fit if fit.problem.model.name == "burylin" else _in_free_form(fit)
-    found = uncertainty(free, between_runs=False)
-    if not {"b1", "d"} <= set(found.names):
+    free = fit if fit.problem.model.name == "burylin" else _free_form(fit)
+    estimates = uncertainty(free, between_runs=False)
+    if not {"b1", "d"} <= set(estimates.names):
         return None
-    i, j = found.names.index("b1"), found.names.index("d")
-    b1, d = found.values[i], found.values[j]
-    covariance = found.covariance[np.ix_((i, j), (i, j))]
-    slope = np.array([1 / d, -b1 / d**2])
-    std = float(np.sqrt(slope @ covariance @ slope))
-    return TieCheck(float((b1 + d) / d), std, bool(b1 + 1.96 * found.std[i] >= 0))
+    i, j = estimates.names.index("b1"), estimates.names.index("d")
+    b1, d = estimates.values[i], estimates.values[j]
+    covariance = estimates.covariance[np.ix_((i, j), (i, j))]
+    gradient = np.array([1 / d, -b1 / d**2])
+    std = float(np.sqrt(gradient @ covariance @ gradient))
+    return TieCheck(float((b1 + d) / d), std, bool(b1 + 1.96 * estimates.std[i] >= 0))
 
 
-def _in_free_form(fit: OutputError) -> OutputError:
-    problem, free = fit.problem, ship_model("burylin")
+def _free_form(fit: OutputError) -> OutputError:
+    """Fit the free form, starting from a fit of the tied form."""
+    problem = fit.problem
     start = problem.model.coefficients(fit.parameters)._asdict()
-    known = {name: start[name] for name in ("alpha1", "alpha2", "alpha3")}
-    start = {name: value for name, value in start.items() if name not in known}
+    fixed = {name: start.pop(name) for name in RUDDER_PARAMETERS}
     return output_error(
-        problem.segments, free, start=start, fixed=known, nuisance=problem.nuisance,
-        outputs=problem.outputs,
+        problem.segments, ship_model("burylin"), start=start, fixed=fixed,
+        nuisance=problem.nuisance, outputs=problem.outputs,
     )  # fmt: skip

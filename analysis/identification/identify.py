@@ -1,7 +1,9 @@
-"""From logs to a ship's coefficients, what they are worth, and what they say of other logs."""
+"""Identification of a ship model from logs, with its uncertainty and its validation."""
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
 
@@ -10,144 +12,237 @@ from analysis.identification.comparison.paper_scheme import paper_scheme
 from analysis.identification.comparison.parameter_ekf import parameter_ekf
 from analysis.identification.comparison.windows import window_estimates
 from shiplog.errors import LogError, UsageError
+from shiplog.mcap.stream import open_log
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model, loadable_models, ship_model
-from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray, Log
 from shiplog.vessel.vessel import Vessel
 
 from .advice import TieCheck, check_ties, manoeuvres_to_identify
+from .fit_warnings import fit_warnings
+from .fixed_parameters import check_fixed, fixed_values
 from .model_selection import Candidate, rank_models
 from .output_error import OutputError, make_problem, output_error
 from .prior_sensitivity import PriorSensitivity, prior_sensitivity
 from .problem import residuals
-from .runs import common_vessel, consistency_warnings, distinct_runs
-from .segment import Segment
+from .runs import Run, common_vessel, consistency_warnings, distinct_runs
 from .uncertainty import Uncertainty, uncertainty
 from .validation import Validation, nan_rms, validate
 
 AUTO = "auto"
-ALPHAS = ("alpha1", "alpha2", "alpha3")
-UNEXPLAINED = 0.2  # of what was measured, in the rms: a fit that leaves more says little
-CONTRADICTING = 3.0  # times what noise explains: runs that differ so much are not one ship's
+LogSource = Log | str | os.PathLike[str]
 
 
 @dataclass(frozen=True, eq=False)
 class RunFit:
-    """How a fit goes with a run it was made from."""
+    """How well a fit reproduces one segment, and what was estimated for that segment alone.
+
+    Attributes
+    ----------
+    name
+        The log's name.
+    duration_secs
+        The segment's duration.
+    rms
+        Root mean square of the residuals of each output, SI.
+    rudder_offset
+        The rudder's zero, rad; any constant yaw moment is part of it.
+    biases
+        Of the sensors that have one, SI.
+    wave_secs
+        The periods of the swells found.
+    """
 
     name: str
     duration_secs: float
-    rms: Mapping[str, float]  # of the residuals of each output, SI
-    rudder_offset: float  # rad: the rudder's zero, and every constant yaw moment
-    biases: Mapping[str, float]  # of sensors, SI
-    wave_secs: tuple[float, ...]  # the periods of swells
+    rms: dict[str, float]
+    rudder_offset: float
+    biases: dict[str, float]
+    wave_secs: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedShip:
-    """A model of a ship from logs of hers."""
+    """A ship model identified from logs.
+
+    Attributes
+    ----------
+    model
+        The model that was fitted, or that was chosen.
+    fit
+        The output-error fit.
+    uncertainty
+        Standard deviations, intervals and Cramér-Rao bounds of the free parameters.
+    prior_sensitivity
+        How far the fit depends on its priors.
+    histories
+        Estimates over time by other methods, for comparison.
+    runs
+        The segments that were fitted.
+    validations
+        The segments that were predicted.
+    candidates
+        The models compared, the best first; empty where the model was named.
+    ties
+        Whether the ties of the paper's model hold; None for another model.
+    vessel
+        The vessel file whose length, rudder parameters and steering gear are used, if any.
+    length_given
+        Whether the ship's length is given; otherwise one is assumed.
+    fixed
+        The parameters that were not estimated.
+    advice
+        By parameter that is not identifiable, the manoeuvre that would determine it.
+    warnings
+        Warnings about the logs and about the fit.
+    data_lost
+        Whether a log is damaged and data were lost.
+    """
 
     model: Model
     fit: OutputError
     uncertainty: Uncertainty
     prior_sensitivity: PriorSensitivity
-    histories: tuple[ParameterHistory, ...]  # of other methods, for comparison
+    histories: tuple[ParameterHistory, ...]
     runs: tuple[RunFit, ...]
     validations: tuple[Validation, ...]
-    candidates: tuple[Candidate, ...]  # the best first; empty where the model was named
-    ties: TieCheck | None  # of the paper's model
-    vessel: Vessel | None  # whose length and steering gear were taken
+    candidates: tuple[Candidate, ...]
+    ties: TieCheck | None
+    vessel: Vessel | None
     length_given: bool
-    fixed: Mapping[str, float]  # parameters that were not sought
-    advice: Mapping[str, str] = field(default_factory=dict)  # by parameter: what would tell it
+    fixed: dict[str, float]
+    advice: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     data_lost: bool = False
 
     @property
-    def coefficients(self) -> dict[str, float]:
-        """All the model's parameters, sought or known, in their own units."""
+    def parameters(self) -> dict[str, float]:
+        """All the model's parameters, estimated or fixed, in their own units."""
         return dict(zip(self.model.names, self.fit.parameters.tolist(), strict=True))
 
     @property
     def covariance(self) -> FloatArray:
-        """(p, p) of the parameters sought, `uncertainty.names`."""
+        """(p, p) covariance of the free parameters, in the order of `uncertainty.names`."""
         return self.uncertainty.covariance
 
     @property
     def identifiable(self) -> tuple[str, ...]:
-        """The parameters that these logs do tell."""
+        """The free parameters that these logs determine."""
         return tuple(n for n in self.uncertainty.names if n not in self.uncertainty.unidentifiable)
 
 
 def identify(
-    logs: Sequence[Log],
+    logs: LogSource | Sequence[LogSource],
     model: str | Model | None = None,
     *,
-    validation_logs: Sequence[Log] = (),
+    validation_logs: LogSource | Sequence[LogSource] = (),
     fixed: Mapping[str, float] | None = None,
     vessel: Vessel | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> IdentifiedShip:
-    """Fit a model of `shiplog.ships` to logs of one ship, all at once.
+    """Fit a ship model to one or more logs of the same ship by output error.
 
-    `model` is a `Model`, the name of an installed one, or "auto": all installed ones are compared,
-    and the one is taken that predicts each run best from the others. Without a name it is the
-    paper's model, tied where T3 is known. `known` parameters are not sought. Length, the rudder's
-    alphas and the steering gear are those of `vessel`, or of the vessel file the logs carry.
+    Parameters
+    ----------
+    logs
+        A log, the path of a log file, or a sequence of either; all are fitted together.
+    model
+        The name of an installed ship model, a `Model`, or ``"auto"``: each installed model is
+        fitted, and the one is taken that best predicts each log from the others. If None, the
+        paper's model, in its tied form if T3 is fixed.
+    validation_logs
+        Logs that are not fitted but predicted, given as `logs`.
+    fixed
+        Parameters that are not estimated, by name, in their own units.
+    vessel
+        Gives the ship's length, the parameters alpha1, alpha2 and alpha3 of the rudder, and the
+        steering gear; if None, the vessel file that the logs carry.
+    on_progress
+        Given each step and the share of the whole work that is done.
 
-    Raises `LogError` where the logs cannot identify anything or are of different ships, and
-    `UsageError` for names nobody knows.
+    Returns
+    -------
+    ship
+        The model with its uncertainty, the fit of each log, and the validation.
+
+    Raises
+    ------
+    LogError
+        The logs cannot identify anything, are of different ships, or no model fits them.
+    UsageError
+        An unknown model or parameter, a log given twice, or fewer than two logs for ``"auto"``.
+
+    Examples
+    --------
+    >>> ship = identify("sample_data/zigzag_20_20.mcap", fixed={"T3": 0.5})
+    >>> ship.model.name, round(1e6 * ship.parameters["d"])
+    ('burylin-tied', 133)
     """
-    if not logs:
-        raise UsageError("no log to identify from; give at least one")
-    stated = dict(fixed or {})
-    model = model or ("burylin-tied" if "T3" in stated else "burylin")
-    considered, warnings = _considered(model)
-    _require_known(considered, stated)
-    on_progress("read")
-    runs, held_out = distinct_runs(logs, validation_logs)
+    fixed = dict(fixed or {})
+    model = model or ("burylin-tied" if "T3" in fixed else "burylin")
+    models, warnings = _models_of(model)
+    check_fixed(models, fixed)
+    steps = _Steps(on_progress, auto=model == AUTO)
+    steps.begin("read")
+    runs, held_out = _read(logs, validation_logs)
     ship = common_vessel([*runs, *held_out], vessel)
-    segments = [segment for run in runs for segment in run.segments]
-    length = ship.length if ship else None
-    candidates: list[Candidate] = []
-    if model == AUTO:
-        candidates = _compared(segments, considered, stated, ship, length, on_progress)
-        fit = _best(candidates)
-    else:
-        on_progress(f"fit {considered[0].name}")
-        settled = _settled(considered[0], stated, ship)
-        fit = output_error(segments, considered[0], fixed=settled, length=length)
-    on_progress("uncertainty")
-    found = uncertainty(fit)
-    on_progress("echo")
-    echo = prior_sensitivity(fit, found)
-    found = replace(found, prior_share=np.fmax(found.prior_share, echo.shares))
-    priors = two_priors(found, fit.problem.bounds)
-    histories = parameter_ekf(fit, priors), window_estimates(fit), paper_scheme(fit, priors)
-    on_progress("validation")
+    steps.begin("fit")
+    candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)
+    steps.begin("uncertainty")
+    estimates = uncertainty(fit)
+    steps.begin("prior sensitivity")
+    sensitivity = prior_sensitivity(fit, estimates)
+    share = np.fmax(estimates.prior_share, sensitivity.shares)
+    estimates = replace(estimates, prior_share=share)
+    steps.begin("other methods")
+    histories = _histories(fit, estimates)
+    steps.begin("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
-    every = [*runs, *held_out]
-    warnings += [w for run in every for w in run.warnings]
-    warnings += [*consistency_warnings(every), *_doubts(fit, found, echo, validations)]
-    if fit.problem.scale.secs != 1.0 and length is None:
-        warnings.append(
-            f"no length is known, {fit.problem.scale.secs * fit.problem.scale.speed:.0f} m is "
-            "taken for the scale of a model without dimensions, whose priors depend on it a "
-            "little; state it in a vessel file"
-        )
+    warnings += [warning for run in (*runs, *held_out) for warning in run.warnings]
+    warnings += consistency_warnings([*runs, *held_out])
+    warnings += fit_warnings(fit, estimates, sensitivity, validations)
+    warnings += _assumed_length(fit, ship)
+    names, values = fit.problem.model.names, fit.parameters.tolist()
     return IdentifiedShip(
-        fit.problem.model, fit, found, echo, tuple(each for each in histories if each is not None),
-        tuple(_run_fits(fit)), tuple(validations),
-        tuple(candidates), check_ties(fit), ship, length is not None,
-        {n: v for n, v in zip(fit.problem.model.names, fit.parameters.tolist(), strict=True)
-         if n not in found.names},
-        {name: manoeuvres_to_identify(name) for name in found.unidentifiable},
-        tuple(warnings), any(run.data_lost for run in every),
-    )  # fmt: skip
+        model=fit.problem.model,
+        fit=fit,
+        uncertainty=estimates,
+        prior_sensitivity=sensitivity,
+        histories=histories,
+        runs=tuple(_run_fits(fit)),
+        validations=tuple(validations),
+        candidates=tuple(candidates),
+        ties=check_ties(fit),
+        vessel=ship,
+        length_given=ship is not None and ship.length is not None,
+        fixed={n: v for n, v in zip(names, values, strict=True) if n not in estimates.names},
+        advice={name: manoeuvres_to_identify(name) for name in estimates.unidentifiable},
+        warnings=tuple(warnings),
+        data_lost=any(run.data_lost for run in (*runs, *held_out)),
+    )
 
 
-def _considered(model: str | Model) -> tuple[list[Model], list[str]]:
+STEPS = ("read", "fit", "uncertainty", "prior sensitivity", "other methods", "validation")
+NAMED_STARTS = (0.0, 0.03, 0.25, 0.5, 0.6, 0.97)  # of each step, as a share of the duration
+AUTO_STARTS = (0.0, 0.01, 0.8, 0.88, 0.9, 0.99)
+
+
+class _Steps:
+    """Progress of an identification: its steps, and the progress within the fit."""
+
+    def __init__(self, on_progress: ProgressCallback, *, auto: bool) -> None:
+        self._on_progress = on_progress
+        self._starts = dict(zip(STEPS, AUTO_STARTS if auto else NAMED_STARTS, strict=True))
+
+    def begin(self, step: str) -> None:
+        self._on_progress(step, self._starts[step])
+
+    def within_fit(self, step: str, share: float | None = None, /) -> None:
+        start, end = self._starts["fit"], self._starts["uncertainty"]
+        self._on_progress(step, start + (end - start) * (share or 0.0))
+
+
+def _models_of(model: str | Model) -> tuple[list[Model], list[str]]:
     """Return the models to fit, and a warning for each installed one that cannot be loaded."""
     if model == AUTO:
         models, warnings = loadable_models()
@@ -155,129 +250,92 @@ def _considered(model: str | Model) -> tuple[list[Model], list[str]]:
     return [model if isinstance(model, Model) else ship_model(model)], []
 
 
-def _require_known(models: Sequence[Model], known: Mapping[str, float]) -> None:
-    for model in models:
-        if all(parameter.fixed or parameter.name in known for parameter in model.parameters):
-            raise UsageError(
-                f"every parameter of {model.name} is known, and nothing is left to seek"
-            )
-    for name, value in known.items():
-        having = [model for model in models if name in model.names]
-        if not having:
-            models[0].parameter(name)
-        units = {model.parameter(name).unit for model in having}
-        if len(units) > 1:
-            raise UsageError(
-                f"--known {name} is in {' or '.join(sorted(units))}, as the model has it; "
-                "name the model with --model"
-            )
-        lowest, highest = (
-            pick(getattr(model.parameter(name), limit) for model in having)
-            for pick, limit in ((max, "lowest"), (min, "highest"))
-        )
-        if not (np.isfinite(value) and lowest <= value <= highest):
-            raise UsageError(
-                f"--known {name} must be a finite number from {lowest:g} to {highest:g}, "
-                f"got {value:g}"
-            )
+def _read(
+    logs: LogSource | Sequence[LogSource], validation_logs: LogSource | Sequence[LogSource]
+) -> tuple[list[Run], list[Run]]:
+    """Return the runs to fit and the runs to predict."""
+    fitted, held_out = _opened(logs), _opened(validation_logs)
+    if not fitted:
+        raise UsageError("no log to identify a ship from; give at least one")
+    return distinct_runs(fitted, held_out)
 
 
-def _settled(model: Model, known: Mapping[str, float], ship: Vessel | None) -> dict[str, float]:
-    """What is known of a model's parameters: what was said, and the alphas of the vessel file."""
-    settled = {name: known[name] for name in model.names if name in known}
-    if ship is not None and ship.coefficients is not None:
-        alphas = {n: getattr(ship.coefficients, n) for n in ALPHAS if n in model.names}
-        settled = alphas | settled
-    return settled
+def _opened(logs: LogSource | Sequence[LogSource]) -> list[Log]:
+    """Return logs given as one log, one path, or a sequence of either."""
+    is_one = isinstance(logs, str | os.PathLike) or hasattr(logs, "chunks")
+    each = [cast("LogSource", logs)] if is_one else cast("Sequence[LogSource]", logs)
+    return [open_log(log) if isinstance(log, str | os.PathLike) else log for log in each]
 
 
-def _compared(
-    segments: Sequence[Segment],
+def _fit(
+    runs: Sequence[Run],
     models: Sequence[Model],
-    known: Mapping[str, float],
+    fixed: Mapping[str, float],
     ship: Vessel | None,
-    length: float | None,
-    on_progress: ProgressCallback,
-) -> list[Candidate]:
-    make_problem(segments, models[0], length=length)  # raises for useless logs
-    found: list[Candidate] = []
-    for i, model in enumerate(models):
-        on_progress(f"cross-validate {model.name}", i / len(models))
-        found += rank_models(segments, [model], fixed=_settled(model, known, ship), length=length)
-    return sorted(found, key=lambda candidate: (candidate.fit is None, candidate.score))
+    steps: _Steps,
+    *,
+    ranked: bool,
+) -> tuple[list[Candidate], OutputError]:
+    """Return the candidates, if models are to be ranked, and the fit that is taken."""
+    segments = [segment for run in runs for segment in run.segments]
+    length = ship.length if ship else None
+    given = {model.name: fixed_values(model, fixed, ship) for model in models}
+    if not ranked:
+        (model,) = models
+        return [], output_error(segments, model, fixed=given[model.name], length=length)
+    make_problem(segments, models[0], length=length)  # rejects logs that are useless to any model
+    candidates = rank_models(
+        segments, models, fixed=given, length=length, on_progress=steps.within_fit
+    )
+    return candidates, _best_fit(candidates)
 
 
-def _best(candidates: Sequence[Candidate]) -> OutputError:
+def _best_fit(candidates: Sequence[Candidate]) -> OutputError:
     for candidate in candidates:
         if candidate.fit is not None:
             return candidate.fit
-    raise LogError("every model runs away on these logs; look at their signs and units")
+    raise LogError(
+        "the simulation of every model diverges on these logs; check their signs and units"
+    )
+
+
+def _histories(fit: OutputError, estimates: Uncertainty) -> tuple[ParameterHistory, ...]:
+    """Return the estimates over time of the other methods that apply to the model."""
+    priors = two_priors(estimates, fit.problem.bounds)
+    histories = parameter_ekf(fit, priors), window_estimates(fit), paper_scheme(fit, priors)
+    return tuple(history for history in histories if history is not None)
+
+
+def _assumed_length(fit: OutputError, ship: Vessel | None) -> Iterator[str]:
+    """Yield a warning where a dimensionless model is scaled by an assumed length."""
+    scale = fit.problem.scale
+    if scale.secs != 1.0 and (ship is None or ship.length is None):
+        yield (
+            f"the ship's length is not given; {scale.secs * scale.speed:.0f} m is assumed as the "
+            "scale of the dimensionless model, on which its priors depend a little; give a vessel "
+            "file with the length"
+        )
 
 
 def _run_fits(fit: OutputError) -> Iterator[RunFit]:
+    """Yield of each segment its residuals and its own unknowns."""
     problem, z = fit.problem, fit.minimum.unknowns
-    left = residuals(problem, z)
+    residual = residuals(problem, z)
+    has_offset = problem.nuisance.rudder_std > 0
+    offset = len(problem.model.state)
+    biases = offset + has_offset
+    waves = biases + len(problem.biases)
     for i, segment in enumerate(problem.segments):
         own = z[problem.own_slice(i)]
-        at = len(problem.model.state)
-        has_offset = problem.nuisance.rudder_std > 0
-        biases = at + has_offset
-        waves = biases + len(problem.biases)
-        omegas = own[waves :: 1 + 2 * len(problem.outputs)]
+        frequencies = own[waves :: 1 + 2 * len(problem.outputs)]
         yield RunFit(
-            segment.name, (len(segment) - 1) * segment.dt_secs,
-            {output: nan_rms(left[i][:, c]) for c, output in enumerate(problem.outputs)},
-            float(own[at]) if has_offset else 0.0,
-            {problem.outputs[c]: float(own[biases + k])
-             for k, (c, _) in enumerate(problem.biases)},
-            tuple(float(2 * np.pi / abs(omega)) for omega in omegas),
-        )  # fmt: skip
-
-
-def _unexplained(fit: OutputError) -> Iterator[str]:
-    """The runs of which the fit leaves much, white noise aside."""
-    problem = fit.problem
-    for segment, left, spread in zip(
-        problem.segments, residuals(problem, fit.minimum.unknowns), fit.residual_stds, strict=True
-    ):
-        for c, output in enumerate(problem.outputs):
-            measured = segment.measured[:, MODEL_OUTPUTS.index(output)]
-            white = max(float(np.mean(spread.typical[:, c] ** 2)) - fit.noises[c].slow ** 2, 0.0)
-            stays = np.sqrt(max(nan_rms(left[:, c]) ** 2 - white, 0.0))
-            size = float(np.nanstd(measured)) if np.isfinite(measured).any() else 0.0
-            if stays > UNEXPLAINED * size and stays**2 > white:
-                yield (
-                    f"{segment.name}: the fit leaves {100 * stays / size:.0f} % of the "
-                    f"{output.replace('_', ' ')} unexplained: "
-                    "a contrary rudder, wrong units, another ship, or a model that is not hers"
-                )
-
-
-def _doubts(
-    fit: OutputError, found: Uncertainty, echo: PriorSensitivity, validations: Sequence[Validation]
-) -> Iterator[str]:
-    """What makes a fit hard to believe."""
-    if not fit.minimum.converged:
-        yield "the search has not come to an end: the values are where it stopped"
-    if echo.elsewhere:
-        yield (
-            "from another start the search ends elsewhere, where the fit is "
-            f"{'better' if echo.worse_by < 0 else 'worse'}: the logs hardly tell this model; "
-            "give more manoeuvres, or take a simpler one"
+            name=segment.name,
+            duration_secs=(len(segment) - 1) * segment.dt_secs,
+            rms={name: nan_rms(residual[i][:, c]) for c, name in enumerate(problem.outputs)},
+            rudder_offset=float(own[offset]) if has_offset else 0.0,
+            biases={
+                problem.outputs[c]: float(own[biases + k])
+                for k, (c, _) in enumerate(problem.biases)
+            },
+            wave_secs=tuple(float(2 * np.pi / abs(omega)) for omega in frequencies),
         )
-    yield from _unexplained(fit)
-    apart = found.agreement.contradiction
-    if apart > CONTRADICTING:
-        alone = len(fit.problem.runs) == 1
-        who = f"the halves of {fit.problem.segments[0].name}" if alone else "the logs"
-        odd = f", {found.agreement.outlier} the others" if found.agreement.outlier else ""
-        yield (
-            f"{who} contradict each other{odd}, {apart:.0f} times what their noise explains: "
-            "another ship, loading or depth, or a model that is not hers; the intervals allow for "
-            "it"
-        )
-    if set(found.unidentifiable) == set(found.names):
-        yield "nothing is identifiable from these logs: no value of the model is to be believed"
-    for validation in validations:
-        if validation.diverged:
-            yield f"{validation.segment.name}: the simulated ship runs away: no prediction of it"

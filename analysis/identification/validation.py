@@ -1,6 +1,7 @@
-"""A fit against runs it never saw: simulated open loop, in the units of a segment.
+"""Open-loop prediction of runs that were not fitted, and how far it is from the measurement.
 
-The ship begins as the run began, and then hears of nothing but rudder and revolutions.
+The simulation starts in the run's initial state and is given only the recorded rudder and
+revolutions.
 """
 
 from dataclasses import dataclass
@@ -16,112 +17,171 @@ from .prediction import dead_reckoning, predict
 from .runs import Run
 from .segment import Segment
 
-FIXES_SECS = 5.0, 60.0  # of fixes before the rudder moves, at least and at most, tell a course
-ASTRAY = 0.03  # of their length, off the way sailed: more is no course
+HEADING = MODEL_OUTPUTS.index("heading")
+MIN_FIXES_SECS, MAX_FIXES_SECS = 5.0, 60.0  # of fixes before the rudder moves, to find a heading
+MAX_TRACK_MISMATCH = 0.03  # rms distance over the track's length: beyond it no heading fits
 
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """A run, and what the fit says of it."""
+    """Comparison of a segment that was not fitted with its simulation.
+
+    Attributes
+    ----------
+    segment
+        The inputs and what was measured.
+    simulated
+        (n, 4) outputs in the order of `MODEL_OUTPUTS`, SI; NaN from where the simulation diverges.
+    track
+        (n, 2) simulated position north and east of the start, m.
+    measured_track
+        (n, 2) the same as measured: by the position fixes, or else by speed and heading.
+    rms
+        Root mean square of simulated minus measured of each output that was measured and that the
+        model predicts, and of the distance between the tracks (``track``): rad/s, m/s, rad, m.
+    indices
+        Indices of a turning circle or of a zig-zag; empty for any other run.
+    """
 
     segment: Segment
-    simulated: FloatArray  # (n, 4) in the order of MODEL_OUTPUTS, NaN where the ship ran away
-    track: FloatArray  # (n, 2) m north and east from the start, as simulated,
-    measured_track: FloatArray  # and as measured: by the fixes, or else by speed and heading
-    rms: dict[str, float]  # rad/s, m/s, rad, m: of each output measured, and of the track
-    figures: tuple[ManoeuvreIndex, ...]  # of a circle or of a zig-zag
+    simulated: FloatArray
+    track: FloatArray
+    measured_track: FloatArray
+    rms: dict[str, float]
+    indices: tuple[ManoeuvreIndex, ...]
 
     @property
     def diverged(self) -> bool:
-        """Whether the simulated ship did."""
+        """Whether the simulation diverged."""
         return not bool(np.isfinite(self.simulated).all())
 
 
 def validate(fit: OutputError, run: Run) -> list[Validation]:
-    """A fit against each piece of a run."""
+    """Compare a fit with each segment of a run that was not fitted.
+
+    Parameters
+    ----------
+    fit
+        The fitted model.
+    run
+        The run, with position fixes if it has any.
+
+    Returns
+    -------
+    validations
+        One for each segment, in order.
+    """
     return [
-        _validation(fit, segment, fixes)
+        _validate_segment(fit, segment, fixes)
         for segment, fixes in zip(run.segments, run.positions, strict=True)
     ]
 
 
-def _validation(fit: OutputError, segment: Segment, fixes: FloatArray | None) -> Validation:
-    course = 0.0 if fixes is None or segment.has("heading") else initial_heading(segment, fixes)
-    if course is None:  # the fixes are north and east of a ship that headed nobody knows where
-        course, fixes = 0.0, None
-    measured = filled_measurements(segment, course)
-    simulated = predict(fit, _headed(segment, measured))
-    track, sailed = (
-        dead_reckoning(simulated, segment.dt_secs),
-        dead_reckoning(measured, segment.dt_secs),
-    )
+def _validate_segment(fit: OutputError, segment: Segment, fixes: FloatArray | None) -> Validation:
+    heading = 0.0 if fixes is None or segment.has("heading") else initial_heading(segment, fixes)
+    if heading is None:  # fixes are of no use where the initial heading is unknown
+        heading, fixes = 0.0, None
+    measured = filled_measurements(segment, heading)
+    simulated = predict(fit, _with_heading(segment, measured[:, HEADING]))
+    track = dead_reckoning(simulated, segment.dt_secs)
+    measured_track = dead_reckoning(measured, segment.dt_secs)
     if fixes is not None:
-        sailed = _from_first_fix(fixes, sailed if np.isnan(track).any() else track)
-    off = simulated - segment.measured
+        reference = measured_track if np.isnan(track).any() else track
+        measured_track = _shifted_to(fixes, reference)
+    residual = simulated - segment.measured
     predicted = (*fit.problem.model.outputs, "heading")
     rms = {
-        name: nan_rms(off[:, i])
+        name: nan_rms(residual[:, i])
         for i, name in enumerate(MODEL_OUTPUTS)
         if segment.has(name) and name in predicted
     }
-    rms["track"] = nan_rms(np.hypot(*(track - sailed).T))
-    figures = tuple(manoeuvre_indices(segment, measured, sailed, simulated, track))
-    return Validation(segment, simulated, track, sailed, rms, figures)
+    rms["track"] = nan_rms(np.hypot(*(track - measured_track).T))
+    indices = tuple(manoeuvre_indices(segment, measured, measured_track, simulated, track))
+    return Validation(segment, simulated, track, measured_track, rms, indices)
 
 
-def filled_measurements(segment: Segment, course: float = 0.0) -> FloatArray:
-    """What was measured, its holes filled in.
+def filled_measurements(segment: Segment, heading: float = 0.0) -> FloatArray:
+    """Return the measured outputs with gaps interpolated.
 
-    A heading nobody measured is the turning summed up, from the `course` she began on.
+    Parameters
+    ----------
+    segment
+        A segment; an output without two samples stays NaN.
+    heading
+        Initial heading, rad, from which the yaw rate is integrated where no heading was measured.
+
+    Returns
+    -------
+    outputs
+        (n, 4) in the order of `MODEL_OUTPUTS`, SI.
     """
-    columns = [_filled_in(column) for column in segment.measured.T]
+    columns = [_interpolated(column) for column in segment.measured.T]
     if not segment.has("heading"):
         rate = columns[0]
         turned = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2)) * segment.dt_secs
-        columns[3] = course + turned
+        columns[HEADING] = heading + turned
     return np.column_stack(columns)
 
 
-def _filled_in(values: FloatArray) -> FloatArray:
+def _interpolated(values: FloatArray) -> FloatArray:
     at = np.flatnonzero(np.isfinite(values))
     return np.interp(np.arange(len(values)), at, values[at]) if len(at) > 1 else 0.0 * values
 
 
 def initial_heading(segment: Segment, fixes: FloatArray) -> float | None:
-    """The course a ship without heading began on, in rad: that which lays her way on the fixes.
+    """Find the initial heading that turns the dead-reckoned track onto the position fixes.
 
-    Only those before the rudder moves are looked at, for in a turn she drifts. None where they are
-    too few, or where no course lays one on the other.
+    Only fixes before the first rudder order are used: in a turn the ship drifts.
+
+    Parameters
+    ----------
+    segment
+        A segment without a measured heading.
+    fixes
+        (n, 2) positions north and east, m; NaN where unknown.
+
+    Returns
+    -------
+    heading
+        In rad; None where there are less than `MIN_FIXES_SECS` of fixes, or where they are more
+        than `MAX_TRACK_MISMATCH` of the track's length away from it.
     """
     order = first_execute(segment.signals["rudder"], segment.dt_secs)
-    least, most = (round(secs / segment.dt_secs) for secs in FIXES_SECS)
-    before = len(segment) if order is None else order + 1
-    known = np.flatnonzero(np.isfinite(fixes[:before]).all(axis=1))[:most]
-    if len(known) <= least:
+    fewest, most = (round(secs / segment.dt_secs) for secs in (MIN_FIXES_SECS, MAX_FIXES_SECS))
+    straight = len(segment) if order is None else order + 1
+    fixed = np.flatnonzero(np.isfinite(fixes[:straight]).all(axis=1))[:most]
+    if len(fixed) <= fewest:
         return None
-    sailed = dead_reckoning(filled_measurements(segment), segment.dt_secs)[known]
-    way, seen = ((each - each.mean(axis=0)) @ [1, 1j] for each in (sailed, fixes[known]))
-    course = float(np.angle(np.vdot(way, seen)))
-    off = nan_rms(np.abs(way * np.exp(1j * course) - seen))
-    return course if off < ASTRAY * abs(way[-1] - way[0]) else None
+    reckoned = dead_reckoning(filled_measurements(segment), segment.dt_secs)[fixed]
+    # as complex numbers, north + i east, about their means: a heading is a rotation
+    track, seen = ((each - each.mean(axis=0)) @ [1, 1j] for each in (reckoned, fixes[fixed]))
+    heading = float(np.angle(np.vdot(track, seen)))
+    mismatch = nan_rms(np.abs(track * np.exp(1j * heading) - seen))
+    return heading if mismatch < MAX_TRACK_MISMATCH * abs(track[-1] - track[0]) else None
 
 
-def _headed(segment: Segment, measured: FloatArray) -> Segment:
-    """The segment with a heading to begin with."""
+def _with_heading(segment: Segment, heading: FloatArray) -> Segment:
+    """Return the segment with its own heading or, where it has none, with this one, (n,)."""
     if segment.has("heading"):
         return segment
-    given = segment.measured.copy()
-    given[:, 3] = measured[:, 3]
-    return Segment(segment.name, segment.signals, segment.path, given)
+    measured = segment.measured.copy()
+    measured[:, HEADING] = heading
+    return Segment(segment.name, segment.signals, segment.path, measured)
 
 
-def _from_first_fix(fixes: FloatArray, track: FloatArray) -> FloatArray:
-    """The fixes laid on a track at the first of them, which need not be where the run begins."""
-    known = np.flatnonzero(np.isfinite(fixes).all(axis=1))
-    return fixes - fixes[known[0]] + track[known[0]] if len(known) else fixes
+def _shifted_to(fixes: FloatArray, track: FloatArray) -> FloatArray:
+    """Shift the fixes onto a track at the first fix, which may be later than the run's start."""
+    fixed = np.flatnonzero(np.isfinite(fixes).all(axis=1))
+    return fixes - fixes[fixed[0]] + track[fixed[0]] if len(fixed) else fixes
 
 
-def nan_rms(off: FloatArray) -> float:
-    """The root of the mean square of what is known; NaN where nothing is."""
-    known = off[np.isfinite(off)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+def nan_rms(values: FloatArray) -> float:
+    """Return the root mean square of the finite values; NaN where there are none.
+
+    Examples
+    --------
+    >>> nan_rms(np.array([3.0, np.nan, -3.0]))
+    3.0
+    """
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if len(finite) else np.nan

@@ -1,7 +1,8 @@
-"""An identified ship as a vessel file, for `record simulate` and `replay`.
+"""Vessel file of an identified ship, for `shiplog record simulate` and `shiplog replay`.
 
-What is sailed is the model that was identified. What is filtered by is the paper's, which filters
-and observers are built on: where another was identified, that one is fitted beside it.
+`[model]` holds the identified model, which simulations use. `[yaw]`, `[surge]` and `[rudder]` hold
+the paper's model, on which filters and observers are designed: where another model was identified,
+the paper's is fitted to the same logs as well.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -16,177 +17,203 @@ from shiplog.ships.paper import COEFFICIENT_UNITS, YAW_COEFFICIENTS, Coefficient
 from shiplog.vessel.model_section import PAPER_MODELS
 from shiplog.vessel.vessel import Vessel
 
-from .identify import ALPHAS, IdentifiedShip
+from .advice import RUDDER_PARAMETERS
+from .fixed_parameters import fixed_values
+from .identify import IdentifiedShip
 from .output_error import USUAL_LENGTH, OutputError, output_error
 from .segment import initial_level
 from .uncertainty import ECHO, UNIDENTIFIABLE, Uncertainty, uncertainty
 
 SECTIONS = {"yaw": YAW_COEFFICIENTS, "surge": ("f", "g", "h")}
-ANGLES = {"b2": 1, "b3": 2, "f": 2}  # how often an angle stands in their denominators
-PER_UNIT = {"rad": 1.0, "deg": 180 / pi}  # of such a unit to the radian
-SURGE = ("f", "f1", "f2", "g", "h", "p", "xvr", "x4", "xd")  # of any model; the others turn her
+ANGLE_POWERS = {"b2": 1, "b3": 2, "f": 2}  # power of the angle in the unit's denominator
+PER_RADIAN = {"rad": 1.0, "deg": 180 / pi}
+# of the surge equations of all models; the other parameters are of the yaw and sway equations
+SURGE_PARAMETERS = ("f", "f1", "f2", "g", "h", "p", "xvr", "x4", "xd")
 
-WITH_PAPERS = ("", "# What `replay` filters by: the paper's model, fitted to the same logs.")
-WITHOUT_PAPERS = (
+PAPER_MODEL_COMMENT = (
     "",
-    "# The paper's model, by which `replay` filters, cannot be identified from these logs:",
-    "# `replay` fits a first one to each log.",
+    "# The paper's model, fitted to the same logs; `shiplog replay` designs its filters on it.",
+)
+NO_PAPER_MODEL_COMMENT = (
+    "",
+    "# The paper's model, on which `shiplog replay` designs its filters, cannot be identified from",
+    "# these logs: `shiplog replay` fits a preliminary model to each log instead.",
 )
 
 
-def vessel_toml(found: IdentifiedShip, on_progress: ProgressCallback = no_progress) -> str:
-    """The text of the vessel file, each value with its 95 % interval or a caution.
+def vessel_toml(ship: IdentifiedShip, on_progress: ProgressCallback = no_progress) -> str:
+    """Write the vessel file of an identified ship.
 
-    Raises `LogError` where nobody knows anything of the yaw or of the surge: the logs tell nothing
-    of it, and not all of it is believed before any.
+    Parameters
+    ----------
+    ship
+        The result of `identify`.
+    on_progress
+        Given a step where the paper's model is fitted as well, which takes as long as a fit.
+
+    Returns
+    -------
+    text
+        TOML; the comment of each value is its 95 % interval or a caution.
+
+    Raises
+    ------
+    LogError
+        No parameter of the yaw equations, or none of the surge equations, is identifiable, and
+        not all of them have a prior either.
     """
-    for part in _untold(found.model, found.uncertainty):
+    for part in _undetermined_parts(ship.model, ship.uncertainty):
         raise LogError(
-            f"nothing of the {part} is identifiable from these logs, and a vessel file "
-            "would hold numbers nobody knows; give a log of a zig-zag as well"
+            f"no parameter of the {part} equation is identifiable from these logs, so that no "
+            "vessel file is written; add the log of a zig-zag"
         )
-    if found.model.name in PAPER_MODELS:
-        own = [*_head(found), *_paper(found.fit, found.uncertainty, _angle_unit(found.vessel))]
-        return _text([*own, *_rudder(found.vessel, found.fit)])
-    own = [*_head(found), *_model(found)]
-    on_progress("fit the paper's model beside it")
-    paper = _beside(found)
+    unit = _angle_unit(ship.vessel)
+    if ship.model.name in PAPER_MODELS:
+        own = [*_head(ship), *_paper_sections(ship.fit, ship.uncertainty, unit)]
+        return _text([*own, *_rudder(ship.vessel, ship.fit)])
+    own = [*_head(ship), *_model_section(ship)]
+    on_progress("fit the paper's model")
+    paper = _paper_model(ship)
     if paper is None:
-        return _text([*own, *WITHOUT_PAPERS, *_rudder(found.vessel)])
-    return _text(
-        [
-            *own,
-            *WITH_PAPERS,
-            *_paper(*paper, _angle_unit(found.vessel)),
-            *_rudder(found.vessel, paper[0]),
-        ]
-    )
+        return _text([*own, *NO_PAPER_MODEL_COMMENT, *_rudder(ship.vessel)])
+    fit, estimates = paper
+    sections = [*_paper_sections(fit, estimates, unit), *_rudder(ship.vessel, fit)]
+    return _text([*own, *PAPER_MODEL_COMMENT, *sections])
 
 
 def _text(lines: Iterable[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _untold(model: Model, found: Uncertainty) -> Iterator[str]:
-    """Whether nothing is known of her yaw, of her surge.
+def _undetermined_parts(model: Model, estimates: Uncertainty) -> Iterator[str]:
+    """Yield "yaw" and "surge" where neither data nor priors determine any of their parameters.
 
-    By the noise alone: a model that is not the ship has wider intervals, and may be near enough.
+    Judged by the standard deviations of the noise alone: those of a model that does not fit the
+    ship are wider, but the model may still be close enough to be used.
     """
-    told = (found.coloured <= UNIDENTIFIABLE * np.abs(found.values)) & (found.prior_share <= ECHO)
+    by_data = estimates.coloured <= UNIDENTIFIABLE * np.abs(estimates.values)
+    by_data &= estimates.prior_share <= ECHO
     for part in ("yaw", "surge"):
-        own = np.array([(name in SURGE) == (part == "surge") for name in found.names], bool)
-        priors = [model.parameter(name).prior_std for name in np.array(found.names)[own]]
-        if not (told[own].any() or np.isfinite(priors).all()):
+        is_surge = part == "surge"
+        own = np.array([(name in SURGE_PARAMETERS) == is_surge for name in estimates.names], bool)
+        priors = [model.parameter(name).prior_std for name in np.array(estimates.names)[own]]
+        if not (by_data[own].any() or np.isfinite(priors).all()):
             yield part
 
 
-def _beside(found: IdentifiedShip) -> tuple[OutputError, Uncertainty] | None:
-    """The paper's model fitted to the same logs; None where it runs away or is no ship's.
+def _paper_model(ship: IdentifiedShip) -> tuple[OutputError, Uncertainty] | None:
+    """Fit the paper's model to the same logs, unless it is among the candidates already.
 
-    It is not hers, so that no value of it need be told: it is as near as filters come. But its
-    second order has nothing to hold on to in a ship of the first: a pole that the rudder never
-    shows may lie anywhere, and a rudder that acts to the contrary side with it.
+    It does not fit this ship exactly, so that its parameters need not be identifiable: it is as
+    close as the filters' model can be. None where its simulation diverges, or where it is not a
+    ship's: for a ship of first order a second pole may lie anywhere, and the rudder's effect may
+    have the wrong sign.
     """
-    segments = found.fit.problem.segments
-    fits = [c.fit for c in found.candidates if c.model.name == "burylin" and c.fit is not None]
-    known = found.vessel.coefficients if found.vessel is not None else None
+    segments = ship.fit.problem.segments
+    fits = [c.fit for c in ship.candidates if c.model.name == "burylin" and c.fit is not None]
     try:
-        fit = fits[0] if fits else output_error(
-            segments, ship_model("burylin"),
-            fixed={name: getattr(known, name) for name in ALPHAS} if known is not None else {},
-        )  # fmt: skip
+        if fits:
+            fit = fits[0]
+        else:
+            model = ship_model("burylin")
+            fit = output_error(segments, model, fixed=fixed_values(model, {}, ship.vessel))
     except LogError:
         return None
-    told, c = uncertainty(fit), _coefficients(fit)
-    works = (
-        rudder_effect(c, initial_level(segments, "speed"), initial_level(segments, "rpm")) * c.d
-        > 0
-        > c.a
-    )
-    return (fit, told) if works else None
-
-
-def _head(found: IdentifiedShip) -> Iterator[str]:
-    ship, segments = found.vessel, found.fit.problem.segments
-    logs = ", ".join(dict.fromkeys(segment.name for segment in segments))
-    name = f"{ship.name if ship else 'ship'}, identified"
-    yield f"# {found.model.title}, identified from {logs}"
-    yield f"name = {_quoted(name)}"
-    if ship is not None and ship.length is not None:
-        yield f"length = {ship.length!r}"
-    elif found.model.dimensionless:
-        yield f"length = {USUAL_LENGTH!r}  # m, ASSUMED, for nobody gave it: the scale of [model]"
-    yield f"approach_rpm = {round(initial_level(segments, 'rpm'), 3)!r}"
-    yield f'angle_unit = "{_angle_unit(ship)}"'
-
-
-def _angle_unit(ship: Vessel | None) -> str:
-    """Her own file's: the paper's noise, too, is told in it."""
-    return ship.angle_unit if ship is not None else "deg"
-
-
-def _model(found: IdentifiedShip) -> Iterator[str]:
-    scale, remark = found.fit.problem.scale, _remarks(found.uncertainty)
-    yield "\n# what `record simulate` sails"
-    yield "[model]"
-    yield f"name = {_quoted(found.model.name)}"
-    yield f"speed = {scale.speed!r}  # m/s: with the length and rpm, the units of the equations"
-    yield f"rpm = {scale.rpm!r}"
-    for name, value in found.coefficients.items():
-        yield f"{name} = {value!r}  # {remark(name)}"
-
-
-def _paper(fit: OutputError, told: Uncertainty, unit: str) -> Iterator[str]:
-    per = {key: PER_UNIT[unit] ** power for key, power in ANGLES.items()}
     c = _coefficients(fit)
-    remark = _remarks(told, per, tied=fit.problem.model.name == "burylin-tied")
+    effect = (
+        rudder_effect(c, initial_level(segments, "speed"), initial_level(segments, "rpm")) * c.d
+    )
+    return (fit, uncertainty(fit)) if effect > 0 > c.a else None
+
+
+def _head(ship: IdentifiedShip) -> Iterator[str]:
+    """Yield the lines before the first section."""
+    vessel, segments = ship.vessel, ship.fit.problem.segments
+    logs = ", ".join(dict.fromkeys(segment.name for segment in segments))
+    name = f"{vessel.name if vessel else 'ship'}, identified"
+    yield f"# {ship.model.title}, identified from {logs}"
+    yield f"name = {_quoted(name)}"
+    if vessel is not None and vessel.length is not None:
+        yield f"length = {vessel.length!r}"
+    elif ship.model.dimensionless:
+        yield f"length = {USUAL_LENGTH!r}  # m, ASSUMED, as none was given: the scale of [model]"
+    yield f"approach_rpm = {round(initial_level(segments, 'rpm'), 3)!r}"
+    yield f'angle_unit = "{_angle_unit(vessel)}"'
+
+
+def _angle_unit(vessel: Vessel | None) -> str:
+    """Return the unit of the vessel file's own angles, in which filters have their noise."""
+    return vessel.angle_unit if vessel is not None else "deg"
+
+
+def _model_section(ship: IdentifiedShip) -> Iterator[str]:
+    """Yield `[model]`."""
+    scale, comment = ship.fit.problem.scale, _comments(ship.uncertainty)
+    yield "\n# `shiplog record simulate` uses this model."
+    yield "[model]"
+    yield f"name = {_quoted(ship.model.name)}"
+    yield f"speed = {scale.speed!r}  # m/s; with length and rpm, the scale of the parameters"
+    yield f"rpm = {scale.rpm!r}"
+    for name, value in ship.parameters.items():
+        yield f"{name} = {value!r}  # {comment(name)}"
+
+
+def _paper_sections(fit: OutputError, estimates: Uncertainty, unit: str) -> Iterator[str]:
+    """Yield `[yaw]` and `[surge]`, with angles in `unit`."""
+    divisors = {name: PER_RADIAN[unit] ** power for name, power in ANGLE_POWERS.items()}
+    c = _coefficients(fit)
+    comment = _comments(estimates, divisors, tied=fit.problem.model.name == "burylin-tied")
     for section, names in SECTIONS.items():
         yield f"\n[{section}]"
-        for key in names:
-            value = getattr(c, key) / per.get(key, 1.0)
-            in_file = COEFFICIENT_UNITS[key].replace("rad", unit)
-            yield f"{key} = {value!r}  # {in_file}, {remark(key)}"
+        for name in names:
+            value = getattr(c, name) / divisors.get(name, 1.0)
+            file_unit = COEFFICIENT_UNITS[name].replace("rad", unit)
+            yield f"{name} = {value!r}  # {file_unit}, {comment(name)}"
 
 
-def _rudder(ship: Vessel | None, paper: OutputError | None = None) -> Iterator[str]:
+def _rudder(vessel: Vessel | None, paper: OutputError | None = None) -> Iterator[str]:
+    """Yield `[rudder]`: the paper's rudder parameters and the steering gear, where known."""
     yield "\n[rudder]"
-    alphas = {} if paper is None else {key: getattr(_coefficients(paper), key) for key in ALPHAS}
-    for key, value in alphas.items():
-        yield f"{key} = {value!r}  # {COEFFICIENT_UNITS[key]}, not identified"
-    if ship is not None:
-        per = PER_UNIT[ship.angle_unit]
-        yield f"max = {ship.rudder_max * per!r}  # {ship.angle_unit}"
-        yield f"rate = {ship.rudder_rate * per!r}  # {ship.angle_unit}/s"
+    if paper is not None:
+        c = _coefficients(paper)
+        for name in RUDDER_PARAMETERS:
+            yield f"{name} = {getattr(c, name)!r}  # {COEFFICIENT_UNITS[name]}, fixed"
+    if vessel is not None:
+        unit, factor = vessel.angle_unit, PER_RADIAN[vessel.angle_unit]
+        yield f"max = {vessel.rudder_max * factor!r}  # {unit}"
+        yield f"rate = {vessel.rudder_rate * factor!r}  # {unit}/s"
 
 
 def _coefficients(fit: OutputError) -> Coefficients:
-    found: Coefficients = fit.problem.model.coefficients(fit.parameters)
-    return found
+    coefficients: Coefficients = fit.problem.model.coefficients(fit.parameters)
+    return coefficients
 
 
-def _remarks(
-    found: Uncertainty, per: Mapping[str, float] | None = None, *, tied: bool = False
+def _comments(
+    estimates: Uncertainty, divisors: Mapping[str, float] | None = None, *, tied: bool = False
 ) -> Callable[[str], str]:
-    """How sure a parameter of a fit is, by its name; `per` what each is divided by."""
-    half = dict(zip(found.names, 1.96 * found.std, strict=True))
-    echo = dict(zip(found.names, found.prior_share > ECHO, strict=True))
+    """Return a function that comments on a parameter: its 95 % interval, or a caution.
 
-    def remark(name: str) -> str:
-        if name in found.unidentifiable:
-            known = "believed before, for the most" if echo[name] else "a value that fits them"
-            return f"NOT IDENTIFIABLE from these logs: {known}"
+    `divisors` are what the values are divided by; `tied` where the fit is of the tied form.
+    """
+    half = dict(zip(estimates.names, 1.96 * estimates.std, strict=True))
+    prior = dict(zip(estimates.names, estimates.prior_share > ECHO, strict=True))
+
+    def comment(name: str) -> str:
+        if name in estimates.unidentifiable:
+            origin = "mostly its prior" if prior[name] else "one of many values that fit them"
+            return f"NOT IDENTIFIABLE from these logs: {origin}"
         if name in half:
-            return f"± {half[name] / (per or {}).get(name, 1.0):.2g} (95 %)"
+            return f"± {half[name] / (divisors or {}).get(name, 1.0):.2g} (95 %)"
         if tied and name in ("b1", "e"):
             return "tied: b1 = -d" if name == "b1" else "tied: e = T3 d"
-        return "stated as known"
+        return "fixed"
 
-    return remark
+    return comment
 
 
 def _quoted(text: str) -> str:
-    """A TOML string."""
+    """Return a TOML string; characters that cannot be printed become spaces."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return (
-        '"' + "".join(character if character.isprintable() else " " for character in escaped) + '"'
-    )
+    printable = (character if character.isprintable() else " " for character in escaped)
+    return f'"{"".join(printable)}"'

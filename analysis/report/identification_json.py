@@ -1,4 +1,4 @@
-"""An identified ship as plain numbers for JSON."""
+"""An identified ship as plain numbers in SI, for JSON."""
 
 from math import isfinite
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from analysis.identification.identify import IdentifiedShip
-from analysis.identification.model_selection import JUDGED_COLUMNS
+from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
 from analysis.identification.validation import Validation
 from shiplog import __version__
 from shiplog.ships.motion import MODEL_OUTPUTS
@@ -14,99 +14,136 @@ from shiplog.ships.motion import MODEL_OUTPUTS
 from .identification_tables import mean_misfits, prior_shares_by_method
 
 
-def identification_json(found: IdentifiedShip) -> dict[str, Any]:
-    """The same as plain numbers in SI; what is not a number is None."""
-    told = found.uncertainty
-    told_of = {
+def identification_json(ship: IdentifiedShip) -> dict[str, Any]:
+    """Convert an identification to plain numbers in SI, ready for `json.dump`.
+
+    Parameters
+    ----------
+    ship
+        The result of `analysis.identify`.
+
+    Returns
+    -------
+    tree
+        Dictionaries, lists, strings and numbers; None for a number that is not finite, and for the
+        value of a parameter that is not identifiable.
+    """
+    estimates, scale = ship.uncertainty, ship.fit.problem.scale
+    tree = {
         "shiplog": __version__,
-        "model": {"name": found.model.name, "title": found.model.title},
+        "model": {"name": ship.model.name, "title": ship.model.title},
         "scale": {
-            "secs": found.fit.problem.scale.secs,
-            "speed": found.fit.problem.scale.speed,
-            "rpm": found.fit.problem.scale.rpm,
-            "length_given": found.length_given,
+            "secs": scale.secs,
+            "speed": scale.speed,
+            "rpm": scale.rpm,
+            "length_given": ship.length_given,
         },
-        "coefficients": {
-            name: _coefficient(found, i) for i, name in enumerate(told.names)
-        },
-        "fixed": dict(found.fixed),
+        "parameters": {name: _parameter(ship, i) for i, name in enumerate(estimates.names)},
+        "fixed": dict(ship.fixed),
         "prior_share": {
             method: {name: float(share) for name, share in shares.items()}
-            for method, shares in prior_shares_by_method(found).items()
+            for method, shares in prior_shares_by_method(ship).items()
         },
-        "covariance": {"of": list(told.names), "values": told.covariance.tolist()},
-        "correlation": told.correlation.tolist(),
-        "condition": told.condition,
-        "enlarged": told.enlargement,
-        "agreement": {
-            "logs": list(told.agreement.names),
-            "by_own_noise": list(told.agreement.by_own_noise),
-            "by_noise_of_all": list(told.agreement.by_common_noise),
-            "contradiction": told.agreement.contradiction,
-            "odd": told.agreement.outlier,
+        "covariance": {
+            "parameters": list(estimates.names),
+            "values": estimates.covariance.tolist(),
         },
-        "ties": None if found.ties is None else {
-            "sum_over_d": found.ties.sum_over_d,
-            "std": found.ties.std,
-            "contradicted": found.ties.contradicted,
-            "advice": found.ties.advice(tied=found.model.name == "burylin-tied"),
-        },
-        "fit": [
-            {
-                "log": run.name, "duration_secs": run.duration_secs, "rms": dict(run.rms),
-                "rudder_offset": run.rudder_offset, "biases": dict(run.biases),
-                "wave_secs": list(run.wave_secs),
-            }
-            for run in found.runs
-        ],
-        "validation": [_validation(each) for each in found.validations],
-        "models": [
-            {
-                "name": c.model.name, "score": c.score if c.fit is not None else None,
-                "misfits": dict(zip(
-                    (MODEL_OUTPUTS[i] for i in JUDGED_COLUMNS), mean_misfits(c), strict=True
-                )),
-            }
-            for c in found.candidates
-        ],
-        "warnings": list(found.warnings),
-    }  # fmt: skip
-    return _finite(told_of)  # type: ignore[no-any-return]
+        "correlation": estimates.correlation.tolist(),
+        "condition_number": estimates.condition,
+        "interval_enlargement": estimates.enlargement,
+        "agreement": _agreement(ship),
+        "ties": _ties(ship),
+        "fit": _fit(ship),
+        "validation": [_validation(each) for each in ship.validations],
+        "models": [_candidate(each) for each in ship.candidates],
+        "warnings": list(ship.warnings),
+    }
+    return _finite(tree)  # type: ignore[no-any-return]
 
 
-def _coefficient(found: IdentifiedShip, i: int) -> dict[str, Any]:
-    """A value that the logs do not tell stands as None: what is printed is believed."""
-    told = found.uncertainty
-    name = told.names[i]
-    unidentifiable = name in told.unidentifiable
+def _parameter(ship: IdentifiedShip, i: int) -> dict[str, Any]:
+    """Return the entry of a free parameter; without a value where it is not identifiable."""
+    estimates = ship.uncertainty
+    name = estimates.names[i]
+    identifiable = name not in estimates.unidentifiable
     return {
-        "value": None if unidentifiable else told.values[i],
-        "unit": found.model.parameter(name).unit,
-        "identifiable": not unidentifiable,
-        "interval": None if unidentifiable else told.interval[i].tolist(),
-        "std": told.std[i],
-        "cramer_rao_std": told.bound[i],
-        "prior_share": told.prior_share[i],
-        "what_would_tell": found.advice.get(name),
+        "value": estimates.values[i] if identifiable else None,
+        "unit": ship.model.parameter(name).unit,
+        "identifiable": identifiable,
+        "interval_95": estimates.interval[i].tolist() if identifiable else None,
+        "std": estimates.std[i],
+        "cramer_rao_std": estimates.bound[i],
+        "prior_share": estimates.prior_share[i],
+        "recommended_manoeuvre": ship.advice.get(name),
     }
 
 
-def _validation(each: Validation) -> dict[str, Any]:
+def _agreement(ship: IdentifiedShip) -> dict[str, Any]:
+    """Return how far the runs differ, as ratios to what noise explains."""
+    agreement = ship.uncertainty.agreement
     return {
-        "log": each.segment.name,
-        "ran_away": each.diverged,
-        "rms": each.rms,
-        "figures": [
+        "logs": list(agreement.names),
+        "by_own_noise": list(agreement.by_own_noise),
+        "by_noise_of_all": list(agreement.by_common_noise),
+        "contradiction": agreement.contradiction,
+        "outlier": agreement.outlier,
+    }
+
+
+def _ties(ship: IdentifiedShip) -> dict[str, Any] | None:
+    if ship.ties is None:
+        return None
+    return {
+        "sum_over_d": ship.ties.sum_over_d,
+        "std": ship.ties.std,
+        "contradicted": ship.ties.contradicted,
+        "advice": ship.ties.advice(tied=ship.model.name == "burylin-tied"),
+    }
+
+
+def _fit(ship: IdentifiedShip) -> list[dict[str, Any]]:
+    return [
+        {
+            "log": run.name,
+            "duration_secs": run.duration_secs,
+            "residual_rms": dict(run.rms),
+            "rudder_zero": run.rudder_offset,
+            "biases": dict(run.biases),
+            "swell_periods_secs": list(run.wave_secs),
+        }
+        for run in ship.runs
+    ]
+
+
+def _validation(validation: Validation) -> dict[str, Any]:
+    return {
+        "log": validation.segment.name,
+        "diverged": validation.diverged,
+        "rms": validation.rms,
+        "indices": [
             {
-                "name": f.name, "unit": f.unit, "measured": f.measured,
-                "simulated": f.simulated, "error": f.error,
+                "name": index.name,
+                "unit": index.unit,
+                "measured": index.measured,
+                "simulated": index.simulated,
+                "error": index.error,
             }
-            for f in each.figures
+            for index in validation.indices
         ],
-    }  # fmt: skip
+    }
+
+
+def _candidate(candidate: Candidate) -> dict[str, Any]:
+    names = [MODEL_OUTPUTS[i] for i in JUDGED_COLUMNS]
+    return {
+        "name": candidate.model.name,
+        "score": candidate.score if candidate.fit is not None else None,
+        "misfits": dict(zip(names, mean_misfits(candidate), strict=True)),
+    }
 
 
 def _finite(value: Any) -> Any:  # noqa: ANN401 - walks a tree of JSON
+    """Replace numbers that are not finite by None, at any depth."""
     if isinstance(value, dict):
         return {key: _finite(inner) for key, inner in value.items()}
     if isinstance(value, list):

@@ -1,11 +1,11 @@
-"""An identified ship as tables for people, and as plain numbers for JSON."""
+"""Tables of an identified ship for people, in the units they use."""
 
 from collections.abc import Iterator
 from math import isfinite
 
 import numpy as np
 
-from analysis.identification.comparison.history import OFF
+from analysis.identification.comparison.history import PRIOR_OFFSET
 from analysis.identification.identify import IdentifiedShip
 from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
 from analysis.identification.validation import Validation
@@ -14,204 +14,267 @@ from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.text_table import TextTable
 from shiplog.units import CATALOGUE, conversion_factor
 
-FITTED = "output error"
-PEOPLES = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}
-ALIKE, MOST_PAIRS = 0.97, 3  # of correlations that are told
-UNIT = {name: CATALOGUE[name].unit for name in MODEL_OUTPUTS} | {"track": "m"}
+FIT_METHOD = "output error"
+DISPLAY_UNITS = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}
+OUTPUT_UNITS = {name: CATALOGUE[name].unit for name in MODEL_OUTPUTS} | {"track": "m"}
+SENSORS = {
+    "yaw_rate": "gyro",
+    "speed": "speed log",
+    "heading": "compass",
+}  # whose bias is estimated
+MIN_CORRELATION, MAX_PAIRS = 0.97, 3  # of the correlated pairs that are reported
 
 
-def identification_tables(found: IdentifiedShip) -> tuple[TextTable, ...]:
-    """Tables in the units people use, and what is to be said of them."""
-    made = [_coefficients(found), _prior_shares(found), _runs(found)]
-    if found.validations:
-        made += [_held_out(found), *(_figures(v) for v in found.validations if v.figures)]
-    if found.candidates:
-        made.insert(0, _comparison(found))
-    return tuple(made)
+def identification_tables(ship: IdentifiedShip) -> tuple[TextTable, ...]:
+    """Summarise an identification as tables with remarks.
+
+    Parameters
+    ----------
+    ship
+        The result of `analysis.identify`.
+
+    Returns
+    -------
+    tables
+        Where models were compared, their scores; then the parameters, the share of prior by
+        method, and the fitted runs; where runs were predicted, the validation and the indices of
+        each manoeuvre.
+    """
+    tables = [_model_table(ship)] if ship.candidates else []
+    tables += [_parameter_table(ship), _prior_table(ship), _fit_table(ship)]
+    if ship.validations:
+        tables.append(_validation_table(ship))
+        tables += [_index_table(each) for each in ship.validations if each.indices]
+    return tuple(tables)
 
 
-def _comparison(found: IdentifiedShip) -> TextTable:
-    rows = []
-    for candidate in found.candidates:
-        told = candidate.fit is not None
-        off = mean_misfits(candidate)
-        rows.append(
-            (
-                candidate.model.name,
-                str(len(candidate.fit.problem.free)) if candidate.fit else "",
-                f"{100 * candidate.score:.3g}" if told else "runs away",
-                *(f"{100 * value:.3g}" if told and isfinite(value) else "" for value in off),
-            )
-        )
-    columns = ("model", "sought", "score [%]", *(f"{MODEL_OUTPUTS[i]} [%]" for i in JUDGED_COLUMNS))
+# ---- models
+
+
+def _model_table(ship: IdentifiedShip) -> TextTable:
+    names = [MODEL_OUTPUTS[i].replace("_", " ") for i in JUDGED_COLUMNS]
+    columns = ("model", "free\nparameters", "score\n[%]", *(f"{name}\n[%]" for name in names))
     remark = (
-        "Each run in turn is predicted by a fit to the others, which know nothing of it but where "
-        "it began, its rudder's zero and its gyro's bias: the rms of what is off over the standard "
-        "deviation of what was measured. The least is taken."
+        "Each run in turn is predicted by the model fitted to the other runs; only its initial "
+        "state, rudder zero and gyro bias are estimated from the run itself. The error is the rms "
+        "of predicted minus measured over the standard deviation of the measured, the score its "
+        "mean. The model with the lowest score is taken."
     )
-    title = f"Models by cross-validation: {found.model.name}"
-    return TextTable(title, columns, tuple(rows), (remark,))
+    title = f"Models by cross-validation: {ship.model.name}"
+    return TextTable(title, columns, tuple(map(_model_row, ship.candidates)), (remark,))
+
+
+def _model_row(candidate: Candidate) -> tuple[str, ...]:
+    if candidate.fit is None:
+        return (candidate.model.name, "", "diverges", *("" for _ in JUDGED_COLUMNS))
+    errors = [f"{100 * error:.3g}" if isfinite(error) else "" for error in mean_misfits(candidate)]
+    free = str(len(candidate.fit.problem.free))
+    return (candidate.model.name, free, f"{100 * candidate.score:.3g}", *errors)
 
 
 def mean_misfits(candidate: Candidate) -> list[float]:
-    """Return the mean relative misfit of each judged output; NaN where none was measured."""
+    """Average a model's relative errors over the runs left out.
+
+    Returns
+    -------
+    errors
+        Of yaw rate, speed and heading; NaN where no run has a finite one.
+    """
     columns = [column[np.isfinite(column)] for column in candidate.misfits[:, JUDGED_COLUMNS].T]
     return [float(np.mean(column)) if len(column) else np.nan for column in columns]
 
 
-def _coefficients(found: IdentifiedShip) -> TextTable:
-    told, rows = found.uncertainty, []
-    for i, name in enumerate(told.names):
-        value, half, bound = told.values[i], 1.96 * told.std[i], 1.96 * told.bound[i]
-        share = _percent(told.prior_share[i])
-        unit = found.model.parameter(name).unit
-        if name in told.unidentifiable:
+# ---- parameters
+
+
+def _parameter_table(ship: IdentifiedShip) -> TextTable:
+    estimates, rows = ship.uncertainty, []
+    for i, name in enumerate(estimates.names):
+        share, unit = _percent(estimates.prior_share[i]), ship.model.parameter(name).unit
+        if name in estimates.unidentifiable:
             rows.append((name, "not identifiable", "", "", share, unit))
-        else:
-            rows.append((name, f"{value:.5g}", f"± {half:.2g}", f"± {bound:.2g}", share, unit))
-    for name, value in found.fixed.items():
-        rows.append((name, f"{value:.5g}", "stated", "", "", found.model.parameter(name).unit))
-    columns = ("coefficient", "value", "95 %", "bound", "echo", "unit")
-    title = f"Coefficients: {found.model.title}"
-    return TextTable(title, columns, tuple(rows), tuple(_remarks(found)))
+            continue
+        half, bound = 1.96 * estimates.std[i], 1.96 * estimates.bound[i]
+        value = f"{estimates.values[i]:.5g}"
+        rows.append((name, value, f"± {half:.2g}", f"± {bound:.2g}", share, unit))
+    for name, fixed in ship.fixed.items():
+        rows.append((name, f"{fixed:.5g}", "fixed", "", "", ship.model.parameter(name).unit))
+    columns = (
+        "parameter", "value", "95 %\ninterval", "Cramér-Rao\nbound", "share of\nprior", "unit",
+    )  # fmt: skip
+    title = f"Parameters: {ship.model.title}"
+    return TextTable(title, columns, tuple(rows), tuple(_parameter_remarks(ship)))
 
 
-def _remarks(found: IdentifiedShip) -> Iterator[str]:
-    for text, names in _by_advice(found).items():
-        yield f"{', '.join(names)}: not identifiable from these logs; what would tell: {text}."
+def _parameter_remarks(ship: IdentifiedShip) -> Iterator[str]:
+    for manoeuvre, names in _names_by_manoeuvre(ship).items():
+        yield (
+            f"{', '.join(names)}: not identifiable from these logs; "
+            f"recommended manoeuvre: {manoeuvre}."
+        )
     yield (
-        "95 %: half the interval; bound: Cramér and Rao's, if each sample were off by itself. "
-        "PriorSensitivity: how much of the value was believed before any data. "
-        f"Condition {found.uncertainty.condition:.0f}."
+        "95 % interval: allows for coloured residuals and for differences between runs. "
+        "Cramér-Rao bound: the 95 % interval if the residuals were white. Share of prior: how much "
+        "of the value comes from its prior and not from the data. Condition number "
+        f"{ship.uncertainty.condition:.0f}."
     )
-    alike = _alike(found)
-    if alike:
-        yield f"Hardly to be told apart (correlation): {alike}."
-    scale = found.fit.problem.scale
-    if found.model.dimensionless:
+    pairs = _correlated_pairs(ship)
+    if pairs:
+        yield f"Hardly separable, with correlation: {pairs}."
+    scale = ship.fit.problem.scale
+    if ship.model.dimensionless:
         yield (
-            f"Without dimensions: time in {scale.secs:.4g} s (L/U0), speed in {scale.speed:.4g} "
-            f"m/s, revolutions in {scale.rpm:.4g} rpm."
+            f"Dimensionless model: the unit of time is L/U0 = {scale.secs:.4g} s, of speed "
+            f"U0 = {scale.speed:.4g} m/s, of revolutions {scale.rpm:.4g} rpm."
         )
-    if found.uncertainty.enlargement > 1:
+    if ship.uncertainty.enlargement > 1:
+        parts = "The halves of the log" if len(ship.fit.problem.runs) == 1 else "The runs"
         yield (
-            f"{'The halves' if len(found.fit.problem.runs) == 1 else 'The runs'} differ more than "
-            "their noise explains: intervals are enlarged "
-            f"{found.uncertainty.enlargement:.1f} times."
+            f"{parts} differ by more than their noise explains; the intervals are enlarged by a "
+            f"factor of {ship.uncertainty.enlargement:.1f}."
         )
-    if found.ties is not None:
-        yield found.ties.advice(tied=found.model.name == "burylin-tied")
+    if ship.ties is not None:
+        yield ship.ties.advice(tied=ship.model.name == "burylin-tied")
 
 
-def _alike(found: IdentifiedShip) -> str:
-    """The coefficients that the data know a sum of rather than each, the worst pairs first."""
-    told, names = found.uncertainty.correlation, found.uncertainty.names
-    pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(told[i, j]) > ALIKE]
-    pairs.sort(key=lambda pair: -abs(told[pair]))
-    return ", ".join(f"{names[j]} and {names[i]} {told[i, j]:+.3f}" for i, j in pairs[:MOST_PAIRS])
-
-
-def _by_advice(found: IdentifiedShip) -> dict[str, list[str]]:
+def _names_by_manoeuvre(ship: IdentifiedShip) -> dict[str, list[str]]:
+    """Group the parameters that are not identifiable by the recommended manoeuvre."""
     grouped: dict[str, list[str]] = {}
-    for name, text in found.advice.items():
-        grouped.setdefault(text, []).append(name)
+    for name, manoeuvre in ship.advice.items():
+        grouped.setdefault(manoeuvre, []).append(name)
     return grouped
 
 
-def _prior_shares(found: IdentifiedShip) -> TextTable:
-    """How much of each coefficient is prior, by each method that begins with one."""
-    by_method = prior_shares_by_method(found)
+def _correlated_pairs(ship: IdentifiedShip) -> str:
+    """List the most correlated pairs, of which the data determine a combination only."""
+    correlation, names = ship.uncertainty.correlation, ship.uncertainty.names
+    pairs = [
+        (i, j) for i in range(len(names)) for j in range(i)
+        if abs(correlation[i, j]) > MIN_CORRELATION
+    ]  # fmt: skip
+    pairs.sort(key=lambda pair: -abs(correlation[pair]))
+    return ", ".join(
+        f"{names[j]} and {names[i]} {correlation[i, j]:+.3f}" for i, j in pairs[:MAX_PAIRS]
+    )
+
+
+# ---- share of prior
+
+
+def _prior_table(ship: IdentifiedShip) -> TextTable:
+    by_method = prior_shares_by_method(ship)
     rows = tuple(
         (name, *(_percent(shares.get(name, np.nan)) for shares in by_method.values()))
-        for name in found.uncertainty.names
+        for name in ship.uncertainty.names
     )
     remark = (
-        "How much of a value is what was believed before, by a second run from other beliefs: the "
-        "fit from priors a standard deviation off and a start elsewhere, the other methods from "
-        f"priors to either side, {100 * OFF:.0f} % off or more, over the latter half of the runs. "
-        "100 % is a copy of the prior; beyond it errors grow."
+        "How much of a value comes from its prior, by a second estimate from another prior. Output "
+        "error: priors shifted by a standard deviation, and another start. Other methods: two "
+        f"priors, at least {100 * PRIOR_OFFSET:.0f} % above and below the value; the median over "
+        "the latter half of the runs. 0 %: from data alone; 100 %: a copy of the prior; above: "
+        "the method amplifies errors of the prior."
     )
-    return TextTable(
-        "PriorSensitivity of what was believed before", ("coefficient", *by_method), rows, (remark,)
-    )
+    return TextTable("Share of prior by method", ("parameter", *by_method), rows, (remark,))
 
 
-def prior_shares_by_method(found: IdentifiedShip) -> dict[str, dict[str, float]]:
-    """Return the share of prior of each parameter, by method."""
-    told = {FITTED: dict(zip(found.uncertainty.names, found.uncertainty.prior_share, strict=True))}
-    for histories in found.histories:
-        if len(histories.priors) > 1:
-            told[histories.method] = dict(
-                zip(histories.names, histories.median_prior_share, strict=True)
-            )
-    return told
+def prior_shares_by_method(ship: IdentifiedShip) -> dict[str, dict[str, float]]:
+    """Collect the share of prior in each parameter, by each method that has priors.
+
+    Returns
+    -------
+    shares
+        By method, then by parameter: 0 for none, 1 for a copy of the prior, NaN where the method
+        has no estimate.
+    """
+    estimates = ship.uncertainty
+    shares = {FIT_METHOD: dict(zip(estimates.names, estimates.prior_share, strict=True))}
+    for history in ship.histories:
+        if len(history.priors) > 1:
+            medians = history.median_prior_share
+            shares[history.method] = dict(zip(history.names, medians, strict=True))
+    return shares
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %" if isfinite(share) else ""
+# ---- runs
 
 
-def _runs(found: IdentifiedShip) -> TextTable:
-    outputs, rows = found.fit.problem.outputs, []
-    for run in found.runs:
-        biases = [_shown(value, UNIT[name]) for name, value in run.biases.items()]
-        waves = ", ".join(f"{secs:.3g} s" for secs in run.wave_secs)
-        rows.append(
-            (
-                run.name, f"{run.duration_secs:.0f}",
-                *(_shown(run.rms[name], UNIT[name]) for name in outputs),
-                _shown(run.rudder_offset, "rad"), *biases, waves,
-            )
-        )  # fmt: skip
+def _fit_table(ship: IdentifiedShip) -> TextTable:
+    outputs, rows = ship.fit.problem.outputs, []
+    for run in ship.runs:
+        rms = [_in_display_unit(run.rms[name], OUTPUT_UNITS[name]) for name in outputs]
+        zero = _in_display_unit(run.rudder_offset, "rad")
+        biases = [_in_display_unit(bias, OUTPUT_UNITS[name]) for name, bias in run.biases.items()]
+        swells = ", ".join(f"{secs:.3g}" for secs in run.wave_secs)
+        rows.append((run.name, f"{run.duration_secs:.0f}", *rms, zero, *biases, swells))
     columns = (
-        "fitted to", "length\n[s]", *map(_headed, outputs), "rudder's\nzero [deg]",
-        *(_headed(name, " bias") for name in found.runs[0].biases), "swell",
+        "log", "duration\n[s]", *(_heading(name, name) for name in outputs), "rudder zero\n[deg]",
+        *(_heading(f"{SENSORS.get(name, name)} bias", name) for name in ship.runs[0].biases),
+        "swell\nperiod [s]",
     )  # fmt: skip
-    remark = "Residuals' rms, and what each run has of its own, fitted with it."
+    remark = (
+        "Of each output the residual rms, measured minus fitted; then what is estimated for each "
+        "run by itself."
+    )
     return TextTable("Fit", columns, tuple(rows), (remark,))
 
 
-def _held_out(found: IdentifiedShip) -> TextTable:
-    names = [n for n in (*MODEL_OUTPUTS, "track") if any(n in v.rms for v in found.validations)]
+def _validation_table(ship: IdentifiedShip) -> TextTable:
+    each_name = (*MODEL_OUTPUTS, "track")
+    names = [name for name in each_name if any(name in v.rms for v in ship.validations)]
     rows = []
-    for each in found.validations:
-        cells = [_shown(each.rms[n], UNIT[n]) if n in each.rms else "" for n in names]
-        seconds = f"{(len(each.segment) - 1) * each.segment.dt_secs:.0f}"
-        end = np.hypot(*(each.track[-1] - each.measured_track[-1]))
-        last = f"{end:.3g}" if isfinite(end) else ""
-        rows.append((each.segment.name, seconds, *cells, last))
-    columns = ("held out", "length\n[s]", *map(_headed, names), "at the end\n[m]")
+    for each in ship.validations:
+        cells = [
+            _in_display_unit(each.rms[name], OUTPUT_UNITS[name]) if name in each.rms else ""
+            for name in names
+        ]
+        duration = f"{(len(each.segment) - 1) * each.segment.dt_secs:.0f}"
+        distance = np.hypot(*(each.track[-1] - each.measured_track[-1]))
+        last = f"{distance:.3g}" if isfinite(distance) else ""
+        rows.append((each.segment.name, duration, *cells, last))
+    columns = (
+        "log", "duration\n[s]", *(_heading(name, name) for name in names), "final\nposition [m]",
+    )  # fmt: skip
     remark = (
-        "Simulated open loop from how each run began, under its rudder and revolutions: the rms of "
-        "what is off."
+        "Runs that were not fitted, simulated open loop from their initial state with the recorded "
+        "rudder and revolutions: the rms of simulated minus measured, and the distance between "
+        "the final positions."
     )
     return TextTable("Validation", columns, tuple(rows), (remark,))
 
 
-def _figures(validation: Validation) -> TextTable:
-    rows = tuple(_figure(figure) for figure in validation.figures)
-    columns = ("figure", "measured", "simulated", "off", "off [%]")
-    remark = "Counted from where the rudder leaves its rest by 0.5°."
-    return TextTable(f"Figures of {validation.segment.name}", columns, rows, (remark,))
+def _index_table(validation: Validation) -> TextTable:
+    rows = tuple(map(_index_row, validation.indices))
+    columns = ("index", "measured", "simulated", "error", "error [%]")
+    remark = "Counted from where the rudder departs from its rest by 0.5°."
+    return TextTable(f"Manoeuvring indices: {validation.segment.name}", columns, rows, (remark,))
 
 
-def _figure(figure: ManoeuvreIndex) -> tuple[str, ...]:
-    """A row; of an angle no per cent are told."""
-    unit = figure.unit
-    cells = [_shown(v, unit, 4) for v in (figure.measured, figure.simulated)]
-    cells.append(_shown(figure.error, unit))
-    share = "" if unit == "rad" else f"{100 * figure.error / figure.measured:+.1f}"
-    return (f"{figure.name} [{_unit(unit)}]", *cells, share if isfinite(figure.error) else "")
+def _index_row(index: ManoeuvreIndex) -> tuple[str, ...]:
+    """Format an index; an angle has no relative error."""
+    unit = index.unit
+    cells = [_in_display_unit(v, unit, 4) for v in (index.measured, index.simulated)]
+    cells.append(_in_display_unit(index.error, unit))
+    relative = "" if unit == "rad" else f"{100 * index.error / index.measured:+.1f}"
+    name = f"{index.name} [{_display_unit(unit)}]"
+    return (name, *cells, relative if isfinite(index.error) else "")
 
 
-def _headed(name: str, what: str = "") -> str:
-    return f"{name.replace('_', ' ')}{what}\n[{_unit(UNIT[name])}]"
+# ---- cells
 
 
-def _unit(unit: str) -> str:
-    return PEOPLES.get(unit, unit)
+def _heading(text: str, output: str) -> str:
+    return f"{text.replace('_', ' ')}\n[{_display_unit(OUTPUT_UNITS[output])}]"
 
 
-def _shown(value: float, unit: str, digits: int = 3) -> str:
-    """A number in the unit people use."""
-    return f"{value * conversion_factor(unit, _unit(unit)):.{digits}g}" if isfinite(value) else ""
+def _display_unit(unit: str) -> str:
+    return DISPLAY_UNITS.get(unit, unit)
+
+
+def _in_display_unit(value: float, unit: str, digits: int = 3) -> str:
+    if not isfinite(value):
+        return ""
+    return f"{value * conversion_factor(unit, _display_unit(unit)):.{digits}g}"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if isfinite(share) else ""

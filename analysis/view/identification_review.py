@@ -1,13 +1,14 @@
-"""An identified ship in Rerun: a sheet of her coefficients, and one for each run."""
+"""Rerun review of an identified ship: a tab of its parameters, and one for each run."""
 
 import os
 import re
+from collections.abc import Sequence
 from hashlib import sha256
 
 import rerun as rr
 import rerun.blueprint as rrb
 
-from analysis.identification.comparison.history import run_secs
+from analysis.identification.comparison.history import total_duration_secs
 from analysis.identification.identify import IdentifiedShip
 from analysis.report.identification_tables import identification_tables
 from analysis.report.markdown import markdown_page
@@ -26,53 +27,63 @@ from .rerun_io import (
     send_text,
 )
 
-MOST_LARGE = 12  # coefficients; more are drawn smaller
-KEY = """\
-*Runs: grey measured, coloured simulated. Residuals over what is usual, with ±2σ. Coefficients, \
-over the runs put end to end: grey the value by output error with its 95 % interval; blue the \
-extended Kalman filter from two priors; green windows in weak form, ±2σ; red the paper's own \
-scheme from the same two priors, for comparison. Faint: more than half of it is its prior.*
+MAX_LARGE_PANELS = 12  # parameters; with more, the panels are in more columns
+LEGEND = """\
+*Parameters, over the runs put end to end. Grey: value by output error with its 95 % interval. \
+Blue: extended Kalman filter from two priors. Green: windows in weak form, ±2σ. Red: the paper's \
+scheme from the same two priors, for comparison. Faint: more than half of the estimate is prior. \
+Runs: grey measured, coloured simulated. Residuals over their standard deviation, with ±2σ.*
 
 """
 
 
-def write_review(found: IdentifiedShip, path: str | os.PathLike[str]) -> None:
-    """Write the review to an .rrd file.
+def write_identification_review(ship: IdentifiedShip, path: str | os.PathLike[str]) -> None:
+    """Write the review of an identified ship to an .rrd file.
 
-    Raises `ShiplogError` where `path` cannot be written to.
+    Parameters
+    ----------
+    ship
+        The result of `analysis.identify`.
+    path
+        Where to write; a file there is replaced when the new one is complete.
+
+    Raises
+    ------
+    ShiplogError
+        The path cannot be written to.
     """
-    recording = _recording(found)
-    sheets, coefficients = list(run_sheets(found)), parameter_panels(found)
+    recording = _recording(ship)
+    sheets, parameters = list(run_sheets(ship)), parameter_panels(ship)
     with save_recording(recording, path):
-        rr.send_blueprint(_blueprint(found, sheets, coefficients), recording=recording)
-        text = markdown_page(
-            f"{found.model.title}, identified", identification_tables(found), found.warnings
-        )
-        send_text(recording, "summary", KEY + text)
-        _send(recording, coefficients, sheets[0].start_ns)
+        rr.send_blueprint(_blueprint(ship, sheets, parameters), recording=recording)
+        title = f"{ship.model.title}, identified"
+        page = markdown_page(title, identification_tables(ship), ship.warnings)
+        send_text(recording, "summary", LEGEND + page)
+        _send(recording, parameters, sheets[0].start_ns)
         for i, sheet in enumerate(sheets):
-            panels = (*sheet.outputs, *sheet.residuals, *sheet.inputs, sheet.correlation)
+            panels = [*sheet.outputs, *sheet.residuals, *sheet.inputs, sheet.correlation]
             _send(recording, panels, sheet.start_ns)
             if sheet.track is not None:
                 send_chart(recording, _track_origin(i), sheet.track, sheet.start_ns)
         recording.flush()
 
 
-def _recording(found: IdentifiedShip) -> rr.RecordingStream:
-    """A stream whose names depend on the model and the logs alone; see the replay's."""
-    logs = [segment.name for segment in found.fit.problem.segments]
-    digest = sha256(repr((found.model.name, logs, found.fit.parameters.tolist())).encode())
-    name = re.sub(r"[^A-Za-z0-9_-]+", "-", f"shiplog identify {found.model.name} {logs[0]}")
+def _recording(ship: IdentifiedShip) -> rr.RecordingStream:
+    """Open a stream whose identity depends on the model, the logs and the result alone.
+
+    The same identification therefore replaces its earlier review in a viewer.
+    """
+    logs = [segment.name for segment in ship.fit.problem.segments]
+    digest = sha256(repr((ship.model.name, logs, ship.fit.parameters.tolist())).encode())
+    name = re.sub(r"[^A-Za-z0-9_-]+", "-", f"shiplog identify {ship.model.name} {logs[0]}")
     recording = rr.RecordingStream(
         name, recording_id=digest.hexdigest()[:32], send_properties=False
     )
-    recording.send_recording_name(f"{found.model.name} from {', '.join(dict.fromkeys(logs))}")
+    recording.send_recording_name(f"{ship.model.name} from {', '.join(dict.fromkeys(logs))}")
     return recording
 
 
-def _send(
-    recording: rr.RecordingStream, panels: list[Panel] | tuple[Panel, ...], start_ns: int
-) -> None:
+def _send(recording: rr.RecordingStream, panels: Sequence[Panel], start_ns: int) -> None:
     for panel in panels:
         for series in panel.series:
             entity = f"{panel.name}/{series.name}"
@@ -85,21 +96,22 @@ def _track_origin(i: int) -> str:
 
 
 def _blueprint(
-    found: IdentifiedShip, sheets: list[RunSheet], coefficients: list[Panel]
+    ship: IdentifiedShip, sheets: Sequence[RunSheet], parameters: Sequence[Panel]
 ) -> rrb.Blueprint:
-    axis = axis_until(run_secs(found.fit.problem.segments))
-    columns = 3 if len(coefficients) <= MOST_LARGE else 4
+    axis = axis_until(total_duration_secs(ship.fit.problem.segments))
+    columns = 3 if len(parameters) <= MAX_LARGE_PANELS else 4
     overview = rrb.Horizontal(
-        rrb.Grid(*(plot_view(panel, axis) for panel in coefficients), grid_columns=columns),
+        rrb.Grid(*(plot_view(panel, axis) for panel in parameters), grid_columns=columns),
         rrb.TextDocumentView(origin="summary", name="summary"),
         column_shares=[3, 2],
-        name="coefficients",
+        name="parameters",
     )
-    runs = [_run(i, sheet) for i, sheet in enumerate(sheets)]
+    runs = [_run_tab(i, sheet) for i, sheet in enumerate(sheets)]
     return make_blueprint(rrb.Tabs(overview, *runs, active_tab=0))
 
 
-def _run(i: int, sheet: RunSheet) -> rrb.Container:
+def _run_tab(i: int, sheet: RunSheet) -> rrb.Container:
+    """Return outputs over inputs on the left, residuals, autocorrelation and track on the right."""
     axis = axis_until(sheet.duration_secs)
     left = [plot_view(panel, axis) for panel in (*sheet.outputs, *sheet.inputs)]
     right: list[rrb.View] = [plot_view(panel, axis) for panel in sheet.residuals]

@@ -1,7 +1,9 @@
-"""How coefficients came about along the runs, and how much of them was there before.
+"""Parameter estimates over time by one method, and how much of them is prior.
 
-Each method goes through the runs from two priors, one to either side of what was identified. Where
-it ends apart by as much as it began, it has learnt nothing: it echoes.
+Each method that has a prior is run from two priors, one on either side of the fitted value. The
+distance between the two estimates, over the distance between the two priors, is the share of the
+prior in the estimate: where the estimates are as far apart as the priors, the data have added
+nothing.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,75 +16,120 @@ from analysis.identification.segment import Segment
 from analysis.identification.uncertainty import ECHO, Uncertainty
 from shiplog.types import FloatArray
 
-OFF = 0.3  # of a value: how far to either side of it the priors are
-MOST_OFF = 1.0  # the same where the value is hardly told
+PRIOR_OFFSET = 0.3  # distance of each prior from the fitted value, as a share of that value
+MAX_PRIOR_OFFSET = 1.0  # the same for a value that is hardly determined
 
 
 @dataclass(frozen=True, eq=False)
 class ParameterHistory:
-    """Coefficients by one method from one or two priors, over the runs put end to end.
+    """Estimates of p parameters at k instants by one method, from each of q priors.
 
-    p coefficients at k instants from each of q priors; NaN where the method cannot tell.
+    The runs are put end to end, with a break between them (`with_breaks`).
+
+    Attributes
+    ----------
+    method
+        The method's name, as printed in tables and drawings.
+    names
+        The p parameters.
+    time_secs
+        (k,) since the beginning of the first run, as if each run began when the one before ended.
+    values
+        (q, k, p) estimates in the parameters' own units; NaN where the method returns none.
+    stds
+        (q, k, p) standard deviations as the method computes them; NaN where it has none.
+    priors
+        (q, p) the values each pass started from. Where the method has no prior, q is 1 and they
+        are NaN.
     """
 
     method: str
     names: tuple[str, ...]
-    time_secs: FloatArray  # (k,) since the first run began, as if each began when one ended
-    values: FloatArray  # (q, k, p)
-    stds: FloatArray  # (q, k, p) as the method has it; NaN where it has none
-    priors: FloatArray  # (q, p); q is 1 and they are NaN where there are none
+    time_secs: FloatArray
+    values: FloatArray
+    stds: FloatArray
+    priors: FloatArray
 
     @property
     def prior_share(self) -> FloatArray:
-        """(k, p) of each value, how much of it is the prior: 0 for none of it, 1 for all.
+        """(k, p) share of the prior in each estimate: 0 for none, 1 for a copy of the prior.
 
-        A method that makes errors grow goes beyond 1. Zero where there are no priors.
+        A method that amplifies errors exceeds 1. It is 0 for a method without priors, and NaN
+        where there is no estimate.
         """
         if len(self.values) < 2:
             return np.where(np.isfinite(self.values[0]), 0.0, np.nan)
-        apart = np.abs(self.values[0] - self.values[1])
-        return np.asarray(apart / np.abs(self.priors[0] - self.priors[1]))
+        distance = np.abs(self.values[0] - self.values[1])
+        return np.asarray(distance / np.abs(self.priors[0] - self.priors[1]))
 
     @property
     def mostly_prior(self) -> NDArray[np.bool_]:
-        """(k, p) where a value is more prior than data, or will be so again.
+        """(k, p) where an estimate, then or at any later instant, is more prior than data.
 
-        Two courses that cross have learnt nothing there.
+        Looking ahead excludes instants at which the two passes merely cross: there they agree by
+        chance.
         """
         later = np.fmax.accumulate(self.prior_share[::-1])[::-1]
         return np.asarray(later > ECHO)
 
     @property
     def median_prior_share(self) -> FloatArray:
-        """(p,) the median over the latter half; NaN where nothing is told."""
+        """(p,) the median of `prior_share` over the latter half; NaN where there is no estimate."""
         half = self.prior_share[len(self.time_secs) // 2 :]
-        return np.array([_median(column) for column in half.T])
+        return np.array([_finite_median(column) for column in half.T])
 
 
-def _median(values: FloatArray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else np.nan
+def _finite_median(values: FloatArray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else np.nan
 
 
-def two_priors(told: Uncertainty, bounds: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """(2, p) to either side of the values of a fit, by turns high and low, within bounds.
+def two_priors(fitted: Uncertainty, bounds: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Compute two priors, one on either side of the fitted values.
 
-    They are off by `OFF` of the value, by more where that is no more than its uncertainty. The
-    bounds, of a problem, may be of more unknowns.
+    The first prior is above the value for every other parameter and below it for the rest, the
+    second the reverse, so that no prior is a uniform scaling of the fit. The distance is three
+    standard deviations, limited to between `PRIOR_OFFSET` and `MAX_PRIOR_OFFSET` of the value.
+
+    Parameters
+    ----------
+    fitted
+        Values and standard deviations of the p parameters.
+    bounds
+        Lower and upper limits, (m,) each with m >= p, the parameters first, as `Problem.bounds`.
+
+    Returns
+    -------
+    priors
+        (2, p), within the bounds.
     """
-    size = np.abs(told.values)
-    reach = np.clip(3 * told.std, OFF * size, MOST_OFF * size)
-    reach = np.where(reach > 0, reach, np.minimum(3 * told.std, 1.0))
-    sides = np.where(np.arange(len(size)) % 2, -1.0, 1.0)
-    either = np.array([told.values + sides * reach, told.values - sides * reach])
+    size = np.abs(fitted.values)
+    offset = np.clip(3 * fitted.std, PRIOR_OFFSET * size, MAX_PRIOR_OFFSET * size)
+    offset = np.where(offset > 0, offset, np.minimum(3 * fitted.std, 1.0))
+    signs = np.where(np.arange(len(size)) % 2, -1.0, 1.0)
+    priors = np.array([fitted.values + signs * offset, fitted.values - signs * offset])
     lowest, highest = (bound[: len(size)] for bound in bounds)
-    return np.asarray(np.clip(either, lowest, highest))
+    return np.asarray(np.clip(priors, lowest, highest))
 
 
 def with_breaks(parts: Sequence[FloatArray]) -> FloatArray:
-    """Instants or values of several runs, one below the other, and a break between runs.
+    """Concatenate instants or values of several runs, with a break between two runs.
 
-    An instant that breaks is that before it; a value is NaN.
+    Parameters
+    ----------
+    parts
+        Of each run either instants, (k,), or values, (k, ...).
+
+    Returns
+    -------
+    concatenated
+        After each run but the last one row is inserted: the last instant again, or values of NaN,
+        so that a drawn line is interrupted there.
+
+    Examples
+    --------
+    >>> with_breaks([np.array([0.0, 1.0]), np.array([5.0])])
+    array([0., 1., 1., 5.])
     """
     rows = []
     for part in parts:
@@ -90,13 +137,13 @@ def with_breaks(parts: Sequence[FloatArray]) -> FloatArray:
     return np.concatenate(rows[:-1])
 
 
-def run_secs(segments: tuple[Segment, ...]) -> float:
-    """How long some runs take, put end to end."""
+def total_duration_secs(segments: tuple[Segment, ...]) -> float:
+    """Return the duration of some segments put end to end, in s."""
     return sum(len(segment) * segment.dt_secs for segment in segments)
 
 
-def begins_secs(segments: tuple[Segment, ...]) -> Iterator[float]:
-    """When each of some runs put end to end begins."""
+def start_times_secs(segments: tuple[Segment, ...]) -> Iterator[float]:
+    """Yield the start of each of some segments put end to end, in s since the first one's."""
     start = 0.0
     for segment in segments:
         yield start

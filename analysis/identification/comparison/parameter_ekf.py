@@ -1,12 +1,15 @@
-"""The parameters as states that stay as they are: an extended Kalman filter over the runs.
+"""Extended Kalman filter with the parameters, rudder offset and biases among its states.
 
-The state is augmented by the parameters, the rudder's zero and the gyro's bias, none of which
-moves; what was measured over a stride is taken in at once, by the derivatives of the run that
-the augmented state predicts over them, and then the state goes on to their end. A run begins in an
-unknown state of its own, while the parameters go on from run to run. The noise is the fit's, so
-that at the end of one run the filter should say what output error says of it, but for what it took
-in before it knew better: that is what its courses show. Source: Jazwinski, "Stochastic processes
-and filtering theory", 1970, sections 8.3 and 8.4.
+The state is augmented by the parameters, the rudder offset and the sensor biases, which are
+constant. All samples of a stride are processed in one update, linearised by the derivatives of the
+run that the augmented state predicts over the stride; the state is then propagated to the end of
+the stride. Each run begins in an unknown state of its own, while the parameters continue from run
+to run. The measurement noise is that of the output-error fit, so that at the end the filter should
+agree with the fit, except for the effect of early updates that were linearised far from it.
+
+References
+----------
+Jazwinski, "Stochastic processes and filtering theory", 1970, sections 8.3 and 8.4.
 """
 
 from collections.abc import Iterator
@@ -23,87 +26,105 @@ from shiplog.ships.motion import InputPath
 from shiplog.ships.path import path_part
 from shiplog.types import FloatArray
 
-from .history import ParameterHistory, begins_secs, run_secs
+from .history import ParameterHistory, start_times_secs, total_duration_secs
 
 EKF_METHOD = "extended Kalman filter"
-STRIDE_SECS, MOST_STRIDES = 2.0, 1000  # a ship's fastest motion takes several; of long runs more
-FIRST_STDS = 5.0  # of a sample's noise: how far off a first state may be
-ROUNDS = 2  # of linearisation, each where the one before has led
-STILL = 1e-9  # rad: what a heading may be off that nothing depends on
+STRIDE_SECS = 2.0  # a ship's fastest motion takes several of them
+MAX_STRIDES = 1000  # over all runs; long runs have longer strides
+INITIAL_STD_FACTOR = 5.0  # standard deviation of a measured initial state over a sample's noise
+ITERATIONS = 2  # linearisations of an update, each at the estimate of the one before
+FIXED_HEADING_STD = 1e-9  # rad, of an initial heading that no output depends on
 
 
 @dataclass(frozen=True, eq=False)
-class _Belief:
-    """What is believed at an instant, of parameters, state, offset and biases: (m,), (m, m)."""
+class _Estimate:
+    """Mean, (m,), and covariance, (m, m), of parameters, state, rudder offset and biases."""
 
     mean: FloatArray
     covariance: FloatArray
 
 
 def parameter_ekf(fit: OutputError, priors: FloatArray) -> ParameterHistory:
-    """The courses of a fit's parameters by the extended Kalman filter, from two priors, (2, p)."""
-    reach = np.abs(priors[0] - priors[1]) / 2
-    parts = [list(_course(fit, prior, reach)) for prior in priors]
-    times = np.array([time for time, _, _ in parts[0]])
-    values, stds = (np.array([[row[i] for row in part] for part in parts]) for i in (1, 2))
+    """Estimate a fit's free parameters by the extended Kalman filter, from two priors.
+
+    Parameters
+    ----------
+    fit
+        The model, the segments and the measurement noise; swells that it found are subtracted.
+    priors
+        (2, p) the initial parameters of the two passes, as `two_priors`. Half their distance is
+        the initial standard deviation.
+
+    Returns
+    -------
+    history
+        Two passes, at the end of each stride; NaN from where the simulated ship diverges.
+    """
+    prior_std = np.abs(priors[0] - priors[1]) / 2
+    passes = [list(_pass(fit, prior, prior_std)) for prior in priors]
+    times = np.array([time for time, _, _ in passes[0]])
+    values, stds = (np.array([[row[i] for row in each] for each in passes]) for i in (1, 2))
     return ParameterHistory(EKF_METHOD, fit.problem.free_names, times, values, stds, priors)
 
 
-def _course(
-    fit: OutputError, prior: FloatArray, reach: FloatArray
+def _pass(
+    fit: OutputError, prior: FloatArray, prior_std: FloatArray
 ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-    """Instants, parameters and their standard deviations, (p,) each; NaN once the ship ran away."""
+    """Yield instants, parameters and their standard deviations, (p,) each."""
     problem, p = fit.problem, len(prior)
-    values, covariance = prior, np.diag(reach**2)
-    stride = max(STRIDE_SECS, run_secs(problem.segments) / MOST_STRIDES)
-    for i, begins in enumerate(begins_secs(problem.segments)):
-        yield begins, values.copy(), np.sqrt(np.diag(covariance))
-        measured, weight = _calm(fit, i)
-        belief = _begun(fit, i, values, covariance)
+    values, covariance = prior, np.diag(prior_std**2)
+    stride = max(STRIDE_SECS, total_duration_secs(problem.segments) / MAX_STRIDES)
+    for i, start in enumerate(start_times_secs(problem.segments)):
+        yield start, values.copy(), np.sqrt(np.diag(covariance))
+        measured, weight = _data_without_waves(fit, i)
+        estimate = _initial_estimate(fit, i, values, covariance)
         for path, part in _strides(problem.segments[i], stride):
-            belief = _taken_in(problem, belief, path, measured[part], weight[part])
-            at = begins + (part.stop - 1) * problem.segments[i].dt_secs
-            yield at, belief.mean[:p], np.sqrt(np.diag(belief.covariance)[:p])
-        values, covariance = belief.mean[:p], belief.covariance[:p, :p]
+            estimate = _update_and_predict(problem, estimate, path, measured[part], weight[part])
+            time = start + (part.stop - 1) * problem.segments[i].dt_secs
+            yield time, estimate.mean[:p], np.sqrt(np.diag(estimate.covariance)[:p])
+        values, covariance = estimate.mean[:p], estimate.covariance[:p, :p]
 
 
-def _calm(fit: OutputError, i: int) -> tuple[FloatArray, FloatArray]:
-    """What was measured in a segment less the swell the fit found, and its weights: (n, c) each."""
+def _data_without_waves(fit: OutputError, i: int) -> tuple[FloatArray, FloatArray]:
+    """Return segment i's outputs less the swell the fit found, and their weights: (n, c) each."""
     problem, z = fit.problem, fit.minimum.unknowns
-    left = residuals(problem, z)[i]
-    _, weight = weighted_residuals(left, fit.residual_stds[i])
-    still = replace(problem, waves=())
-    own = z[problem.own_slice(i)][: _own_size(problem)]
+    residual = residuals(problem, z)[i]
+    _, weight = weighted_residuals(residual, fit.residual_stds[i])
+    count = _own_count(problem)
+    own = z[problem.own_slice(i)][:count]
     parts = [z[: len(problem.free)]]
-    parts += [own if j == i else np.zeros(_own_size(problem)) for j in range(len(problem.segments))]
-    return left + still.predicted(np.concatenate(parts), i), weight
+    parts += [own if j == i else np.zeros(count) for j in range(len(problem.segments))]
+    return residual + replace(problem, waves=()).predicted(np.concatenate(parts), i), weight
 
 
-def _own_size(problem: Problem) -> int:
+def _own_count(problem: Problem) -> int:
+    """Count a segment's own unknowns, waves excepted."""
     return len(problem.model.state) + (problem.nuisance.rudder_std > 0) + len(problem.biases)
 
 
-def _begun(fit: OutputError, i: int, values: FloatArray, covariance: FloatArray) -> _Belief:
-    """What is believed as segment i begins."""
-    problem, segment, p = fit.problem, fit.problem.segments[i], len(values)
-    still = replace(problem, waves=())
-    own, outputs = still.own_slice(i), problem.outputs
-    mean = np.concatenate((values, still.start()[own]))
-    with np.errstate(divide="ignore"):  # what a sensor tells has no prior
-        stds = np.asarray(still.prior[1])[own] ** -0.5
+def _initial_estimate(
+    fit: OutputError, i: int, values: FloatArray, covariance: FloatArray
+) -> _Estimate:
+    """Return the estimate at the beginning of segment i, given that of the parameters."""
+    segment, p = fit.problem.segments[i], len(values)
+    problem = replace(fit.problem, waves=())
+    own, outputs = problem.own_slice(i), problem.outputs
+    mean = np.concatenate((values, problem.start()[own]))
+    with np.errstate(divide="ignore"):  # a measured state has no prior, and a precision of 0
+        stds = np.asarray(problem.prior[1])[own] ** -0.5
     for k, value in enumerate(problem.model.state):
         if value.channel in outputs and segment.has(value.channel or ""):
-            usual = fit.residual_stds[i].typical[0, outputs.index(value.channel or "")]
-            stds[k] = FIRST_STDS * usual / problem.scale.of_channel(value.channel)
+            noise_std = fit.residual_stds[i].typical[0, outputs.index(value.channel or "")]
+            stds[k] = INITIAL_STD_FACTOR * noise_std / problem.scale.of_channel(value.channel)
         elif value.channel == "heading":
-            stds[k] = STILL
-    whole = np.diag(np.concatenate((np.zeros(p), stds**2)))
-    whole[:p, :p] = covariance
-    return _Belief(mean, whole)
+            stds[k] = FIXED_HEADING_STD
+    joint = np.diag(np.concatenate((np.zeros(p), stds**2)))
+    joint[:p, :p] = covariance
+    return _Estimate(mean, joint)
 
 
 def _strides(segment: Segment, stride: float) -> Iterator[tuple[InputPath, slice]]:
-    """A segment's path in pieces of about `stride` s, and the samples of each, ends included."""
+    """Yield the inputs of each stride of about `stride` s, and its samples, both ends included."""
     path = segment.path
     ends = np.flatnonzero(path.sample >= 0)
     numbers = np.asarray((path.sample[ends] * segment.dt_secs) // stride)
@@ -114,89 +135,103 @@ def _strides(segment: Segment, stride: float) -> Iterator[tuple[InputPath, slice
         yield path_part(path, before + 1, end + 1), slice(first, int(path.sample[end]) + 1)
 
 
-def _taken_in(
-    problem: Problem, belief: _Belief, path: InputPath, measured: FloatArray, weight: FloatArray
-) -> _Belief:
-    """What is believed at the end of a stride, its samples taken in but for the first.
+def _update_and_predict(
+    problem: Problem,
+    prior: _Estimate,
+    path: InputPath,
+    measured: FloatArray,
+    weight: FloatArray,
+) -> _Estimate:
+    """Update by a stride's samples, (n, c), and predict the estimate at its end.
 
-    That one was the last of the stride before.
+    The first sample is skipped: it is the last one of the stride before.
     """
-    mean, moved = belief.mean, _directions(problem)
-    for _ in range(ROUNDS):
-        run = _run(problem, mean, path, len(measured), moved)
-        off = (measured - run.predicted)[1:]
-        known = np.isfinite(off) & (weight[1:] > 0)
-        H = run.by_unknown[1:][known]
-        root = np.sqrt(weight[1:][known])
-        step, covariance = _corrected(belief, mean, H * root[:, None], off[known] * root)
-        mean = _within(problem, mean + step)
-    end = _run(problem, mean, path, len(measured), moved)
-    if not np.isfinite(end.state).all():  # the ship has run away, and there is no more to believe
-        return _Belief(np.full_like(mean, np.nan), np.full_like(covariance, np.nan))
+    mean, directions = prior.mean, _directions(problem)
+    for _ in range(ITERATIONS):
+        run = _predict_stride(problem, mean, path, len(measured), directions)
+        residual = (measured - run.predicted)[1:]
+        used = np.isfinite(residual) & (weight[1:] > 0)
+        H = run.jacobian[1:][used]
+        root = np.sqrt(weight[1:][used])
+        step, covariance = _correction(prior, mean, H * root[:, None], residual[used] * root)
+        mean = _clip_parameters(problem, mean + step)
+    end = _predict_stride(problem, mean, path, len(measured), directions)
+    if not np.isfinite(end.state).all():  # diverged: there is no estimate from here on
+        return _Estimate(np.full_like(mean, np.nan), np.full_like(covariance, np.nan))
     ahead = mean.copy()
     states = slice(len(problem.free), len(problem.free) + len(problem.model.state))
     ahead[states] = end.state
     F = np.eye(len(mean))
-    F[states] = end.state_by
-    return _Belief(ahead, F @ covariance @ F.T)
+    F[states] = end.state_jacobian
+    return _Estimate(ahead, F @ covariance @ F.T)
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
-    """A stride as it is predicted, with its derivatives by the m unknowns."""
+class _Stride:
+    """Prediction over a stride of n samples, with its derivatives by the m unknowns.
 
-    predicted: FloatArray  # (n, c)
-    by_unknown: FloatArray  # (n, c, m)
-    state: FloatArray  # (s,) at its end
-    state_by: FloatArray  # (s, m)
+    Attributes
+    ----------
+    predicted
+        (n, c) outputs, biases included.
+    jacobian
+        (n, c, m) their derivatives.
+    state, state_jacobian
+        (s,) and (s, m) at the end, in the units of the equations.
+    """
+
+    predicted: FloatArray
+    jacobian: FloatArray
+    state: FloatArray
+    state_jacobian: FloatArray
 
 
 def _directions(problem: Problem) -> FloatArray:
-    """(m - biases, p + s + 1) the unknowns that move the ship."""
+    """Return the (m - biases, p + s + 1) unit vectors of the unknowns that move the ship."""
     p, s = len(problem.values), len(problem.model.state)
     has_offset = problem.nuisance.rudder_std > 0
     return np.eye(p + s + 1)[[*problem.free, *range(p, p + s + has_offset)]]
 
 
-def _run(
-    problem: Problem, mean: FloatArray, path: InputPath, count: int, moved: FloatArray
-) -> _Run:
+def _predict_stride(
+    problem: Problem, mean: FloatArray, path: InputPath, count: int, directions: FloatArray
+) -> _Stride:
     p, s = len(problem.free), len(problem.model.state)
     offset = float(mean[p + s]) if problem.nuisance.rudder_std > 0 else 0.0
     run = problem.model.propagate(
-        problem.parameters(mean), mean[p : p + s], path, count, moved, offset=offset,
+        problem.parameters(mean), mean[p : p + s], path, count, directions, offset=offset,
         scale=problem.scale,
     )  # fmt: skip
-    known = len(moved)
+    moving = len(directions)
     predicted = run.outputs[:, problem.columns]
-    by_unknown = np.zeros((*predicted.shape, len(mean)))
-    by_unknown[:, :, :known] = np.moveaxis(run.outputs_by[:, :, problem.columns], 0, 2)
+    jacobian = np.zeros((*predicted.shape, len(mean)))
+    jacobian[:, :, :moving] = np.moveaxis(run.outputs_by[:, :, problem.columns], 0, 2)
     for k, (column, _) in enumerate(problem.biases):
-        predicted[:, column] += mean[known + k]
-        by_unknown[:, column, known + k] = 1.0
-    state_by = np.zeros((s, len(mean)))
-    state_by[:, :known] = run.end_by.T
-    return _Run(predicted, by_unknown, run.end, state_by)
+        predicted[:, column] += mean[moving + k]
+        jacobian[:, column, moving + k] = 1.0
+    state_jacobian = np.zeros((s, len(mean)))
+    state_jacobian[:, :moving] = run.end_by.T
+    return _Stride(predicted, jacobian, run.end, state_jacobian)
 
 
-def _corrected(
-    belief: _Belief, mean: FloatArray, H: FloatArray, off: FloatArray
+def _correction(
+    prior: _Estimate, mean: FloatArray, H: FloatArray, residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """The step from `mean`, about which all is linear, and the covariance after it.
+    """Return the step from `mean`, the point of linearisation, and the covariance after it.
 
-    H, (k, m), and what is off, (k,), are of unit noise. Joseph's form.
+    H, (k, m), and the residuals, (k,), are scaled to unit noise. The covariance is in Joseph form.
     """
-    P = belief.covariance
-    across = P @ H.T
-    gain = np.linalg.solve(H @ across + np.eye(len(off)), across.T).T
-    behind = belief.mean - mean
-    step = behind + gain @ (off - H @ behind)
-    kept = np.eye(len(mean)) - gain @ H
-    return step, kept @ P @ kept.T + gain @ gain.T
+    P = prior.covariance
+    PHt = P @ H.T
+    K = np.linalg.solve(H @ PHt + np.eye(len(residual)), PHt.T).T
+    offset = prior.mean - mean
+    step = offset + K @ (residual - H @ offset)
+    I_KH = np.eye(len(mean)) - K @ H
+    return step, I_KH @ P @ I_KH.T + K @ K.T
 
 
-def _within(problem: Problem, mean: FloatArray) -> FloatArray:
-    """The parameters within their limits."""
+def _clip_parameters(problem: Problem, mean: FloatArray) -> FloatArray:
+    """Clip the parameters to their limits."""
     lowest, highest = problem.bounds
     p = len(problem.free)
     return np.concatenate((np.clip(mean[:p], lowest[:p], highest[:p]), mean[p:]))

@@ -1,4 +1,4 @@
-"""The sliding-window identifier over a fit's runs: the equations in integral form, no prior."""
+"""Sliding-window estimates over a fit's runs: the equations in integral form, without a prior."""
 
 import numpy as np
 
@@ -11,43 +11,54 @@ from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
 
-from .history import ParameterHistory, begins_secs, with_breaks
+from .history import ParameterHistory, start_times_secs, with_breaks
 
 WINDOW_METHOD = "windows in weak form"
 
 
 def window_estimates(fit: OutputError) -> ParameterHistory | None:
-    """The window by window histories of the paper's coefficients; else None.
+    """Estimate the coefficients of the paper's model window by window, as a replay does.
 
-    What a window cannot tell is NaN.
+    Parameters
+    ----------
+    fit
+        A fit of either form of the paper's model; its segments are used where all channels of the
+        regression were measured, and its coefficients scale the regressors.
+
+    Returns
+    -------
+    history
+        One pass without a prior; NaN where a window does not determine a coefficient. None for
+        any other model, or where no segment has all channels.
     """
     problem = fit.problem
-    names = tuple(name for name in problem.free_names if name in Coefficients._fields)
-    usable = [t for t in problem.segments if all(t.has(c) for c in CHANNELS if c in MODEL_OUTPUTS)]
-    if problem.model.kind is not Coefficients or not usable:
+    if problem.model.kind is not Coefficients:
         return None
+    names = tuple(name for name in problem.free_names if name in Coefficients._fields)
     model = problem.model.coefficients(fit.parameters)
+    needed = [channel for channel in CHANNELS if channel in MODEL_OUTPUTS]
     parts = [
-        _history(segment, model, begins, names)
-        for segment, begins in zip(problem.segments, begins_secs(problem.segments), strict=True)
-        if segment in usable
+        _segment_history(segment, model, start, names)
+        for segment, start in zip(problem.segments, start_times_secs(problem.segments), strict=True)
+        if all(segment.has(channel) for channel in needed)
     ]
-    times, found, stds = (with_breaks(each) for each in zip(*parts, strict=True))
-    return ParameterHistory(
-        WINDOW_METHOD, names, times, found[None], stds[None], np.full((1, len(names)), np.nan)
-    )
+    if not parts:
+        return None
+    times, values, stds = (with_breaks(each) for each in zip(*parts, strict=True))
+    no_prior = np.full((1, len(names)), np.nan)
+    return ParameterHistory(WINDOW_METHOD, names, times, values[None], stds[None], no_prior)
 
 
-def _history(
-    segment: Segment, model: Coefficients, begins: float, names: tuple[str, ...]
+def _segment_history(
+    segment: Segment, model: Coefficients, start: float, names: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Instants, values and standard deviations, (k,), (k, p) and (k, p), of one run."""
+    """Return instants, values and standard deviations of one segment: (k,), (k, p), (k, p)."""
     yaw, surge = (identify(rows)[1] for rows in weak_form(segment.signals, model))
     columns = [_column(yaw if name in yaw.names else surge, name) for name in names]
     return (
-        begins + yaw.time_secs,
-        np.column_stack([value for value, _ in columns]),
-        np.column_stack([std for _, std in columns]),
+        start + yaw.time_secs,
+        np.column_stack([values for values, _ in columns]),
+        np.column_stack([stds for _, stds in columns]),
     )
 
 

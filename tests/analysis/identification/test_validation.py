@@ -1,4 +1,4 @@
-"""A fit against runs it never saw: tracks that agree, and figures that are right or not there."""
+"""Prediction of runs that were not fitted: tracks, and manoeuvring indices."""
 
 from dataclasses import replace
 from functools import cache
@@ -35,7 +35,7 @@ def a_log(manoeuvre: str, seconds: float, noise_deg: float = 0.0, seed: int = 0)
 
 @cache
 def the_ship() -> OutputError:
-    """The ship that sails, as if an identification had found her to the last digit."""
+    """Return a fit whose parameters are exactly those of the simulated ship."""
     (trial,) = run_from_log(a_log("zigzag-20-20", 300.0)).segments
     return output_error([trial], ship_model("burylin"), fixed=VESSEL.coefficients._asdict())
 
@@ -46,7 +46,7 @@ def validated(log: TrialLog) -> Validation:
 
 
 def figures(log: TrialLog) -> dict[str, ManoeuvreIndex]:
-    return {figure.name: figure for figure in validated(log).figures}
+    return {figure.name: figure for figure in validated(log).indices}
 
 
 def without(log: TrialLog, *names: str) -> TrialLog:
@@ -54,7 +54,7 @@ def without(log: TrialLog, *names: str) -> TrialLog:
 
 
 def fixes(log: TrialLog, *, after_secs: float = 0.0, course_deg: float = 0.0) -> TrialLog:
-    """The log with its fixes from some time on, the whole track turned to a course."""
+    """Return the log with its fixes from some time on, the track rotated to a course."""
     position = log["position"]
     c, s = np.cos(radians(course_deg)), np.sin(radians(course_deg))
     turned = replace(position, values=position.values @ np.array([[c, s], [-s, c]]))
@@ -72,7 +72,7 @@ def circle(noise_deg: float = 0.0, seed: int = 0) -> TrialLog:
 
 
 def steered(log: TrialLog, secs: list[float], rudder_deg: list[float]) -> TrialLog:
-    """The log with another rudder, in straight lines: of a ship that did not obey it."""
+    """Return the log with another rudder, piecewise linear, which the ship did not follow."""
     rudder = log["rudder"]
     time = (rudder.measured_ns - rudder.measured_ns[0]) * 1e-9
     other = replace(rudder, values=np.radians(np.interp(time, secs, rudder_deg)))
@@ -83,15 +83,15 @@ def steered(log: TrialLog, secs: list[float], rudder_deg: list[float]) -> TrialL
 
 
 @pytest.mark.parametrize("course_deg", [0.0, 90.0, -150.0])
-def test_the_fixes_give_a_ship_without_heading_her_first_course(course_deg: float) -> None:
+def test_without_heading_the_initial_one_is_found_from_the_fixes(course_deg: float) -> None:
     found = validated(without(fixes(circle(), course_deg=course_deg), "heading"))
     assert found.rms["track"] < 5
-    told = {figure.name: figure.measured for figure in found.figures}
-    assert told["advance"] == pytest.approx(ADVANCE, rel=0.005)
-    assert told["tactical diameter"] == pytest.approx(DIAMETER, rel=0.005)
+    indices = {figure.name: figure.measured for figure in found.indices}
+    assert indices["advance"] == pytest.approx(ADVANCE, rel=0.005)
+    assert indices["tactical diameter"] == pytest.approx(DIAMETER, rel=0.005)
 
 
-def test_without_heading_fixes_that_tell_no_course_are_left_alone() -> None:
+def test_without_heading_fixes_that_determine_no_heading_are_not_used() -> None:
     log = without(fixes(circle(), course_deg=90.0), "heading")
     late = validated(fixes(log, after_secs=30.0))  # the rudder moves at 10 s
     assert late.rms["track"] < 5  # by speed and yaw rate
@@ -103,14 +103,14 @@ def test_without_heading_fixes_that_tell_no_course_are_left_alone() -> None:
     assert initial_heading(trial, places[::-1] * 0.0) is None
 
 
-def test_fixes_that_begin_late_are_laid_on_the_track_where_they_begin() -> None:
+def test_late_fixes_are_shifted_onto_the_track_where_they_begin() -> None:
     found = validated(fixes(a_log("zigzag-20-20", 300.0), after_secs=60.0))
     assert found.rms["track"] < 5
     assert np.isnan(found.measured_track[0]).all()
 
 
 @pytest.mark.parametrize("after_secs", [5.0, 60.0])
-def test_figures_of_a_track_are_right_or_not_there(after_secs: float) -> None:
+def test_indices_of_a_track_are_right_or_absent(after_secs: float) -> None:
     whole, late = figures(circle()), figures(fixes(circle(), after_secs=after_secs))
     on_track = {"advance", "transfer", "tactical diameter"}
     expected = set(whole) if after_secs < 10 else set(whole) - on_track
@@ -119,62 +119,62 @@ def test_figures_of_a_track_are_right_or_not_there(after_secs: float) -> None:
         assert late[name].measured == pytest.approx(whole[name].measured, rel=1e-3), name
 
 
-def test_a_run_without_heading_and_position_is_validated_all_the_same() -> None:
+def test_a_run_without_heading_and_position_is_validated() -> None:
     found = validated(without(circle(), "heading", "position"))
     assert "heading" not in found.rms
-    told = {figure.name: figure for figure in found.figures}
-    assert told["advance"].measured == pytest.approx(ADVANCE, rel=0.02)
-    assert abs(told["tactical diameter"].error) < 0.02 * told["tactical diameter"].measured
+    indices = {figure.name: figure for figure in found.indices}
+    assert indices["advance"].measured == pytest.approx(ADVANCE, rel=0.02)
+    assert abs(indices["tactical diameter"].error) < 0.02 * indices["tactical diameter"].measured
 
 
-def test_a_ship_that_runs_away_on_a_held_out_log_is_said() -> None:
+def test_a_diverging_simulation_is_reported() -> None:
     fit = the_ship()
     fast = replace(fit.problem, values=fit.problem.values * -40.0)
     (found,) = validate(replace(fit, problem=fast), run_from_log(circle()))
     assert found.diverged
-    assert found.figures == ()
+    assert found.indices == ()
     assert np.isfinite(found.measured_track).all()
 
 
-def test_the_rms_is_of_what_is_known() -> None:
+def test_the_rms_is_of_the_finite_values() -> None:
     assert nan_rms(np.array([3.0, np.nan, -4.0])) == pytest.approx(np.sqrt(12.5))
     assert np.isnan(nan_rms(np.full(3, np.nan)))
 
 
-# ---- where figures begin
+# ---- where indices begin
 
 
-def test_figures_count_from_where_the_rudder_leaves_its_rest() -> None:
+def test_the_first_order_is_where_the_rudder_departs_from_its_rest() -> None:
     rudder = np.radians(np.interp(np.arange(100.0), [0, 40, 54, 99], [0.1, 0.1, 35, 35]))
     assert first_execute(rudder, 1.0) == 40
     assert first_execute(np.zeros(100), 1.0) is None
 
 
-# ---- a heading's noise
+# ---- noise of the heading
 
 
-def test_a_noisy_heading_moves_no_figure_of_a_zigzag_by_much() -> None:
-    clean, off = figures(a_log("zigzag-10-10", 700.0)), []
+def test_heading_noise_hardly_changes_the_indices_of_a_zigzag() -> None:
+    clean, errors = figures(a_log("zigzag-10-10", 700.0)), []
     for seed in range(6):
         noisy = figures(a_log("zigzag-10-10", 700.0, NOISE_DEG, seed))
         assert list(noisy) == list(clean)
-        off.append([noisy[name].measured - clean[name].measured for name in clean])
-    turning, *overshoots, period = np.array(off).T
+        errors.append([noisy[name].measured - clean[name].measured for name in clean])
+    turning, *overshoots, period = np.array(errors).T
     assert len(overshoots) == 4
     assert nan_rms(np.degrees(overshoots)) < 0.2
-    assert np.abs(np.degrees(overshoots)).max() < 0.4  # of which the first course has a half
+    assert np.abs(np.degrees(overshoots)).max() < 0.4  # half of it from the initial heading
     assert np.abs(turning).max() < 1.0
     assert np.abs(period).max() < 1.0
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_noisy_heading_moves_no_figure_of_a_circle_by_much(seed: int) -> None:
+def test_heading_noise_hardly_changes_the_indices_of_a_circle(seed: int) -> None:
     clean, noisy = figures(circle()), figures(circle(NOISE_DEG, seed))
     for name, figure in noisy.items():
         assert figure.measured == pytest.approx(clean[name].measured, rel=0.01), name
 
 
-def test_a_zigzags_figures_are_those_of_an_independent_simulation() -> None:
+def test_the_indices_of_a_zigzag_are_those_of_an_independent_simulation() -> None:
     found = figures(a_log("zigzag-10-10", 700.0))
     # heading extrema of 24.159 at 133.0 s and -18.093 at 275.8, then at 406.2
     assert degrees(found["overshoot 1"].measured) == pytest.approx(14.159, abs=0.02)
@@ -182,7 +182,7 @@ def test_a_zigzags_figures_are_those_of_an_independent_simulation() -> None:
     assert found["period"].measured == pytest.approx(2 * (406.2 - 275.8), abs=10)
 
 
-def test_the_initial_turning_time_is_until_the_heading_is_the_switch_off() -> None:
+def test_the_initial_turning_time_ends_at_the_first_execute_heading() -> None:
     log = a_log("zigzag-10-10", 700.0)
     heading = log["heading"]
     secs = (heading.measured_ns - heading.measured_ns[0]) * 1e-9
@@ -193,16 +193,16 @@ def test_the_initial_turning_time_is_until_the_heading_is_the_switch_off() -> No
 
 
 def tanker(path: str) -> dict[str, float]:
-    """The figures measured on a real run, in degrees and seconds."""
+    """Return the indices measured on a real run, in degrees and seconds."""
     file = KVLCC2 / path
     if not file.is_file():
         pytest.skip(f"the real recordings are not here: {file}")
     layout = load_layout(PROJECT / "sample_data" / "layouts" / f"simman_{file.parent.name}.toml")
-    told = figures(read_table(file, layout))
-    return {n: degrees(f.measured) if f.unit == "rad" else f.measured for n, f in told.items()}
+    indices = figures(read_table(file, layout))
+    return {n: degrees(f.measured) if f.unit == "rad" else f.measured for n, f in indices.items()}
 
 
-def test_the_tankers_overshoots_are_those_told_of_her() -> None:
+def test_the_tanker_s_overshoots_are_those_published() -> None:
     ten = tanker("marin/MARIN_FREE_KVLCC2_zz_10_m.dat")
     assert ten["overshoot 1"] == pytest.approx(9.39, abs=0.1)
     assert ten["overshoot 2"] == pytest.approx(15.11, abs=0.1)
@@ -215,36 +215,36 @@ def test_the_tankers_overshoots_are_those_told_of_her() -> None:
 
 
 @pytest.mark.parametrize("rudder", ["10", "20", "30", "35"])
-def test_a_tanker_reversed_late_was_to_be_reversed_at_a_usual_heading(rudder: str) -> None:
-    told = tanker(f"hsva/HSVA_CPMC_KVLCC2_Z_{rudder}_05.dat")
-    assert list(told) == ["initial turning time", *(f"overshoot {i}" for i in (1, 2, 3, 4)),
+def test_a_late_reversal_is_counted_from_the_nominal_heading(rudder: str) -> None:
+    indices = tanker(f"hsva/HSVA_CPMC_KVLCC2_Z_{rudder}_05.dat")
+    assert list(indices) == ["initial turning time", *(f"overshoot {i}" for i in (1, 2, 3, 4)),
                           "period"]  # fmt: skip
-    # her rudder leaves its angle 5.4 to 6.3 degrees off, and was ordered to at 5
-    assert told["overshoot 1"] == pytest.approx(
+    # the rudder departs from its angle at 5.4 to 6.3 degrees, and was ordered to at 5
+    assert indices["overshoot 1"] == pytest.approx(
         {"10": 5.4, "20": 8.1, "30": 12.2, "35": 13.9}[rudder], abs=0.1
     )
 
 
-def test_a_ship_sailed_by_her_own_equations_has_no_figure_off() -> None:
+def test_a_ship_simulated_by_its_own_equations_has_no_error_in_any_index() -> None:
     for log in (circle(), a_log("zigzag-10-10", 700.0)):
         for figure in figures(log).values():
             assert abs(figure.error) < 2e-3 * abs(figure.measured), figure
 
 
-# ---- what is a manoeuvre
+# ---- recognition of manoeuvres
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_run_steered_at_random_is_no_manoeuvre(seed: int) -> None:
+def test_a_pseudo_random_run_has_no_indices(seed: int) -> None:
     assert figures(a_log("pseudo-random", 600.0, seed=seed)) == {}
 
 
 @pytest.mark.parametrize("manoeuvre", ["spiral", "pull-out-5"])
-def test_what_is_neither_zigzag_nor_circle_has_no_figures(manoeuvre: str) -> None:
+def test_spirals_and_pull_outs_have_no_indices(manoeuvre: str) -> None:
     assert figures(a_log(manoeuvre, 900.0)) == {}
 
 
-def test_a_circle_is_what_turns_by_a_rudder_held_over() -> None:
+def test_a_circle_has_a_rudder_held_over() -> None:
     held = steered(circle(), [10, 24, 500], [0, 35, 35])
     assert "advance" in figures(held)
     eased = steered(circle(), [10, 24, 40, 50, 500], [0, 35, 35, 15, 15])
@@ -255,15 +255,15 @@ def test_a_circle_is_what_turns_by_a_rudder_held_over() -> None:
     assert figures(begun_before) == {}
 
 
-def test_a_circles_figures_end_where_the_rudder_is_eased() -> None:
+def test_the_indices_of_a_circle_end_where_the_rudder_is_eased() -> None:
     quarter = figures(circle())["time to 90°"].measured
     eased = 10 + quarter + 5
-    told = figures(steered(circle(), [10, 24, eased, eased + 15, 500], [0, 35, 35, 0, 0]))
-    assert told["advance"].measured == pytest.approx(ADVANCE, rel=0.005)
-    assert "tactical diameter" not in told
+    indices = figures(steered(circle(), [10, 24, eased, eased + 15, 500], [0, 35, 35, 0, 0]))
+    assert indices["advance"].measured == pytest.approx(ADVANCE, rel=0.005)
+    assert "tactical diameter" not in indices
 
 
-def test_a_zigzag_goes_from_one_angle_to_the_same_on_the_other_side() -> None:
+def test_a_zigzag_has_equal_rudder_angles_on_both_sides() -> None:
     log = a_log("zigzag-10-10", 700.0)
     assert "overshoot 1" in figures(log)
     rudder = log["rudder"]

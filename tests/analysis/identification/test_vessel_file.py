@@ -1,4 +1,4 @@
-"""Any model of the ladder: simulated, identified, written, and simulated again."""
+"""Each model: simulated, identified, written to a vessel file, and simulated again."""
 
 from dataclasses import replace
 from functools import cache
@@ -44,47 +44,47 @@ def logs_of(name: str) -> tuple[TrialLog, ...]:
 
 
 @cache
-def found_of(name: str) -> tuple[IdentifiedShip, str]:
-    found = identify(logs_of(name), name)
-    return found, vessel_toml(found)
+def identified(name: str) -> tuple[IdentifiedShip, str]:
+    ship = identify(logs_of(name), name)
+    return ship, vessel_toml(ship)
 
 
 def truth(vessel: Vessel, run: str) -> dict[str, FloatArray]:
-    voyage = compute_trajectory(vessel, manoeuvre(run, 400.0, vessel.approach_rpm), 400.0)
-    return voyage.at(np.arange(400.0))
+    trajectory = compute_trajectory(vessel, manoeuvre(run, 400.0, vessel.approach_rpm), 400.0)
+    return trajectory.at(np.arange(400.0))
 
 
-# ---- there and back
-
-
-@pytest.mark.parametrize("name", SHIPS)
-def test_a_simulated_ship_of_any_model_is_found_within_her_intervals(name: str) -> None:
-    found, _ = found_of(name)
-    # in her own units: the speed of the straight run, as measured, is off by its noise
-    whole = fit_problem(replace(found.fit.problem, scale=ship_from_vessel(vessel_of(name)).scale))
-    told = uncertainty(whole)
-    true = np.array([SHIPS[name][parameter] for parameter in told.names])
-    off = np.abs(told.values - true) / told.std
-    assert off.max() < 3.5, told.names[int(off.argmax())]
-    assert np.mean(off < 1.96) > 0.8
-    assert set(told.unidentifiable) <= {"f2"}
+# ---- round trip
 
 
 @pytest.mark.parametrize("name", SHIPS)
-def test_the_file_is_the_ship_that_was_found(name: str) -> None:
-    found, text = found_of(name)
+def test_the_intervals_of_each_model_contain_the_true_parameters(name: str) -> None:
+    ship, _ = identified(name)
+    # in the true scale: the measured speed of the straight run contains noise
+    whole = fit_problem(replace(ship.fit.problem, scale=ship_from_vessel(vessel_of(name)).scale))
+    estimates = uncertainty(whole)
+    true = np.array([SHIPS[name][parameter] for parameter in estimates.names])
+    error = np.abs(estimates.values - true) / estimates.std
+    assert error.max() < 3.5, estimates.names[int(error.argmax())]
+    assert np.mean(error < 1.96) > 0.8
+    assert set(estimates.unidentifiable) <= {"f2"}
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_the_file_holds_the_identified_model(name: str) -> None:
+    ship, text = identified(name)
     vessel = parse_vessel(text, "v.toml")
-    ship = ship_from_vessel(vessel)
-    assert ship.model is found.model
-    assert ship.scale == found.fit.problem.scale
-    assert ship.coefficients == found.model.coefficients(found.fit.parameters)
+    written = ship_from_vessel(vessel)
+    assert written.model is ship.model
+    assert written.scale == ship.fit.problem.scale
+    assert written.coefficients == ship.model.coefficients(ship.fit.parameters)
     assert (vessel.rudder_max, vessel.rudder_rate, vessel.length) == (0.6, 0.04, LENGTH)
-    assert f"a = {found.coefficients.get('a')!r}  # ± " in text or name == "three-dof"
+    assert f"a = {ship.parameters.get('a')!r}  # ± " in text or name == "three-dof"
 
 
 @pytest.mark.parametrize("name", SHIPS)
-def test_the_ship_that_was_found_sails_as_the_true_one_does_what_neither_saw(name: str) -> None:
-    _, text = found_of(name)
+def test_the_identified_ship_manoeuvres_as_the_true_one_does(name: str) -> None:
+    _, text = identified(name)
     true = parse_vessel(toml_of(name) + GEAR, name)
     for run in ("zigzag-10-10", "turning-circle-25"):
         expected, again = truth(true, run), truth(parse_vessel(text, "v.toml"), run)
@@ -94,40 +94,40 @@ def test_the_ship_that_was_found_sails_as_the_true_one_does_what_neither_saw(nam
         assert np.hypot(*(again["position"] - expected["position"]).T).max() < 15
 
 
-# ---- what stands beside it
+# ---- the paper's model beside it
 
 
 @pytest.mark.parametrize("name", SECOND_ORDER)
-def test_the_papers_model_of_the_same_logs_stands_beside_it_for_replay(name: str) -> None:
-    _, text = found_of(name)
+def test_the_papers_model_of_the_same_logs_is_written_for_replay(name: str) -> None:
+    _, text = identified(name)
     paper = parse_vessel(text, "v.toml").paper_coefficients
-    assert "# what `record simulate` sails\n[model]" in text
-    assert "What `replay` filters by: the paper's model, fitted to the same logs" in text
+    assert "# `shiplog record simulate` uses this model.\n[model]" in text
+    assert "The paper's model, fitted to the same logs; `shiplog replay` designs" in text
     alone = identify(logs_of(name), "burylin").fit.parameters
     np.testing.assert_allclose(paper, alone, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["nomoto", "norrbin"])
-def test_the_papers_model_of_a_ship_of_the_first_order_is_one_that_turns_or_none(name: str) -> None:
-    c = parse_vessel(found_of(name)[1], "v.toml").coefficients
+def test_the_papers_model_of_a_first_order_ship_is_stable_and_turns_or_is_absent(name: str) -> None:
+    c = parse_vessel(identified(name)[1], "v.toml").coefficients
     assert c is None or (c.d > 0 > c.a)
 
 
-def test_a_papers_model_whose_rudder_acts_to_the_other_side_is_left_out() -> None:
+def test_a_papers_model_with_a_rudder_of_opposite_sign_is_not_written() -> None:
     contrary = with_rudder_turned(logs_of("slipstream")[0])
-    turned = replace(found_of("slipstream")[0], fit=identify([contrary], "slipstream").fit)
+    turned = replace(identified("slipstream")[0], fit=identify([contrary], "slipstream").fit)
     assert parse_vessel(vessel_toml(turned), "v.toml").coefficients is None
 
 
 @pytest.mark.parametrize("name", SHIPS)
-def test_every_ships_log_is_replayed_by_the_file_that_was_written(name: str) -> None:
-    log = replace(logs_of(name)[0], vessel_toml=found_of(name)[1])
+def test_each_model_s_log_is_replayed_with_the_written_file(name: str) -> None:
+    log = replace(logs_of(name)[0], vessel_toml=identified(name)[1])
     replayed = analyse(log)
     assert replayed.findings.plan.vessel.model is not None
     yaw, speed = (replayed.signals[n] for n in ("yaw_rate", "speed"))
     for measured, estimated in ((yaw, 0), (speed, 3)):
-        off = measured - replayed.estimates.states[:, estimated]
-        assert np.nanstd(off[len(off) // 4 :]) < 0.1 * np.nanstd(measured)
+        error = measured - replayed.estimates.states[:, estimated]
+        assert np.nanstd(error[len(error) // 4 :]) < 0.1 * np.nanstd(measured)
 
 
 def with_rudder_turned(log: TrialLog) -> TrialLog:
@@ -136,25 +136,25 @@ def with_rudder_turned(log: TrialLog) -> TrialLog:
     return replace(log, channels=tuple(turned if c is rudder else c for c in log.channels))
 
 
-def test_the_papers_model_that_was_compared_is_not_fitted_again(
+def test_the_papers_model_among_the_candidates_is_not_fitted_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    found, text = found_of("slipstream")
+    ship, text = identified("slipstream")
     paper = identify(logs_of("slipstream"), "burylin")
-    compared = replace(found, candidates=(Candidate(paper.model, paper.fit, np.zeros((3, 4))),))
+    compared = replace(ship, candidates=(Candidate(paper.model, paper.fit, np.zeros((3, 4))),))
     monkeypatch.setattr(vessel_file, "output_error", None)
     assert vessel_toml(compared) == text
 
 
-def runs_away(*_: object, **__: object) -> None:
-    raise LogError("the model burylin runs away on these segments")
+def diverges(*_: object, **__: object) -> None:
+    raise LogError("the model burylin diverges on these segments")
 
 
-def test_where_the_papers_model_runs_away_her_own_stands_alone_and_is_replayed(
+def test_where_the_papers_model_diverges_the_identified_one_is_written_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(vessel_file, "output_error", runs_away)
-    text = vessel_toml(found_of("norrbin")[0])
+    monkeypatch.setattr(vessel_file, "output_error", diverges)
+    text = vessel_toml(identified("norrbin")[0])
     vessel = parse_vessel(text, "v.toml")
     assert vessel.coefficients is None
     assert "cannot be identified from these logs" in text
@@ -172,8 +172,8 @@ def test_where_the_papers_model_runs_away_her_own_stands_alone_and_is_replayed(
     assert replayed.findings.plan.vessel.coefficients == without.findings.plan.vessel.coefficients
 
 
-def test_a_log_that_carries_such_a_file_gives_length_gear_and_alphas() -> None:
-    _, text = found_of("three-dof")
+def test_length_gear_and_alphas_come_from_the_file_a_log_carries() -> None:
+    _, text = identified("three-dof")
     carried = text.replace("alpha3 = 0.0654", "alpha3 = 0.05")
     log = replace(logs_of("three-dof")[0], vessel_toml=carried)
     again = identify([log], "slipstream")
@@ -186,7 +186,7 @@ def test_a_log_that_carries_such_a_file_gives_length_gear_and_alphas() -> None:
     assert bare.fixed["alpha3"] == 0.0654
 
 
-# ---- what is not known
+# ---- undetermined values
 
 
 @cache
@@ -199,37 +199,38 @@ def without_length() -> IdentifiedShip:
     return identify([as_log(trial) for trial in segments], "three-dof")
 
 
-def test_a_length_that_was_assumed_is_written_and_said() -> None:
+def test_an_assumed_length_is_marked() -> None:
     text = vessel_toml(without_length())
     (line,) = [line for line in text.split("\n") if line.startswith("length")]
     assert line.startswith("length = 150.0  # m, ASSUMED")
     assert parse_vessel(text, "v.toml").length == 150.0
 
 
-def test_what_was_not_told_is_marked_and_what_was_believed_before() -> None:
-    found = without_length()  # no sway was measured
-    told, share = found.uncertainty, np.where(np.array(found.uncertainty.names) == "yv", 0.6, 0.1)
-    own, _, _ = vessel_toml(replace(found, uncertainty=replace(told, prior_share=share))).partition(
-        "[yaw]"
-    )
+def test_values_that_are_not_identifiable_are_marked_with_their_origin() -> None:
+    ship = without_length()  # no sway was measured
+    estimates = ship.uncertainty
+    share = np.where(np.array(estimates.names) == "yv", 0.6, 0.1)
+    text = vessel_toml(replace(ship, uncertainty=replace(estimates, prior_share=share)))
+    own, _, _ = text.partition("[yaw]")
     lines = {line.split(" = ")[0]: line for line in own.split("\n")}
-    assert lines["yv"].endswith("NOT IDENTIFIABLE from these logs: believed before, for the most")
-    for name in set(told.unidentifiable) - {"yv"}:
-        assert lines[name].endswith("NOT IDENTIFIABLE from these logs: a value that fits them")
+    caution = "NOT IDENTIFIABLE from these logs"
+    assert lines["yv"].endswith(f"{caution}: mostly its prior")
+    for name in set(estimates.unidentifiable) - {"yv"}:
+        assert lines[name].endswith(f"{caution}: one of many values that fit them")
 
 
-def test_numbers_that_nobody_knows_are_not_written() -> None:
-    found, _ = found_of("nomoto")
-    told = found.uncertainty
+def test_an_equation_without_identifiable_parameters_is_not_written() -> None:
+    ship, _ = identified("nomoto")
+    estimates = ship.uncertainty
     for part, names in (("yaw", ("a", "k")), ("surge", ("f", "g", "h"))):
-        std = np.where(np.isin(told.names, names), 100.0, told.coloured)
-        unidentifiable = replace(found, uncertainty=replace(told, std=std, coloured=std))
-        with pytest.raises(LogError, match=f"nothing of the {part} is identifiable"):
+        std = np.where(np.isin(estimates.names, names), 100.0, estimates.coloured)
+        unidentifiable = replace(ship, uncertainty=replace(estimates, std=std, coloured=std))
+        with pytest.raises(LogError, match=f"no parameter of the {part} equation"):
             vessel_toml(unidentifiable)
 
 
-def test_a_model_that_is_not_the_ship_is_written_with_a_caution() -> None:
-    found, _ = found_of("nomoto")
-    wide = replace(found.uncertainty, std=np.full(len(found.uncertainty.names), 100.0))
-    text = vessel_toml(replace(found, uncertainty=wide))
-    assert f"k = {found.coefficients['k']!r}  # NOT IDENTIFIABLE from these logs" in text
+def test_a_model_that_does_not_fit_the_ship_is_written_with_a_caution() -> None:
+    ship, _ = identified("nomoto")
+    wide = replace(ship.uncertainty, std=np.full(len(ship.uncertainty.names), 100.0))
+    text = vessel_toml(replace(ship, uncertainty=wide))
+    assert f"k = {ship.parameters['k']!r}  # NOT IDENTIFIABLE from these logs" in text

@@ -1,4 +1,4 @@
-"""What is drawn of an identified ship, read back from the file."""
+"""Review of an identified ship, read back from the file."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ from trial_logs import as_log
 from analysis.identification.identify import IdentifiedShip, identify
 from analysis.identification.problem import residuals
 from analysis.view.identification_panels import autocorrelation, parameter_panels, run_sheets
-from analysis.view.identification_review import write_review
+from analysis.view.identification_review import write_identification_review
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import ShiplogError, TrialLog, load_vessel
@@ -40,12 +40,12 @@ def ship() -> IdentifiedShip:
 @pytest.fixture(scope="module")
 def review(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("review") / "ship.rrd"
-    write_review(ship(), path)
+    write_identification_review(ship(), path)
     return path
 
 
 def entities(path: Path) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
-    """The scalars of a file, by entity: times in s and values."""
+    """Return the scalars of a file, by entity: times in s and values."""
     found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for chunk in RrdReader(str(path)).stream():
         batch = chunk.to_record_batch()
@@ -56,14 +56,14 @@ def entities(path: Path) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
     return found
 
 
-def test_rerun_finds_no_fault_with_the_file(review: Path) -> None:
+def test_rerun_verifies_the_file(review: Path) -> None:
     command = [sys.executable, "-m", "rerun_cli", "rrd", "verify", str(review)]
     subprocess.run(command, check=True, capture_output=True)
 
 
 def test_each_run_is_drawn_measured_and_simulated(review: Path) -> None:
     drawn = entities(review)
-    for origin in ("run_1", "run_2", "held_out_1"):
+    for origin in ("run_1", "run_2", "validation_1"):
         for name in ("yaw_rate", "speed"):
             for series in ("measured", "simulated"):
                 assert f"/{origin}/{name}/{series}" in drawn
@@ -74,18 +74,18 @@ def test_each_run_is_drawn_measured_and_simulated(review: Path) -> None:
     assert times[-1] == pytest.approx(400.0)
 
 
-def test_residuals_are_measured_less_simulated_over_what_is_usual() -> None:
+def test_residuals_are_measured_minus_simulated_over_their_standard_deviation() -> None:
     sheet = next(run_sheets(ship()))
     drawn = sheet.residuals[0].series[0].lines[0].values
     fit = ship().fit
-    left = residuals(fit.problem, fit.minimum.unknowns)[0][:, 0]
+    residual = residuals(fit.problem, fit.minimum.unknowns)[0][:, 0]
     predicted = fit.problem.predicted(fit.minimum.unknowns, 0)[:, 0]
-    _, usual = fit.noises[0].spread(predicted, 0.1)
-    np.testing.assert_allclose(drawn, (left / usual)[np.isfinite(left)], rtol=1e-9)
+    _, std = fit.noises[0].spread(predicted, 0.1)
+    np.testing.assert_allclose(drawn, (residual / std)[np.isfinite(residual)], rtol=1e-9)
     assert 0.9 < np.std(drawn) < 1.1
 
 
-def test_white_residuals_stay_between_the_guides_and_the_others_do_not() -> None:
+def test_white_residuals_stay_within_the_bounds_and_slow_ones_do_not() -> None:
     rng = np.random.default_rng(0)
     white = rng.standard_normal(5000)
     found, count = autocorrelation(white, 200)
@@ -94,7 +94,7 @@ def test_white_residuals_stay_between_the_guides_and_the_others_do_not() -> None
     assert slow[50] > 0.8
 
 
-def test_an_autocorrelation_is_the_sum_over_the_pairs_that_are_known() -> None:
+def test_an_autocorrelation_is_over_the_pairs_of_finite_values() -> None:
     rng = np.random.default_rng(1)
     values = rng.standard_normal(300)
     values[rng.random(300) < 0.3] = np.nan
@@ -104,39 +104,41 @@ def test_an_autocorrelation_is_the_sum_over_the_pairs_that_are_known() -> None:
     assert count == np.isfinite(values).sum()
 
 
-def test_each_coefficient_has_its_interval_and_every_course(review: Path) -> None:
+def test_each_parameter_has_its_interval_and_all_histories(review: Path) -> None:
     drawn = entities(review)
-    told = ship().uncertainty
-    for name in told.names:
+    estimates = ship().uncertainty
+    for name in estimates.names:
         for series in ("interval", "a_paper", "kalman", "windows"):
-            assert f"/coefficient_{name}/{series}" in drawn
-    i = told.names.index("d")
+            assert f"/parameter_{name}/{series}" in drawn
+    i = estimates.names.index("d")
     panel = parameter_panels(ship())[i]
     prefixed = float(panel.title.split()[1]), float(panel.title.split()[3])
-    assert prefixed[0] * 1e-6 == pytest.approx(told.values[i], abs=told.std[i])
+    assert prefixed[0] * 1e-6 == pytest.approx(estimates.values[i], abs=estimates.std[i])
     interval = panel.series[0].lines
-    assert interval[0].values[0] - interval[1].values[0] == pytest.approx(2 * 1.96e6 * told.std[i])
-
-
-def test_what_echoes_is_faint() -> None:
-    d = next(p for p in parameter_panels(ship()) if p.name == "coefficient_d")
-    paper = next(s for s in d.series if s.name == "a_paper")
-    faint = [line for line in paper.lines if "echoing" in line.name]
-    sure = [line for line in paper.lines if "echoing" not in line.name]
-    assert all(line.colour[3] < 100 for line in faint)
-    assert sum(np.isfinite(x.values).sum() for x in faint) > 10 * sum(
-        np.isfinite(x.values).sum() for x in sure
+    assert interval[0].values[0] - interval[1].values[0] == pytest.approx(
+        2 * 1.96e6 * estimates.std[i]
     )
 
 
-def test_a_value_nobody_knows_is_not_drawn_as_if_it_were_known() -> None:
+def test_estimates_that_are_mostly_prior_are_faint() -> None:
+    d = next(p for p in parameter_panels(ship()) if p.name == "parameter_d")
+    paper = next(s for s in d.series if s.name == "a_paper")
+    faint = [line for line in paper.lines if "mostly prior" in line.name]
+    mostly_data = [line for line in paper.lines if "mostly prior" not in line.name]
+    assert all(line.colour[3] < 100 for line in faint)
+    assert sum(np.isfinite(x.values).sum() for x in faint) > 10 * sum(
+        np.isfinite(x.values).sum() for x in mostly_data
+    )
+
+
+def test_a_value_that_is_not_identifiable_is_not_drawn() -> None:
     circle = identify([a_log("turning-circle-35", 2, 500.0)], "burylin")
-    b1 = next(p for p in parameter_panels(circle) if p.name == "coefficient_b1")
+    b1 = next(p for p in parameter_panels(circle) if p.name == "parameter_b1")
     assert "not identifiable" in b1.title
     assert np.isnan(b1.series[0].lines[0].values).all()
 
 
-def test_held_out_runs_have_a_track_of_both_ships() -> None:
+def test_validation_runs_have_a_measured_and_a_simulated_track() -> None:
     sheets = list(run_sheets(ship()))
     assert [sheet.track is not None for sheet in sheets] == [False, False, True]
     track = sheets[2].track
@@ -146,14 +148,14 @@ def test_held_out_runs_have_a_track_of_both_ships() -> None:
     assert apart < 50.0
 
 
-def test_a_run_without_a_heading_is_drawn_too() -> None:
+def test_a_run_without_a_heading_is_drawn() -> None:
     assert not a_trial().has("heading")
     names = [panel.name.split("/")[1] for panel in next(run_sheets(ship())).outputs]
     assert names == [name for name in MODEL_OUTPUTS if name in ("yaw_rate", "speed")]
 
 
-def test_the_same_ship_has_the_same_names(review: Path, tmp_path: Path) -> None:
-    write_review(ship(), tmp_path / "again.rrd")
+def test_the_same_identification_has_the_same_recording_id(review: Path, tmp_path: Path) -> None:
+    write_identification_review(ship(), tmp_path / "again.rrd")
     ids = [
         RrdReader(str(path)).recordings()[0].recording_id
         for path in (review, tmp_path / "again.rrd")
@@ -161,13 +163,13 @@ def test_the_same_ship_has_the_same_names(review: Path, tmp_path: Path) -> None:
     assert ids[0] == ids[1]
 
 
-def test_an_unwritable_path_leaves_nothing(tmp_path: Path) -> None:
+def test_an_unwritable_path_leaves_no_file(tmp_path: Path) -> None:
     with pytest.raises(ShiplogError):
-        write_review(ship(), tmp_path / "no" / "such" / "folder.rrd")
+        write_identification_review(ship(), tmp_path / "no" / "such" / "folder.rrd")
     assert not list(tmp_path.iterdir())
 
 
-def test_a_piece_of_a_log_is_drawn_where_it_was() -> None:
+def test_a_segment_is_drawn_at_its_own_time() -> None:
     log = a_log("zigzag-20-20", 0)
     rudder = log["rudder"]
     at = (rudder.measured_ns - rudder.measured_ns[0]) * 1e-9

@@ -1,4 +1,4 @@
-"""ParameterHistory from two priors: what of them is an echo."""
+"""Histories from two priors, and their share of prior."""
 
 from types import SimpleNamespace
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from analysis.identification.comparison.history import (
     ParameterHistory,
-    begins_secs,
-    run_secs,
+    start_times_secs,
+    total_duration_secs,
     two_priors,
     with_breaks,
 )
@@ -15,35 +15,35 @@ from analysis.identification.comparison.history import (
 ANYWHERE = np.full(5, -np.inf), np.full(5, np.inf)
 
 
-def courses(high: list[float], low: list[float]) -> ParameterHistory:
+def history(high: list[float], low: list[float]) -> ParameterHistory:
     values = np.array([high, low])[:, :, None]
     priors = np.array([[1.3], [0.7]])
     times = np.arange(float(len(high)))
     return ParameterHistory("m", ("d",), times, values, np.full(values.shape, 0.1), priors)
 
 
-def test_a_copy_of_the_prior_echoes_wholly_and_what_came_together_not_at_all() -> None:
-    found = courses([1.3, 1.3, 1.15, 1.0], [0.7, 0.7, 0.85, 1.0])
+def test_the_share_of_prior_is_1_for_a_copy_and_0_where_both_estimates_agree() -> None:
+    found = history([1.3, 1.3, 1.15, 1.0], [0.7, 0.7, 0.85, 1.0])
     np.testing.assert_allclose(found.prior_share[:, 0], [1.0, 1.0, 0.5, 0.0])
 
 
-def test_errors_that_grow_are_more_than_an_echo() -> None:
-    assert courses([2.2], [-0.2]).prior_share[0, 0] > 3.9
+def test_amplified_errors_exceed_a_share_of_1() -> None:
+    assert history([2.2], [-0.2]).prior_share[0, 0] > 3.9
 
 
-def test_courses_that_cross_and_part_again_have_learnt_nothing() -> None:
-    found = courses([1.3, 1.0, 1.4, 1.0], [0.7, 1.0, 0.6, 1.0])
+def test_estimates_that_cross_and_part_again_are_mostly_prior() -> None:
+    found = history([1.3, 1.0, 1.4, 1.0], [0.7, 1.0, 0.6, 1.0])
     assert found.mostly_prior[:, 0].tolist() == [True, True, True, False]
 
 
-def test_a_gap_is_neither_echo_nor_knowledge() -> None:
-    found = courses([1.3, np.nan, 1.4, 1.0], [0.7, 1.0, 0.6, 1.0])
+def test_a_gap_has_no_share_of_prior() -> None:
+    found = history([1.3, np.nan, 1.4, 1.0], [0.7, 1.0, 0.6, 1.0])
     assert np.isnan(found.prior_share[1, 0])
     assert found.mostly_prior[:3, 0].all()
     assert found.median_prior_share[0] == np.median(found.prior_share[2:, 0])
 
 
-def test_without_a_prior_nothing_is_an_echo() -> None:
+def test_a_method_without_priors_has_no_share_of_prior() -> None:
     one = ParameterHistory(
         "m", ("d",), np.arange(2.0), np.array([[[1.0], [np.nan]]]), np.ones((1, 2, 1)),
         np.full((1, 1), np.nan),
@@ -52,16 +52,16 @@ def test_without_a_prior_nothing_is_an_echo() -> None:
     assert np.isnan(one.prior_share[1, 0])
 
 
-def test_priors_lie_to_either_side_and_further_off_where_little_is_told() -> None:
-    told = SimpleNamespace(values=np.array([2.0, -1.0, 1.0]), std=np.array([0.01, 0.2, 50.0]))
-    high, low = two_priors(told, ANYWHERE)  # type: ignore[arg-type]
-    np.testing.assert_allclose((high + low) / 2, told.values)
+def test_priors_are_on_both_sides_and_further_apart_where_the_std_is_larger() -> None:
+    estimates = SimpleNamespace(values=np.array([2.0, -1.0, 1.0]), std=np.array([0.01, 0.2, 50.0]))
+    high, low = two_priors(estimates, ANYWHERE)  # type: ignore[arg-type]
+    np.testing.assert_allclose((high + low) / 2, estimates.values)
     np.testing.assert_allclose(np.abs(high - low) / 2, [0.6, 0.6, 1.0])
 
 
-def test_a_value_of_zero_has_priors_that_differ() -> None:
-    told = SimpleNamespace(values=np.array([0.0]), std=np.array([0.1]))
-    high, low = two_priors(told, ANYWHERE)  # type: ignore[arg-type]
+def test_a_value_of_zero_has_two_different_priors() -> None:
+    estimates = SimpleNamespace(values=np.array([0.0]), std=np.array([0.1]))
+    high, low = two_priors(estimates, ANYWHERE)  # type: ignore[arg-type]
     assert high[0] != low[0]
 
 
@@ -73,11 +73,11 @@ def test_runs_are_put_end_to_end() -> None:
             return 20
 
     runs = (Run(), Run(), Run())
-    assert list(begins_secs(runs)) == [0.0, 10.0, 20.0]  # type: ignore[arg-type]
-    assert run_secs(runs) == 30.0  # type: ignore[arg-type]
+    assert list(start_times_secs(runs)) == [0.0, 10.0, 20.0]  # type: ignore[arg-type]
+    assert total_duration_secs(runs) == 30.0  # type: ignore[arg-type]
 
 
-def test_between_runs_there_is_a_break() -> None:
+def test_runs_are_separated_by_a_break() -> None:
     values = with_breaks([np.ones((2, 3)), np.zeros((1, 3))])
     assert values.shape == (4, 3)
     assert np.isnan(values[2]).all()
@@ -85,7 +85,7 @@ def test_between_runs_there_is_a_break() -> None:
 
 
 def test_priors_stay_within_the_limits_of_their_parameters() -> None:
-    told = SimpleNamespace(values=np.array([0.5, 2.0]), std=np.array([9.0, 9.0]))
+    estimates = SimpleNamespace(values=np.array([0.5, 2.0]), std=np.array([9.0, 9.0]))
     bounds = np.array([0.02, -np.inf, -np.inf]), np.array([np.inf, 2.5, np.inf])
-    high, low = two_priors(told, bounds)  # type: ignore[arg-type]
+    high, low = two_priors(estimates, bounds)  # type: ignore[arg-type]
     np.testing.assert_allclose(np.sort([high, low], axis=0), [[0.02, 0.0], [1.0, 2.5]])

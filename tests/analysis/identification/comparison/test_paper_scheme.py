@@ -1,4 +1,4 @@
-"""The paper's own scheme, for comparison: it is what the paper has, and it echoes."""
+"""The paper's own scheme: it is as printed, and its result is mostly its prior."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from shiplog import load_vessel
 PRIOR = load_vessel("table1")[0].coefficients
 
 
-def test_a_window_is_the_least_squares_of_its_rows() -> None:
+def test_a_window_is_the_least_squares_solution_of_its_rows() -> None:
     signals = a_trial().signals
     states = paper_states(signals, PRIOR)
     ends, found = window_coefficients(signals, PRIOR, states)
@@ -37,19 +37,19 @@ def test_a_window_is_the_least_squares_of_its_rows() -> None:
     np.testing.assert_allclose(found[k], expected, rtol=1e-6)
 
 
-def test_with_the_truth_for_a_prior_it_finds_the_truth_whatever_it_is_worth() -> None:
+def test_with_the_true_coefficients_as_prior_it_returns_them() -> None:
     signals = a_trial().signals
     states = paper_states(signals, PRIOR, as_printed=False)
     found = np.concatenate([solve_window(rows) for rows in regression_rows(signals, PRIOR, states)])
-    off = dict(zip(IDENTIFIED_NAMES, found / np.array(PRIOR[:9]) - 1, strict=True))
-    assert abs(off["a"]) < 0.05
-    assert abs(off["d"]) < 0.05
-    assert abs(off["h"]) < 0.05
+    error = dict(zip(IDENTIFIED_NAMES, found / np.array(PRIOR[:9]) - 1, strict=True))
+    assert abs(error["a"]) < 0.05
+    assert abs(error["d"]) < 0.05
+    assert abs(error["h"]) < 0.05
 
 
-def test_from_two_priors_it_comes_apart_where_the_fit_does_not() -> None:
-    fit, told = fitted()
-    found = paper_scheme(fit, two_priors(told, fit.problem.bounds))
+def test_its_estimates_from_two_priors_stay_apart() -> None:
+    fit, estimates = fitted()
+    found = paper_scheme(fit, two_priors(estimates, fit.problem.bounds))
     assert found is not None
     prior_share = dict(zip(found.names, found.median_prior_share, strict=True))
     assert prior_share["d"] > 0.5
@@ -57,18 +57,18 @@ def test_from_two_priors_it_comes_apart_where_the_fit_does_not() -> None:
     assert found.mostly_prior.mean() > 0.7
 
 
-def test_it_knows_the_papers_model_alone() -> None:
-    fit, told = fitted("norrbin")
-    assert paper_scheme(fit, two_priors(told, fit.problem.bounds)) is None
+def test_other_models_have_no_history() -> None:
+    fit, estimates = fitted("norrbin")
+    assert paper_scheme(fit, two_priors(estimates, fit.problem.bounds)) is None
     assert window_estimates(fit) is None
 
 
-def test_a_filter_that_ran_away_leaves_no_number() -> None:
+def test_a_diverged_filter_gives_nan() -> None:
     assert np.isnan(solve_window(np.full((20, 4), np.nan))).all()
 
 
 @pytest.mark.parametrize("model", ["burylin", "burylin-tied"])
-def test_windows_in_weak_form_are_the_replays(model: str) -> None:
+def test_windows_in_weak_form_are_those_of_a_replay(model: str) -> None:
     fit, _ = fitted(model, runs=2)
     found = window_estimates(fit)
     assert found is not None

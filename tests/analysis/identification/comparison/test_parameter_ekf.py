@@ -1,4 +1,4 @@
-"""The parameters as states: a filter against the joint least squares that it stands for."""
+"""The extended Kalman filter against the joint least squares that it approximates."""
 
 from dataclasses import replace
 
@@ -9,10 +9,10 @@ from scipy.optimize import least_squares
 
 from analysis.identification.comparison.history import two_priors
 from analysis.identification.comparison.parameter_ekf import (
-    _begun,
-    _calm,
+    _data_without_waves,
+    _initial_estimate,
     _strides,
-    _taken_in,
+    _update_and_predict,
     parameter_ekf,
 )
 from analysis.identification.output_error import output_error
@@ -22,40 +22,40 @@ from shiplog.ships import ship_model
 
 
 @pytest.mark.parametrize("model", ["burylin", "burylin-tied", "norrbin"])
-def test_a_stride_is_the_joint_least_squares_of_belief_and_samples(model: str) -> None:
+def test_an_update_is_the_joint_least_squares_of_prior_and_samples(model: str) -> None:
     """By scipy, with finite differences, of prior and samples together."""
-    fit, told = fitted(model)
+    fit, estimates = fitted(model)
     problem = replace(fit.problem, waves=())
-    covariance = np.diag((0.02 * np.abs(told.values)) ** 2)
-    belief = _begun(fit, 0, told.values * 1.01, covariance)
+    covariance = np.diag((0.02 * np.abs(estimates.values)) ** 2)
+    prior = _initial_estimate(fit, 0, estimates.values * 1.01, covariance)
     path, part = next(_strides(problem.segments[0], 20.0))
-    measured, weight = (column[part] for column in _calm(fit, 0))
-    found = _taken_in(problem, belief, path, measured, weight)
-    p, s = len(told.values), len(problem.model.state)
-    root = np.linalg.cholesky(np.linalg.inv(belief.covariance)).T
+    measured, weight = (column[part] for column in _data_without_waves(fit, 0))
+    found = _update_and_predict(problem, prior, path, measured, weight)
+    p, s = len(estimates.values), len(problem.model.state)
+    root = np.linalg.cholesky(np.linalg.inv(prior.covariance)).T
 
-    def off(z: np.ndarray) -> np.ndarray:
+    def residual(z: np.ndarray) -> np.ndarray:
         out = problem.model.simulate(
-            problem.parameters(belief.mean + z), (belief.mean + z)[p : p + s], path,
-            len(measured), offset=(belief.mean + z)[p + s], scale=problem.scale,
+            problem.parameters(prior.mean + z), (prior.mean + z)[p : p + s], path,
+            len(measured), offset=(prior.mean + z)[p + s], scale=problem.scale,
         )[:, problem.columns]  # fmt: skip
         for k, (column, _) in enumerate(problem.biases):
-            out[:, column] += (belief.mean + z)[p + s + 1 + k]
+            out[:, column] += (prior.mean + z)[p + s + 1 + k]
         samples = ((measured - out) * np.sqrt(weight))[1:]
         return np.concatenate((samples[np.isfinite(samples)], root @ z))
 
-    sizes = np.sqrt(np.diag(belief.covariance))
-    best = least_squares(off, np.zeros(len(sizes)), x_scale=sizes, xtol=1e-14, ftol=1e-14)
-    mean = belief.mean + best.x
+    sizes = np.sqrt(np.diag(prior.covariance))
+    best = least_squares(residual, np.zeros(len(sizes)), x_scale=sizes, xtol=1e-14, ftol=1e-14)
+    mean = prior.mean + best.x
     stds = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)))[:p]
     np.testing.assert_allclose(found.mean[:p] / stds, mean[:p] / stds, atol=0.02, rtol=0)
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)[:p]), stds, rtol=1e-3)
 
 
-def test_strides_put_together_are_the_whole_run() -> None:
-    fit, told = fitted()
+def test_consecutive_strides_are_the_whole_run() -> None:
+    fit, estimates = fitted()
     trial, model = fit.problem.segments[0], fit.problem.model
-    state = fit.problem.start()[len(told.values) :][:4]
+    state = fit.problem.start()[len(estimates.values) :][:4]
     whole = model.simulate(fit.parameters, state, trial.path, len(trial))
     parts = [whole[:1]]
     for path, part in _strides(trial, 2.0):
@@ -66,50 +66,50 @@ def test_strides_put_together_are_the_whole_run() -> None:
 
 
 @pytest.mark.parametrize("runs", [1, 2])
-def test_from_priors_a_third_off_it_ends_where_output_error_is(runs: int) -> None:
-    fit, told = fitted(runs=runs)
-    found = parameter_ekf(fit, two_priors(told, fit.problem.bounds))
+def test_from_priors_30_percent_off_it_converges_to_output_error(runs: int) -> None:
+    fit, estimates = fitted(runs=runs)
+    found = parameter_ekf(fit, two_priors(estimates, fit.problem.bounds))
     for values, stds in zip(found.values, found.stds, strict=True):
-        np.testing.assert_array_less(np.abs(values[-1] - told.values), 1.0 * told.std)
-        np.testing.assert_allclose(stds[-1], told.bound, rtol=0.25)
+        np.testing.assert_array_less(np.abs(values[-1] - estimates.values), 1.0 * estimates.std)
+        np.testing.assert_allclose(stds[-1], estimates.bound, rtol=0.25)
     assert found.time_secs[-1] == pytest.approx(runs * 400.0, abs=0.3)
     assert (np.diff(found.time_secs) >= 0).all()
 
 
-def test_it_begins_at_its_priors() -> None:
-    fit, told = fitted()
-    found = parameter_ekf(fit, two_priors(told, fit.problem.bounds))
+def test_the_first_estimate_is_the_prior() -> None:
+    fit, estimates = fitted()
+    found = parameter_ekf(fit, two_priors(estimates, fit.problem.bounds))
     np.testing.assert_array_equal(found.values[:, 0], found.priors)
     np.testing.assert_allclose(found.prior_share[0], 1.0)
 
 
-def test_what_was_never_told_stays_what_it_was() -> None:
-    """b1 and e on a run that is over before the rudder moves."""
-    fit, told = fitted()
+def test_a_parameter_without_excitation_stays_at_its_prior() -> None:
+    """b1 and e on a run that ends before the rudder moves."""
+    fit, estimates = fitted()
     quiet = replace(fit.problem, segments=(fit.problem.segments[0].part(0, 90),), waves=())
     short = replace(
         fit, problem=quiet, residual_stds=tuple(
             type(s)(s.effective[:90], s.typical[:90]) for s in fit.residual_stds
         ),
     )  # fmt: skip
-    found = parameter_ekf(short, two_priors(told, fit.problem.bounds))
-    assert found.prior_share[-1, told.names.index("e")] > 0.99
-    assert found.mostly_prior[:, told.names.index("b1")].all()
+    found = parameter_ekf(short, two_priors(estimates, fit.problem.bounds))
+    assert found.prior_share[-1, estimates.names.index("e")] > 0.99
+    assert found.mostly_prior[:, estimates.names.index("b1")].all()
 
 
-def test_nothing_but_states_and_parameters_will_do() -> None:
+def test_it_works_without_rudder_offset_and_biases() -> None:
     fit = output_error([a_trial()], ship_model("burylin"), nuisance=Nuisance.none())
-    told = uncertainty(fit)
-    found = parameter_ekf(fit, two_priors(told, fit.problem.bounds))
-    d = told.names.index("d")
+    estimates = uncertainty(fit)
+    found = parameter_ekf(fit, two_priors(estimates, fit.problem.bounds))
+    d = estimates.names.index("d")
     np.testing.assert_allclose(found.values[:, -1, d], TRUE["d"], rtol=0.005)
 
 
-def test_a_ship_that_runs_away_leaves_no_number() -> None:
-    fit, told = fitted()
-    priors = two_priors(told, fit.problem.bounds)
-    priors[0, told.names.index("a")] = 50.0
+def test_a_diverging_simulation_gives_nan() -> None:
+    fit, estimates = fitted()
+    priors = two_priors(estimates, fit.problem.bounds)
+    priors[0, estimates.names.index("a")] = 50.0
     found = parameter_ekf(fit, priors)
-    a = told.names.index("a")
+    a = estimates.names.index("a")
     assert np.isnan(found.values[0, 5:, a]).all()
     assert np.isnan(found.prior_share[-1, a])

@@ -1,0 +1,76 @@
+"""Warnings about a fit: large residuals, contradicting runs, other minima, divergence."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from shiplog.ships.motion import MODEL_OUTPUTS
+
+from .output_error import OutputError
+from .prior_sensitivity import PriorSensitivity
+from .problem import residuals
+from .uncertainty import Uncertainty
+from .validation import Validation, nan_rms
+
+MAX_RESIDUAL_SHARE = 0.2  # rms of a run's residuals, white noise subtracted, over the measured std
+MAX_CONTRADICTION = 3.0  # difference between runs over what their noise explains
+
+
+def fit_warnings(
+    fit: OutputError,
+    fitted: Uncertainty,
+    sensitivity: PriorSensitivity,
+    validations: Sequence[Validation],
+) -> Iterator[str]:
+    """Yield a line for each reason not to trust a fit."""
+    if not fit.minimum.converged:
+        yield "the fit has not converged; its values are those of the last iteration"
+    if sensitivity.other_minimum:
+        better = "better" if sensitivity.worse_by < 0 else "worse"
+        yield (
+            f"from another start the fit ends in another minimum, which is {better}: the logs "
+            "hardly determine this model; add manoeuvres, or fit a model with fewer parameters"
+        )
+    yield from _large_residuals(fit)
+    yield from _contradiction(fit, fitted)
+    if set(fitted.unidentifiable) == set(fitted.names):
+        yield "no parameter is identifiable from these logs; add manoeuvres"
+    for validation in validations:
+        if validation.diverged:
+            yield f"{validation.segment.name}: the simulation diverges, so there is no prediction"
+
+
+def _large_residuals(fit: OutputError) -> Iterator[str]:
+    """Yield the runs that the fit does not explain, white noise excepted."""
+    problem = fit.problem
+    for segment, residual, stds in zip(
+        problem.segments, residuals(problem, fit.minimum.unknowns), fit.residual_stds, strict=True
+    ):
+        for c, output in enumerate(problem.outputs):
+            measured = segment.measured[:, MODEL_OUTPUTS.index(output)]
+            white = max(float(np.mean(stds.typical[:, c] ** 2)) - fit.noises[c].slow ** 2, 0.0)
+            rms = np.sqrt(max(nan_rms(residual[:, c]) ** 2 - white, 0.0))
+            size = float(np.nanstd(measured)) if np.isfinite(measured).any() else 0.0
+            if rms > MAX_RESIDUAL_SHARE * size and rms**2 > white:
+                yield (
+                    f"{segment.name}: the residual of the {output.replace('_', ' ')} is "
+                    f"{100 * rms / size:.0f} % of its standard deviation; check the sign of the "
+                    "rudder, the units, that it is the same ship, and the choice of model"
+                )
+
+
+def _contradiction(fit: OutputError, fitted: Uncertainty) -> Iterator[str]:
+    """Yield a line where the runs contradict each other."""
+    ratio = fitted.agreement.contradiction
+    if ratio <= MAX_CONTRADICTION:
+        return
+    if len(fit.problem.runs) == 1:
+        which = f"the halves of {fit.problem.segments[0].name} contradict each other"
+    else:
+        which = "the logs contradict each other"
+    if fitted.agreement.outlier:
+        which += f", most of all {fitted.agreement.outlier}"
+    yield (
+        f"{which}: they differ by {ratio:.0f} times what their noise explains; another ship, "
+        "loading or water depth, or a model that does not fit the ship; the intervals allow for it"
+    )
