@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.manoeuvres.indices import ManoeuvreIndex, first_execute, manoeuvre_indices
+from analysis.manoeuvres.execute import first_execute
+from analysis.manoeuvres.manoeuvre import ManoeuvreIndex
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
 from .output_error import OutputError
-from .prediction import dead_reckoning, predict
+from .prediction import dead_reckoning, predict, predicted_indices
 from .runs import Run
 from .segment import Segment
 
@@ -96,7 +97,7 @@ def _validate_segment(fit: OutputError, segment: Segment, fixes: FloatArray | No
         if segment.has(name) and name in predicted
     }
     rms["track"] = nan_rms(np.hypot(*(track - measured_track).T))
-    indices = tuple(manoeuvre_indices(segment, measured, measured_track, simulated, track))
+    indices = predicted_indices(segment, measured, measured_track, simulated, track)
     return Validation(segment, simulated, track, measured_track, rms, indices)
 
 

@@ -9,7 +9,7 @@ from analysis.identification.comparison.history import PRIOR_OFFSET
 from analysis.identification.identify import IdentifiedShip
 from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
 from analysis.identification.validation import Validation
-from analysis.manoeuvres.indices import ManoeuvreIndex
+from analysis.manoeuvres.manoeuvre import ManoeuvreIndex
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.text_table import TextTable
 from shiplog.units import CATALOGUE, conversion_factor

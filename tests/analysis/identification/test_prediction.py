@@ -1,4 +1,4 @@
-"""Predictions of runs never seen: on the tanker KVLCC2, and on circles that can be computed."""
+"""Predictions of runs that were not fitted: of the tanker KVLCC2 and of the paper's ship."""
 
 from functools import cache
 from pathlib import Path
@@ -12,13 +12,14 @@ from analysis.identification.model_selection import rank_models
 from analysis.identification.output_error import OutputError, output_error
 from analysis.identification.prediction import (
     dead_reckoning,
+    manoeuvre_motion,
     misfit,
     predict,
-    turn,
     zigzag_overshoots,
 )
 from analysis.identification.segment import Segment, split_into_segments
 from analysis.identification.uncertainty import uncertainty
+from analysis.manoeuvres.turning_circle import turning_circle
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, UsageError, load_vessel, resample
@@ -48,72 +49,76 @@ def hsva() -> list[Segment]:
     return [recorded(KVLCC2 / "hsva" / f"HSVA_CPMC_KVLCC2_Z_{run}.dat")[1] for run in runs]
 
 
-def off_the_circle(fit: OutputError) -> dict[str, float]:
-    """By how many per cent the 35 degree circle is predicted wrongly."""
+def circle_errors(fit: OutputError) -> dict[str, float]:
+    """Return the errors of the predicted 35° turning circle, %."""
     log, trial = marin("tc_35")
     position = log["position"]
     at = (position.measured_ns - trial.signals.start_ns) * 1e-9
     there = [np.interp(trial.signals.time_secs, at, column) for column in position.values.T]
     rudder = trial.signals["rudder"]
-    measured = turn(trial.measured, np.column_stack(there), rudder, trial.dt_secs)
+    motion = manoeuvre_motion(trial.measured, np.column_stack(there))
+    measured = turning_circle(motion, rudder, trial.dt_secs)
     assert measured.advance / LENGTH == pytest.approx(3.122, abs=0.005)
     assert measured.tactical_diameter / LENGTH == pytest.approx(3.067, abs=0.005)
     assert measured.time_90_secs == pytest.approx(169.3, abs=0.5)
     outputs = predict(fit, trial)
-    said = turn(outputs, dead_reckoning(outputs, trial.dt_secs), rudder, trial.dt_secs)
+    motion = manoeuvre_motion(outputs, dead_reckoning(outputs, trial.dt_secs))
+    predicted = turning_circle(motion, rudder, trial.dt_secs)
     return {
-        name: 100 * (getattr(said, name) / getattr(measured, name) - 1)
+        name: 100 * (getattr(predicted, name) / getattr(measured, name) - 1)
         for name in measured.__dataclass_fields__
     }
 
 
-def test_the_tankers_circle_is_predicted_from_marins_zigzags() -> None:
+def test_turning_circle_is_predicted_from_marin_zigzags() -> None:
     segments = [marin("zz_10")[1], marin("zz_20")[1]]
-    off = off_the_circle(output_error(segments, ship_model("three-dof"), length=LENGTH))
-    assert abs(off["advance"]) < 3
-    assert abs(off["transfer"]) < 10
-    assert abs(off["tactical_diameter"]) < 5
-    assert abs(off["time_90_secs"]) < 4
-    # the balance of thrust and drag in the circle is near-singular: not yet what was asked for
-    assert abs(off["steady_yaw_rate"]) < 16
-    assert abs(off["steady_speed"]) < 22
+    errors = circle_errors(output_error(segments, ship_model("three-dof"), length=LENGTH))
+    assert abs(errors["advance"]) < 3
+    assert abs(errors["transfer"]) < 10
+    assert abs(errors["tactical_diameter"]) < 5
+    assert abs(errors["time_90_secs"]) < 4
+    # the balance of thrust and drag in the circle is near-singular: the goal is not reached yet
+    assert abs(errors["steady_yaw_rate"]) < 16
+    assert abs(errors["steady_speed"]) < 22
 
 
-def test_the_tankers_circle_is_predicted_from_hsvas_zigzags_of_another_tank() -> None:
-    off = off_the_circle(output_error(hsva(), ship_model("three-dof"), length=LENGTH))
-    assert abs(off["advance"]) < 6
-    assert abs(off["transfer"]) < 10
-    assert abs(off["tactical_diameter"]) < 5
-    assert abs(off["time_90_secs"]) < 5
-    assert abs(off["steady_yaw_rate"]) < 10
-    assert abs(off["steady_speed"]) < 14
+def test_turning_circle_is_predicted_from_zigzags_of_another_tank() -> None:
+    errors = circle_errors(output_error(hsva(), ship_model("three-dof"), length=LENGTH))
+    assert abs(errors["advance"]) < 6
+    assert abs(errors["transfer"]) < 10
+    assert abs(errors["tactical_diameter"]) < 5
+    assert abs(errors["time_90_secs"]) < 5
+    assert abs(errors["steady_yaw_rate"]) < 10
+    assert abs(errors["steady_speed"]) < 14
 
 
-def test_zigzags_alone_choose_the_model_that_predicts_the_circle() -> None:
+def test_zigzags_select_the_model_that_predicts_the_circle() -> None:
     names = ("nomoto", "norrbin", "slipstream", "three-dof")
-    found = rank_models(
+    candidates = rank_models(
         [marin("zz_10")[1], marin("zz_20")[1]], [ship_model(name) for name in names], length=LENGTH
     )
-    assert found[0].model.name == "three-dof"
-    assert found[-1].model.name == "nomoto"
-    assert found[0].score < 0.15
+    assert candidates[0].model.name == "three-dof"
+    assert candidates[-1].model.name == "nomoto"
+    assert candidates[0].score < 0.15
 
 
-def test_real_residuals_make_white_noise_errors_several_times_too_small() -> None:
+def test_coloured_residuals_enlarge_the_white_noise_errors_of_real_runs() -> None:
     segments = [marin("zz_10")[1], marin("zz_20")[1]]
-    found = uncertainty(output_error(segments, ship_model("slipstream"), length=LENGTH))
-    told = [i for i, name in enumerate(found.names) if name not in found.unidentifiable]
-    assert len(told) >= 5
-    assert np.median(found.std[told] / found.bound[told]) > 3
+    estimates = uncertainty(output_error(segments, ship_model("slipstream"), length=LENGTH))
+    determined = [
+        i for i, name in enumerate(estimates.names) if name not in estimates.unidentifiable
+    ]
+    assert len(determined) >= 5
+    assert np.median(estimates.std[determined] / estimates.bound[determined]) > 3
 
 
-def test_a_fit_is_not_off_its_own_runs_by_much() -> None:
+def test_misfit_of_a_fitted_run_is_small() -> None:
     _, trial = marin("zz_20")
     fit = output_error([trial], ship_model("three-dof"), length=LENGTH)
     assert np.nanmax(misfit(fit, trial)) < 0.15
 
 
-def test_a_zigzag_of_the_papers_ship_overshoots_as_she_does() -> None:
+def test_simulated_zigzag_has_the_overshoots_of_an_independent_simulation() -> None:
     vessel, _ = load_vessel("table1")
     trial = simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=suite("none"))
     fit = output_error(
@@ -128,59 +133,17 @@ def test_a_zigzag_of_the_papers_ship_overshoots_as_she_does() -> None:
     np.testing.assert_allclose(np.degrees(overshoots)[:2], [16.355, 14.744], atol=0.01)
 
 
-def test_the_tankers_first_overshoots_are_predicted() -> None:
+def test_first_overshoots_of_the_tanker_are_predicted() -> None:
     segments = [marin("zz_10")[1], marin("zz_20")[1]]
     fit = output_error(segments, ship_model("three-dof"), length=LENGTH)
     for angle, measured in ((10, 9.39), (20, 15.59)):
-        said = zigzag_overshoots(
+        predicted = zigzag_overshoots(
             fit, np.radians(-angle), np.radians(angle), rudder_rate=np.radians(2.32),
             speed=7.97, rpm=91.7, duration_secs=600.0,
         )  # fmt: skip
-        assert np.degrees(said[0]) == pytest.approx(measured, abs=2.5)
+        assert np.degrees(predicted[0]) == pytest.approx(measured, abs=2.5)
 
 
-# ---- circles that can be computed
-
-
-def test_the_figures_of_a_true_circle_are_its_own() -> None:
-    dt, rate, radius, before = 0.1, 0.01, 500.0, 400.0
-    time = np.arange(0, 800, dt)
-    heading = 0.3 - rate * np.maximum(time - before / 5.0, 0)
-    speed = rate * radius
-    outputs = np.column_stack(
-        (np.where(heading < 0.3, -rate, 0), np.full(len(time), speed), 0 * time, heading)
-    )
-    rudder = np.where(time > 50, -0.6, 0.0)
-    found = turn(outputs, dead_reckoning(outputs, dt), rudder, dt)
-    assert found.advance == pytest.approx(before + radius, rel=1e-3)
-    assert found.transfer == pytest.approx(radius, rel=1e-3)
-    assert found.tactical_diameter == pytest.approx(2 * radius, rel=1e-3)
-    assert found.time_90_secs == pytest.approx(80 + np.pi / 2 / rate, abs=0.2)
-    assert found.time_180_secs == pytest.approx(80 + np.pi / rate, abs=0.2)
-    assert found.steady_yaw_rate == pytest.approx(rate)
-    assert found.steady_speed == pytest.approx(speed)
-
-
-def test_a_first_course_that_is_given_counts_for_the_first_samples_heading() -> None:
-    time = np.arange(0, 500, 1.0)
-    heading = 0.01 * time
-    outputs = np.column_stack((0 * time + 0.01, 5 + 0 * time, 0 * time, heading))
-    positions, rudder = dead_reckoning(outputs, 1.0), np.full(500, 0.6)
-    noisy = outputs.copy()
-    noisy[0, 3] += 0.05
-    exact = turn(outputs, positions, rudder, 1.0)
-    assert turn(noisy, positions, rudder, 1.0, course=0.0) == exact
-    assert turn(noisy, positions, rudder, 1.0).advance > exact.advance + 20
-
-
-def test_a_ship_that_does_not_come_round_has_no_diameter() -> None:
-    time = np.arange(0, 100, 1.0)
-    outputs = np.column_stack((0.02 + 0 * time, 5 + 0 * time, 0 * time, 0.02 * time))
-    found = turn(outputs, dead_reckoning(outputs, 1.0), np.full(100, 0.6), 1.0)
-    assert np.isfinite(found.advance)
-    assert np.isnan(found.tactical_diameter)
-
-
-def test_one_run_chooses_no_model() -> None:
+def test_model_selection_requires_two_runs() -> None:
     with pytest.raises(UsageError, match="two logs or more, or name the model"):
         rank_models([marin("zz_10")[1]], [ship_model("nomoto")])

@@ -12,7 +12,9 @@ from trial_logs import as_log
 from analysis.identification.output_error import OutputError, output_error
 from analysis.identification.runs import run_from_log
 from analysis.identification.validation import Validation, initial_heading, nan_rms, validate
-from analysis.manoeuvres.indices import ManoeuvreIndex, _switch, first_execute
+from analysis.manoeuvres.execute import first_execute
+from analysis.manoeuvres.manoeuvre import ManoeuvreIndex
+from analysis.manoeuvres.zigzag import switch_heading
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, load_vessel
@@ -278,9 +280,9 @@ def test_a_zigzag_has_equal_rudder_angles_on_both_sides() -> None:
 
 
 def test_reversals_at_several_headings_are_no_zigzag() -> None:
-    assert _switch(np.radians([10.4, -10.9, 10.1]), 0.0) == pytest.approx(radians(10))
-    assert _switch(np.radians([9.2, -10.4]), 0.0) == pytest.approx(radians(10))
-    assert _switch(np.radians([2.1, -1.8]), 0.0) == pytest.approx(radians(2))
-    assert _switch(np.radians([10.0, -18.0, 38.0]), 0.0) is None
-    assert _switch(np.radians([10.0, 10.0, 10.0]), 0.0) is None
-    assert _switch(np.radians([0.2, -0.3]), 0.0) is None
+    assert switch_heading(np.radians([10.4, -10.9, 10.1]), 0.0) == pytest.approx(radians(10))
+    assert switch_heading(np.radians([9.2, -10.4]), 0.0) == pytest.approx(radians(10))
+    assert switch_heading(np.radians([2.1, -1.8]), 0.0) == pytest.approx(radians(2))
+    assert switch_heading(np.radians([10.0, -18.0, 38.0]), 0.0) is None
+    assert switch_heading(np.radians([10.0, 10.0, 10.0]), 0.0) is None
+    assert switch_heading(np.radians([0.2, -0.3]), 0.0) is None
