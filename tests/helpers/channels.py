@@ -1,4 +1,4 @@
-"""Channels from values and times in seconds."""
+"""Channels made of values and times in seconds."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ Values = np.ndarray[tuple[int], np.dtype[np.float64]]
 def channel(
     values: Values, times: Values | None = None, name: str = "yaw_rate", lag: float = 0.0
 ) -> Channel:
-    """A channel of 10 Hz, or of the given times in seconds."""
+    """Return a channel of 10 Hz, or of the given times (n,), s, received `lag` s later."""
     at = 0.1 * np.arange(len(values)) if times is None else times
     stamps = START + np.round(at * 1e9).astype(np.int64)
     return Channel(name, "a", "1", stamps, stamps + int(lag * 1e9), values)

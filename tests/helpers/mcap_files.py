@@ -1,4 +1,4 @@
-"""MCAP files as others write them, as ours are damaged, and what mcap's own reader finds there."""
+"""MCAP files of other programs, damaged files, and their samples as the mcap library reads them."""
 
 import struct
 from collections import defaultdict
@@ -19,10 +19,12 @@ START = 1_700_000_000_000_000_000
 EXTREMES = [0.0, -0.0, 1.0, -1e308, 5e-324, float("inf"), float("-inf"), float("nan")]
 UNIT = {"yaw_rate": "rad/s", "speed": "m/s", "rudder": "rad", "position": "m"}
 
-Samples = dict[str, list[tuple[int, int, bytes]]]  # topic: received, measured, the values' bytes
+# by topic: times of reception and measurement, bytes of the values
+Samples = dict[str, list[tuple[int, int, bytes]]]
 
 
 def channel(name: str, count: int, seed: int = 0, source: str = "test") -> Channel:
+    """Return a channel of random times and values, with extreme values and NaN."""
     rng = np.random.default_rng(seed)
     measured = START + np.cumsum(rng.integers(1, 200_000_000, count))
     received = np.sort(measured + rng.integers(0, 50_000_000, count))
@@ -31,12 +33,14 @@ def channel(name: str, count: int, seed: int = 0, source: str = "test") -> Chann
 
 
 def position(count: int, fields: tuple[str, ...]) -> Channel:
+    """Return a position channel with random values, one sample a second."""
     at = START + np.arange(count) * 1_000_000_000
     values = np.random.default_rng(5).normal(size=(count, len(fields)))
     return Channel("position", "x".join(fields), "m", at, at + 7, values, fields)
 
 
 def samples(log: TrialLog) -> Samples:
+    """Return the samples of a log, comparable bit for bit."""
     return {
         c.topic: [
             (received, measured, value.tobytes())
@@ -49,7 +53,7 @@ def samples(log: TrialLog) -> Samples:
 
 
 def samples_by_mcap(path: Path, reader: Callable[..., McapReader] = make_reader) -> Samples:
-    """The samples by mcap's own reader and the file's own schemas: nothing of ours."""
+    """Read the samples with the mcap library and the file's schemas, without shiplog."""
     found: Samples = defaultdict(list)
     types: dict[int, Any] = {}
     with path.open("rb") as stream:
@@ -74,8 +78,8 @@ def samples_by_mcap(path: Path, reader: Callable[..., McapReader] = make_reader)
     return dict(found)
 
 
-def written(path: Path, *channels: Channel, **options: Any) -> Path:  # noqa: ANN401 - mcap's own
-    """The channels in a file as another program would lay it out."""
+def write_by_mcap(path: Path, *channels: Channel, **options: Any) -> Path:  # noqa: ANN401 - mcap's own
+    """Write channels with the mcap library, with its options for the layout of the file."""
     with path.open("wb") as stream:
         writer = Writer(stream, **options)
         writer.start()
@@ -96,10 +100,10 @@ def written(path: Path, *channels: Channel, **options: Any) -> Path:  # noqa: AN
     return path
 
 
-def foreign(
+def write_messages(
     path: Path, messages: list[bytes], *, unit: str | None = "rad/s", topic: str = "/yaw_rate/imu"
 ) -> Path:
-    """A file of another program whose scalar messages are these bytes, one a second."""
+    """Write scalar messages of the given bytes with the mcap library, one a second."""
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start()
@@ -115,11 +119,12 @@ def foreign(
 
 
 def scalar(value: float, tag: int = 0x09) -> bytes:
+    """Return a serialised scalar message."""
     return bytes([tag]) + struct.pack("<d", value)
 
 
-def top_level(data: bytes) -> list[tuple[int, int, int]]:
-    """Opcode, start and end of the file's records, their heads included."""
+def file_records(data: bytes) -> list[tuple[int, int, int]]:
+    """Return the opcode, the start and the end of each record of a file."""
     found, at = [], 8
     while at + 9 <= len(data) - 8:
         opcode, length = struct.unpack_from("<BQ", data, at)
@@ -128,46 +133,38 @@ def top_level(data: bytes) -> list[tuple[int, int, int]]:
     return found
 
 
-def mcap_chunks(data: bytes) -> list[tuple[int, int]]:
-    return [(start, end) for opcode, start, end in top_level(data) if opcode == Opcode.CHUNK]
+def mcap_chunk_ranges(data: bytes) -> list[tuple[int, int]]:
+    """Return the start and the end of each MCAP chunk of a file."""
+    return [(start, end) for opcode, start, end in file_records(data) if opcode == Opcode.CHUNK]
 
 
-def flushed(path: Path, chunks: int = 5, count: int = 100) -> tuple[TrialLog, bytes]:
-    """A log written in flushed chunks, so in many chunks, and the bytes of its finished file."""
+def write_flushed(path: Path, chunks: int = 5, count: int = 100) -> tuple[TrialLog, bytes]:
+    """Write a log in many MCAP chunks; return it and the bytes of its file."""
     whole = [channel("yaw_rate", chunks * count, 1), channel("speed", chunks * count, 2)]
     with LogWriter(path, metadata={"place": "Neva"}) as writer:
         for at in range(0, chunks * count, count):
-            part = slice(at, at + count)
-            for c in whole:
-                writer.write(
-                    Channel(
-                        c.name,
-                        c.source,
-                        c.unit,
-                        c.measured_ns[part],
-                        c.received_ns[part],
-                        c.values[part],
-                    )
-                )
+            writer.write(*(c.part(at, at + count) for c in whole))
             writer.flush()
     return TrialLog("trial.mcap", tuple(whole)), path.read_bytes()
 
 
-def is_part_of(log: TrialLog, held: TrialLog) -> bool:
-    """Whether a log holds nothing but samples of the other, each as often and in that order."""
-    told = samples(held)
-    for topic, found in samples(log).items():
-        rest = iter(told.get(topic, []))
-        if not all(sample in rest for sample in found):
+def is_subset_of(log: TrialLog, original: TrialLog) -> bool:
+    """Whether all samples of a log are in the original, as often and in the same order."""
+    originals = samples(original)
+    for topic, rows in samples(log).items():
+        rest = iter(originals.get(topic, []))
+        if not all(sample in rest for sample in rows):
             return False
     return True
 
 
-def within(fraction: float, low: int, high: int) -> int:
+def offset_between(fraction: float, low: int, high: int) -> int:
+    """Return the integer at a fraction, less than one, of the range."""
     return low + int(fraction * (high - low))
 
 
-def flipped(data: bytes, bit: int) -> bytes:
+def flip_bit(data: bytes, bit: int) -> bytes:
+    """Return the data with one bit inverted."""
     changed = bytearray(data)
     changed[bit // 8] ^= 1 << bit % 8
     return bytes(changed)

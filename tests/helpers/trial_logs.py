@@ -10,11 +10,12 @@ from shiplog import Channel, TrialLog
 
 
 def as_log(trial: SimulatedTrial, name: str = "trial.mcap") -> TrialLog:
+    """Return a simulated trial as a log in memory."""
     return TrialLog(name, trial.channels, trial.metadata, trial.vessel_toml)
 
 
 class InChunks:
-    """A log cut at given times of reception, seconds after its start."""
+    """A log whose chunks are cut at given times of reception, s after its start."""
 
     def __init__(self, log: TrialLog, cuts: list[float]) -> None:
         self.log, self.cuts = log, cuts

@@ -15,11 +15,11 @@ print(rudder_effect(c, 0.0, 2.0), is_compiled("shiplog"), is_compiled("analysis"
 """
 
 
-def said(kept: Path, where: Path) -> list[str]:
+def printed_by_run(cache: Path, cwd: Path) -> list[str]:
     done = subprocess.run(
         [sys.executable, "-c", CODE],
-        env=os.environ | {"NUMBA_CACHE_DIR": str(kept)},
-        cwd=where,
+        env=os.environ | {"NUMBA_CACHE_DIR": str(cache)},
+        cwd=cwd,
         capture_output=True,
         text=True,
         check=True,
@@ -27,32 +27,32 @@ def said(kept: Path, where: Path) -> list[str]:
     return done.stdout.split()
 
 
-def test_machine_code_is_kept_for_later_runs_and_a_first_run_is_known(tmp_path: Path) -> None:
-    first, second = said(tmp_path, tmp_path), said(tmp_path, tmp_path)
+def test_machine_code_is_cached_for_later_runs_and_a_first_run_is_detected(tmp_path: Path) -> None:
+    first, second = printed_by_run(tmp_path, tmp_path), printed_by_run(tmp_path, tmp_path)
     assert first == ["False", "False", "2.0", "True", "False"]
     assert second == ["True", "False", "2.0", "True", "False"]
 
 
-def test_machine_code_of_other_sources_is_not_taken(tmp_path: Path) -> None:
-    """What a loop calls may stand in another file, which numba does not look at."""
+def test_machine_code_of_other_sources_is_not_used(tmp_path: Path) -> None:
+    """A loop may call functions of another file, which numba does not check."""
     home = Path(shiplog.__file__).parents[1]
     for package in ("shiplog", "analysis", "recorders"):
         shutil.copytree(
             home / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
         )
-    kept = tmp_path / "kept"
-    assert said(kept, tmp_path)[0] == "False"
-    assert said(kept, tmp_path)[0] == "True"
+    cache = tmp_path / "kept"
+    assert printed_by_run(cache, tmp_path)[0] == "False"
+    assert printed_by_run(cache, tmp_path)[0] == "True"
     other = tmp_path / "analysis" / "signals" / "signal_stats.py"  # compiles nothing
     other.write_text(other.read_text(encoding="utf-8") + "\n", encoding="utf-8")
-    assert said(kept, tmp_path)[0] == "False"
+    assert printed_by_run(cache, tmp_path)[0] == "False"
 
 
-def test_outdated_machine_code_is_deleted_and_recent_is_left(tmp_path: Path) -> None:
+def test_outdated_machine_code_is_deleted_and_recent_is_kept(tmp_path: Path) -> None:
     old, recent = tmp_path / "shiplog-0123", tmp_path / "shiplog-4567"
     for folder in (old, recent):
         folder.mkdir()
     os.utime(old, (0, 0))
-    said(tmp_path, tmp_path)
+    printed_by_run(tmp_path, tmp_path)
     assert not old.exists()
     assert recent.exists()

@@ -18,7 +18,7 @@ def test_the_final_name_appears_only_when_the_block_succeeds(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-def test_after_any_error_what_stood_there_stands_there_still(
+def test_after_any_error_the_existing_file_is_unchanged(
     tmp_path: Path, error: type[BaseException]
 ) -> None:
     final = tmp_path / "out.txt"
@@ -46,7 +46,7 @@ def test_a_full_disk_is_an_error_that_names_the_file(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_is_refused_before_the_work_is_done(tmp_path: Path) -> None:
+def test_a_folder_is_rejected_before_the_block_runs(tmp_path: Path) -> None:
     for folder in (tmp_path, f"{tmp_path}{os.sep}", "", "."):
         with pytest.raises(ShiplogError, match="it is a folder"), atomic_write(folder):
             pytest.fail("the block must not run")
@@ -60,7 +60,7 @@ def test_a_missing_folder_is_named(tmp_path: Path) -> None:
         pytest.fail("the block must not run")
 
 
-def test_a_file_in_the_folders_place_is_an_error(tmp_path: Path) -> None:
+def test_a_file_in_place_of_the_folder_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(ShiplogError, match="cannot write"), atomic_write(tmp_path / "file" / "x"):
         pytest.fail("the block must not run")
@@ -69,7 +69,7 @@ def test_a_file_in_the_folders_place_is_an_error(tmp_path: Path) -> None:
 @pytest.mark.skipif(
     not hasattr(os, "geteuid") or os.geteuid() == 0, reason="the superuser may write anywhere"
 )
-def test_a_folder_one_may_not_write_to_is_an_error(tmp_path: Path) -> None:
+def test_a_folder_without_write_permission_is_an_error(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     try:
         with pytest.raises(ShiplogError, match="permission denied"), atomic_write(tmp_path / "x"):

@@ -1,7 +1,8 @@
-"""Chunks laid out by columns hold what mcap's own writer puts there."""
+"""MCAP chunks encoded by columns have the messages that the mcap library writes."""
 
 import io
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from shiplog.units import GEOGRAPHIC
 
 
 def trial(rng: np.random.Generator, count: int) -> TrialLog:
-    """Channels of three message sizes, one of them ragged, received in a jumble."""
+    """Channels of three message sizes, one of them variable, received out of order."""
 
     def times() -> np.ndarray:
         return np.sort(rng.integers(0, 10**12, count))
@@ -39,10 +40,10 @@ def trial(rng: np.random.Generator, count: int) -> TrialLog:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_every_message_is_the_one_mcaps_own_writer_would_write(seed: int) -> None:
+def test_messages_are_those_that_the_mcap_library_writes(seed: int) -> None:
     log = trial(np.random.default_rng(seed), 400)
-    ours, theirs = io.BytesIO(), io.BytesIO()
-    writer = Writer(theirs)
+    ours, by_mcap = io.BytesIO(), io.BytesIO()
+    writer = Writer(by_mcap)
     writer.start()
     messages = []
     for number, c in enumerate(log, start=1):
@@ -57,18 +58,18 @@ def test_every_message_is_the_one_mcaps_own_writer_would_write(seed: int) -> Non
     parts = [SampleBatch(number, 0, c) for number, c in enumerate(log, start=1)]
     for chunk in encode_mcap_chunks(parts, 8192):
         ours.write(chunk.data.tobytes())
-    theirs.seek(0)
+    by_mcap.seek(0)
     expected = b"".join(
         struct.pack("<BQHIQQ", 5, 22 + len(m.data), m.channel_id, m.sequence, m.log_time,
                     m.publish_time) + m.data
-        for _, _, m in make_reader(theirs).iter_messages()
+        for _, _, m in make_reader(by_mcap).iter_messages()
     )  # fmt: skip
     assert sorted(_split(ours.getvalue())) == sorted(_split(expected))
     received = [struct.unpack_from("<Q", r, 15)[0] for r in _split(ours.getvalue())]
     assert received == sorted(received)
 
 
-def test_laid_out_little_by_little_it_is_the_same_as_all_at_once(
+def test_encoding_in_portions_gives_the_same_messages_as_all_at_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     rng = np.random.default_rng(4)
@@ -89,8 +90,8 @@ def test_laid_out_little_by_little_it_is_the_same_as_all_at_once(
         data = chunk.data.tobytes()
         for channel_id, entries in chunk.index.items():
             for got, offset in entries.tolist():
-                said = struct.unpack_from("<BQHIQ", data, offset)
-                assert (said[0], said[2], said[4]) == (5, channel_id, got)
+                head = struct.unpack_from("<BQHIQ", data, offset)
+                assert (head[0], head[2], head[4]) == (5, channel_id, got)
 
 
 def _split(data: bytes) -> list[bytes]:
@@ -103,7 +104,7 @@ def _split(data: bytes) -> list[bytes]:
 
 
 @pytest.mark.parametrize("largest", [100, 1000, 1 << 20])
-def test_the_index_says_where_each_message_stands(largest: int) -> None:
+def test_the_index_has_the_offset_of_each_message(largest: int) -> None:
     log = trial(np.random.default_rng(9), 150)
     parts = [SampleBatch(number, 0, c) for number, c in enumerate(log, start=1)]
     seen = 0
@@ -119,7 +120,9 @@ def test_the_index_says_where_each_message_stands(largest: int) -> None:
     assert seen == 600
 
 
-def test_small_chunks_are_gathered_into_large_chunks(tmp_path: pytest.TempPathFactory) -> None:
+def test_small_writes_are_collected_into_large_mcap_chunks(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "a.mcap"
     with LogWriter(path) as writer:
         for k in range(3000):

@@ -17,18 +17,18 @@ from mcap_files import (
     START,
     UNIT,
     channel,
-    flipped,
-    flushed,
-    foreign,
-    is_part_of,
-    mcap_chunks,
+    file_records,
+    flip_bit,
+    is_subset_of,
+    mcap_chunk_ranges,
+    offset_between,
     position,
     samples,
     samples_by_mcap,
     scalar,
-    top_level,
-    within,
-    written,
+    write_by_mcap,
+    write_flushed,
+    write_messages,
 )
 from places import RECORDINGS
 
@@ -47,20 +47,20 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "trial.mcap"
 
 
-# -- against a decoder that knows nothing of shiplog
+# -- compared with the mcap library
 
 
-def test_we_read_what_mcap_reads_bit_for_bit(path: Path) -> None:
-    held = (
+def test_the_samples_are_those_that_the_mcap_library_reads_bit_for_bit(path: Path) -> None:
+    original = (
         channel("yaw_rate", 30_000, 1),
         channel("yaw_rate", 3000, 2, "imu"),
         channel("torque", 500, 3),
         position(100, ("north", "east")),
         position(50, GEOGRAPHIC),
     )
-    write(TrialLog("t", held), path)
-    assert len(mcap_chunks(path.read_bytes())) > 1
-    assert samples(read(path)) == samples_by_mcap(path) == samples(TrialLog("t", held))
+    write(TrialLog("t", original), path)
+    assert len(mcap_chunk_ranges(path.read_bytes())) > 1
+    assert samples(read(path)) == samples_by_mcap(path) == samples(TrialLog("t", original))
 
 
 @pytest.mark.parametrize(
@@ -78,33 +78,33 @@ def test_we_read_what_mcap_reads_bit_for_bit(path: Path) -> None:
     ],
     ids=str,
 )
-def test_we_read_what_mcap_reads_however_the_file_is_laid_out(
+def test_the_samples_are_those_of_the_mcap_library_in_every_file_layout(
     path: Path, options: dict[str, Any]
 ) -> None:
-    held = channel("yaw_rate", 3000, 1), channel("speed", 700, 2), position(30, GEOGRAPHIC)
-    written(path, *held, **{"chunk_size": 1 << 14, **options})
+    original = channel("yaw_rate", 3000, 1), channel("speed", 700, 2), position(30, GEOGRAPHIC)
+    write_by_mcap(path, *original, **{"chunk_size": 1 << 14, **options})
     log = read(path)
     by_mcap = samples_by_mcap(path, NonSeekingReader)
-    assert samples(log) == by_mcap == samples(TrialLog("t", held))
+    assert samples(log) == by_mcap == samples(TrialLog("t", original))
     assert log.warnings == ()
     assert not log.data_lost
 
 
 @given(st.lists(st.tuples(st.integers(0, 2), st.floats()), max_size=60), st.integers(1, 500))
 @settings(derandomize=True, deadline=None, max_examples=60)
-def test_we_read_what_mcap_reads_in_whatever_chunks(
-    tmp_path_factory: pytest.TempPathFactory, told: list[tuple[int, float]], chunk_size: int
+def test_the_samples_are_those_of_the_mcap_library_in_mcap_chunks_of_any_size(
+    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[int, float]], chunk_size: int
 ) -> None:
-    held = []
+    original = []
     for source in range(3):
-        at = np.array([k for k, (of, _) in enumerate(told) if of == source], np.int64)
-        values = np.array([value for of, value in told if of == source])
-        held.append(Channel("yaw_rate", str(source), "rad/s", at, at, values))
-    path = written(tmp_path_factory.mktemp("any") / "t", *held, chunk_size=chunk_size)
+        at = np.array([k for k, (of, _) in enumerate(rows) if of == source], np.int64)
+        values = np.array([value for of, value in rows if of == source])
+        original.append(Channel("yaw_rate", str(source), "rad/s", at, at, values))
+    path = write_by_mcap(tmp_path_factory.mktemp("any") / "t", *original, chunk_size=chunk_size)
     assert {t: s for t, s in samples(read(path)).items() if s} == samples_by_mcap(path)
 
 
-def test_samples_are_in_the_order_in_which_they_were_received(path: Path) -> None:
+def test_samples_are_in_the_order_of_reception(path: Path) -> None:
     received = START + np.array([5, 1, 3, 3, 2])
     with path.open("wb") as stream:
         writer = Writer(stream)
@@ -147,32 +147,32 @@ def parts_by_mcap(
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_a_part_is_what_mcaps_reader_gives_of_these_topics_and_times(path: Path, seed: int) -> None:
+def test_a_part_is_what_the_mcap_library_reads_of_it(path: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    held = channel("yaw_rate", 2000, 1), channel("speed", 700, 2), channel("torque", 90, 3)
-    written(path, *held, chunk_size=int(rng.integers(100, 20_000)))
-    topics = rng.choice([c.topic for c in held], rng.integers(1, 4), replace=False).tolist()
-    instants = np.concatenate([c.received_ns for c in held])
+    original = channel("yaw_rate", 2000, 1), channel("speed", 700, 2), channel("torque", 90, 3)
+    write_by_mcap(path, *original, chunk_size=int(rng.integers(100, 20_000)))
+    topics = rng.choice([c.topic for c in original], rng.integers(1, 4), replace=False).tolist()
+    instants = np.concatenate([c.received_ns for c in original])
     start, end = np.sort(rng.choice(instants, 2)).tolist()
     for of, to in ((None, None), (start, None), (None, end), (start, end), (start, start)):
         log = read(path, channels=topics, start_ns=of, end_ns=to)
         assert {c.topic for c in log} == set(topics)
-        ours = {topic: told for topic, told in samples(log).items() if told}
+        ours = {topic: rows for topic, rows in samples(log).items() if rows}
         assert ours == parts_by_mcap(path, topics, of, to)
 
 
 @pytest.mark.parametrize("options", LAYOUTS, ids=str)
 @pytest.mark.parametrize("unfinished", [False, True])
-def test_a_part_is_what_is_cut_from_the_whole(
+def test_a_part_is_the_same_part_of_the_whole_log(
     path: Path, options: dict[str, Any], *, unfinished: bool
 ) -> None:
-    held = (
+    original = (
         channel("speed", 700, 2),
         channel("yaw_rate", 2000, 1),
         channel("yaw_rate", 500, 4, "imu"),
         position(30, GEOGRAPHIC),
     )
-    written(path, *held, **{"chunk_size": 1 << 12, **options})
+    write_by_mcap(path, *original, **{"chunk_size": 1 << 12, **options})
     if unfinished:
         path.write_bytes(path.read_bytes()[:-10])
     log = read(path)
@@ -193,7 +193,7 @@ def test_a_part_is_what_is_cut_from_the_whole(
         assert part.warnings == log.warnings
 
 
-def test_only_the_chunks_of_the_part_are_decompressed(
+def test_only_the_mcap_chunks_of_the_part_are_decompressed(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     names = ("yaw_rate", "speed") * 5
@@ -219,14 +219,14 @@ def test_only_the_chunks_of_the_part_are_decompressed(
     assert len(inflated) == 2
 
 
-def test_the_index_of_a_chunk_that_is_passed_over_is_not_taken_for_that_of_another(
+def test_the_index_of_a_skipped_mcap_chunk_is_not_used_for_another(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with LogWriter(path) as writer:
         for number in range(6):
             at = START + 1000 * number + np.arange(100)
             here = [Channel("speed", "test", "m/s", at, at, np.ones(100))]
-            if number % 2 == 0:  # two sizes of messages: only the index does without a walk
+            if number % 2 == 0:  # two sizes of messages: located by the index
                 values = np.ones((100, 2))
                 here.append(Channel("position", "x", "m", at, at, values, ("north", "east")))
             writer.write(*here)
@@ -235,7 +235,7 @@ def test_the_index_of_a_chunk_that_is_passed_over_is_not_taken_for_that_of_anoth
     assert len(read(path, channels=["position"])["position"]) == 300
 
 
-def test_damage_is_noticed_in_the_chunks_of_the_part_and_in_no_other(path: Path) -> None:
+def test_damage_is_reported_in_the_mcap_chunks_of_the_part_only(path: Path) -> None:
     names = ("yaw_rate", "speed") * 3
     with LogWriter(path) as writer:
         for number, name in enumerate(names):
@@ -243,8 +243,8 @@ def test_damage_is_noticed_in_the_chunks_of_the_part_and_in_no_other(path: Path)
             writer.write(Channel(name, "test", UNIT[name], at, at, np.ones(100)))
             writer.flush()
     data = path.read_bytes()
-    start, end = mcap_chunks(data)[2]
-    path.write_bytes(flipped(data, 4 * (start + end)))
+    start, end = mcap_chunk_ranges(data)[2]
+    path.write_bytes(flip_bit(data, 4 * (start + end)))
     assert read(path, channels=["speed"]).warnings == ()
     assert len(read(path, channels=["speed"])["speed"]) == 300
     part = read(path, channels=["yaw_rate"])
@@ -254,14 +254,14 @@ def test_damage_is_noticed_in_the_chunks_of_the_part_and_in_no_other(path: Path)
 
 
 @pytest.mark.parametrize("cut", [0, 10])
-def test_a_part_with_a_channel_that_is_not_there_is_refused(path: Path, cut: int) -> None:
-    written(path, channel("speed", 100))
+def test_a_part_with_a_missing_channel_is_rejected(path: Path, cut: int) -> None:
+    write_by_mcap(path, channel("speed", 100))
     path.write_bytes(path.read_bytes()[: path.stat().st_size - cut])
     with pytest.raises(LogError, match=r"no channel 'yaw_rate' in trial\.mcap; it has speed"):
         read(path, channels=["speed", "yaw_rate"])
 
 
-# -- the files of others
+# -- files of other programs
 
 conformance = pytest.mark.skipif(
     not CONFORMANCE.is_dir(), reason="the MCAP conformance files are not here"
@@ -299,24 +299,24 @@ def test_a_conformance_file_cut_anywhere_is_read_as_unfinished(tmp_path: Path, s
 
 
 @conformance
-def test_a_conformance_file_with_any_byte_changed_is_read_or_refused(tmp_path: Path) -> None:
+def test_a_conformance_file_with_any_byte_changed_is_read_or_rejected(tmp_path: Path) -> None:
     changed = tmp_path / "changed.mcap"
     for file in conforming()[::20]:
         for at in range(8, file.stat().st_size, 3):
             data = bytearray(file.read_bytes())
             data[at] ^= 0xFF
             changed.write_bytes(data)
-            _read_or_refused(changed)
+            _read_or_rejected(changed)
 
 
-def _read_or_refused(path: Path) -> TrialLog | None:
+def _read_or_rejected(path: Path) -> TrialLog | None:
     try:
         return read(path)
     except LogError:
         return None
 
 
-def test_foreign_topics_are_passed_over_with_a_warning(path: Path) -> None:
+def test_topics_of_other_programs_are_ignored_with_a_warning(path: Path) -> None:
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start()
@@ -336,21 +336,23 @@ def test_foreign_topics_are_passed_over_with_a_warning(path: Path) -> None:
 
 
 def test_a_channel_in_another_unit_is_converted(path: Path) -> None:
-    foreign(path, [scalar(180.0), scalar(-90.0)], unit="deg/s")
+    write_messages(path, [scalar(180.0), scalar(-90.0)], unit="deg/s")
     yaw_rate = read(path)["yaw_rate"]
     assert yaw_rate.unit == "rad/s"
     np.testing.assert_allclose(yaw_rate.values, [np.pi, -np.pi / 2], rtol=1e-15)
 
 
 def test_a_channel_that_is_not_in_the_catalogue_keeps_its_unit(path: Path) -> None:
-    foreign(path, [scalar(3.0)], unit="kN·m", topic="/torque/shaft")
+    write_messages(path, [scalar(3.0)], unit="kN·m", topic="/torque/shaft")
     torque = read(path)["torque"]
     assert (torque.unit, torque.source, torque.values[0]) == ("kN·m", "shaft", 3.0)
 
 
 @pytest.mark.parametrize("unit", ["deg/sec", "m", None])
-def test_a_unit_nobody_can_convert_is_an_error_that_names_all(path: Path, unit: str | None) -> None:
-    foreign(path, [scalar(1.0)], unit=unit)
+def test_an_unknown_unit_is_an_error_that_names_channel_and_file(
+    path: Path, unit: str | None
+) -> None:
+    write_messages(path, [scalar(1.0)], unit=unit)
     with pytest.raises(LogError) as caught:
         read(path)
     message = str(caught.value)
@@ -360,23 +362,23 @@ def test_a_unit_nobody_can_convert_is_an_error_that_names_all(path: Path, unit: 
     assert unit != "deg/sec" or "did you mean 'deg/s'?" in message
 
 
-def test_a_message_without_its_value_is_not_measured(path: Path) -> None:
-    foreign(path, [scalar(1.0), b"", scalar(2.0)])
+def test_a_message_without_its_value_is_nan(path: Path) -> None:
+    write_messages(path, [scalar(1.0), b"", scalar(2.0)])
     np.testing.assert_array_equal(read(path)["yaw_rate"].values, [1.0, np.nan, 2.0])
 
 
-def test_a_message_of_the_usual_length_with_another_field_is_not_taken_for_it(path: Path) -> None:
-    foreign(path, [scalar(1.0), scalar(9.0, tag=0x11)])
+def test_a_message_of_the_same_length_with_another_field_is_nan(path: Path) -> None:
+    write_messages(path, [scalar(1.0), scalar(9.0, tag=0x11)])
     np.testing.assert_array_equal(read(path)["yaw_rate"].values, [1.0, np.nan])
 
 
-def test_a_message_that_is_none_is_an_error(path: Path) -> None:
-    foreign(path, [scalar(1.0), b"\x09\x00"])
+def test_a_malformed_message_is_an_error(path: Path) -> None:
+    write_messages(path, [scalar(1.0), b"\x09\x00"])
     with pytest.raises(LogError, match=r"'yaw_rate' has messages that are not shiplog\.Scalar"):
         read(path)
 
 
-def test_a_file_from_the_future_asks_for_a_newer_shiplog(path: Path) -> None:
+def test_a_file_of_a_later_format_asks_for_a_newer_shiplog(path: Path) -> None:
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start()
@@ -399,31 +401,31 @@ def test_times_beyond_the_signed_range_do_not_crash(path: Path) -> None:
     assert [len(c) for c in read(path)] == [1, 1]
 
 
-# -- what is no log
+# -- files that are not logs
 
 
 @pytest.mark.parametrize(
-    ("contents", "says"),
+    ("contents", "error"),
     [
         (b"", "the file is empty"),
         (b"\x89MCA", "not an MCAP file"),
         (b"time,yaw_rate\n0,1\n", "not an MCAP file; `shiplog convert` reads tables"),
     ],
 )
-def test_what_is_no_mcap_is_refused_by_name(path: Path, contents: bytes, says: str) -> None:
+def test_a_file_that_is_not_mcap_is_rejected(path: Path, contents: bytes, error: str) -> None:
     path.write_bytes(contents)
-    with pytest.raises(LogError, match=rf"{says}.*trial\.mcap"):
+    with pytest.raises(LogError, match=rf"{error}.*trial\.mcap"):
         read(path)
 
 
-def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder_are_rejected_by_name(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"no such file: .*nowhere"):
         read(tmp_path / "nowhere")
     with pytest.raises(LogError, match="a folder, not a log"):
         read(tmp_path)
 
 
-def test_the_magic_alone_is_an_unfinished_log_of_nothing(path: Path) -> None:
+def test_the_magic_bytes_alone_are_an_unfinished_empty_log(path: Path) -> None:
     path.write_bytes(b"\x89MCAP0\r\n")
     log = read(path)
     assert log.channels == ()
@@ -435,11 +437,11 @@ def test_the_magic_alone_is_an_unfinished_log_of_nothing(path: Path) -> None:
 
 
 def test_an_unfinished_flushed_file_is_read_whole(path: Path) -> None:
-    held, data = flushed(path)
-    (end,) = (start for opcode, start, _ in top_level(data) if opcode == Opcode.DATA_END)
+    original, data = write_flushed(path)
+    (end,) = (start for opcode, start, _ in file_records(data) if opcode == Opcode.DATA_END)
     path.write_bytes(data[:end])
     log = read(path)
-    assert samples(log) == samples(held)
+    assert samples(log) == samples(original)
     assert log.metadata["place"] == "Neva"
     assert len(log.warnings) == 1
     assert "was not finished" in log.warnings[0]
@@ -447,10 +449,10 @@ def test_an_unfinished_flushed_file_is_read_whole(path: Path) -> None:
     assert not log.data_lost
 
 
-def kept_at_least(data: bytes, cut: int, compression: str) -> int:
-    """How many whole messages a plain decompressor finds before the cut."""
+def complete_messages(data: bytes, cut: int, compression: str) -> int:
+    """Count the complete messages that a plain decompressor finds before the cut."""
     whole = 0
-    for start, end in mcap_chunks(data):
+    for start, end in mcap_chunk_ranges(data):
         body = start + 9 + 32 + len(compression) + 8
         content = data[body : min(end, cut)] if cut > body else b""
         if compression == "zstd":
@@ -464,43 +466,45 @@ def kept_at_least(data: bytes, cut: int, compression: str) -> int:
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.NONE])
-def test_a_cut_anywhere_keeps_every_whole_message_before_it(
+def test_a_file_cut_anywhere_keeps_every_complete_message_before_the_cut(
     path: Path, compression: CompressionType
 ) -> None:
-    # values of every length of zeros would blur where an uncompressed file really ends
+    # random values: trailing zeros would hide where an uncompressed file ends
     values = np.random.default_rng(0).normal(size=12_000)
     at = START + np.arange(12_000)
-    held = Channel("yaw_rate", "gyro", "rad/s", at, at, values)
-    data = written(path, held, compression=compression, chunk_size=1 << 18).read_bytes()
-    assert len(mcap_chunks(data)) >= 2
+    original = Channel("yaw_rate", "gyro", "rad/s", at, at, values)
+    data = write_by_mcap(path, original, compression=compression, chunk_size=1 << 18).read_bytes()
+    assert len(mcap_chunk_ranges(data)) >= 2
     name = "zstd" if compression == CompressionType.ZSTD else ""
-    edges = [edge + d for pair in mcap_chunks(data) for edge in pair for d in (-1, 0, 1, 9, 41, 60)]
+    edges = [
+        edge + d for pair in mcap_chunk_ranges(data) for edge in pair for d in (-1, 0, 1, 9, 41, 60)
+    ]
     cuts = [*edges, *np.random.default_rng(1).integers(8, len(data), 60).tolist()]
     for cut in sorted({c for c in cuts if 8 <= c < len(data)}):
         path.write_bytes(data[:cut])
         log = read(path)
         yaw_rate = log.get("yaw_rate")
         count = 0 if yaw_rate is None else len(yaw_rate)
-        assert count == kept_at_least(data, cut, name), cut
+        assert count == complete_messages(data, cut, name), cut
         if yaw_rate is not None:
             np.testing.assert_array_equal(yaw_rate.values, values[:count])
             np.testing.assert_array_equal(yaw_rate.measured_ns, at[:count])
         assert any("was not finished" in warning for warning in log.warnings)
-        assert log.data_lost == (cut not in {end for _, _, end in top_level(data)})
+        assert log.data_lost == (cut not in {end for _, _, end in file_records(data)})
 
 
 @given(ANYWHERE, st.sampled_from([0, 1, 4096]))
 @settings(derandomize=True, deadline=None, max_examples=150)
-def test_zeros_from_any_point_on_lose_what_follows_and_invent_nothing(
+def test_zeros_from_any_point_on_lose_only_what_follows_and_add_no_samples(
     damaged: tuple[TrialLog, bytes, Path], where: float, zeros: int
 ) -> None:
-    held, whole, path = damaged
-    cut = within(where, 8, len(whole))
+    original, whole, path = damaged
+    cut = offset_between(where, 8, len(whole))
     path.write_bytes(whole[:cut] + bytes(zeros or len(whole) - cut))
     log = read(path)
-    assert is_part_of(log, held)
+    assert is_subset_of(log, original)
     assert log.warnings
-    kept = sum(cut >= end for _, end in mcap_chunks(whole))
+    kept = sum(cut >= end for _, end in mcap_chunk_ranges(whole))
     assert all(len(c) >= 100 * kept for c in log)
     assert not kept or len(log.channels) == 2
 
@@ -508,55 +512,55 @@ def test_zeros_from_any_point_on_lose_what_follows_and_invent_nothing(
 @pytest.fixture(scope="module")
 def damaged(tmp_path_factory: pytest.TempPathFactory) -> tuple[TrialLog, bytes, Path]:
     path = tmp_path_factory.mktemp("damaged") / "trial.mcap"
-    return *flushed(path), path
+    return *write_flushed(path), path
 
 
 @given(ANYWHERE, ANYWHERE, st.booleans())
 @settings(derandomize=True, deadline=None, max_examples=250)
-def test_a_bit_flipped_anywhere_before_the_end_of_the_data_is_noticed_and_invents_nothing(
+def test_a_bit_flipped_anywhere_in_the_data_is_reported_and_adds_no_samples(
     damaged: tuple[TrialLog, bytes, Path],
     record: float,
     where: float,
     in_its_head: bool,
 ) -> None:
-    held, whole, path = damaged
-    opcodes = [opcode for opcode, _, _ in top_level(whole)]
-    _, start, end = top_level(whole)[within(record, 0, opcodes.index(Opcode.DATA_END))]
-    if in_its_head:  # where the least is protected
+    original, whole, path = damaged
+    opcodes = [opcode for opcode, _, _ in file_records(whole)]
+    _, start, end = file_records(whole)[offset_between(record, 0, opcodes.index(Opcode.DATA_END))]
+    if in_its_head:  # which no checksum of an MCAP chunk protects
         end = min(end, start + 60)
-    path.write_bytes(flipped(whole, within(where, 8 * start, 8 * end)))
-    log = _read_or_refused(path)
+    path.write_bytes(flip_bit(whole, offset_between(where, 8 * start, 8 * end)))
+    log = _read_or_rejected(path)
     if log is not None:
-        assert is_part_of(log, held)
+        assert is_subset_of(log, original)
         assert log.warnings
         assert log.data_lost
 
 
-def test_a_bit_flipped_in_a_message_costs_its_chunk_and_no_other(path: Path) -> None:
-    held, data = flushed(path)
-    start, end = mcap_chunks(data)[2]
-    path.write_bytes(flipped(data, 8 * (start + end) // 2))
+def test_a_bit_flipped_in_a_message_loses_its_mcap_chunk_only(path: Path) -> None:
+    original, data = write_flushed(path)
+    start, end = mcap_chunk_ranges(data)[2]
+    path.write_bytes(flip_bit(data, 8 * (start + end) // 2))
     log = read(path)
-    assert samples(log) == {t: told[:200] + told[300:] for t, told in samples(held).items()}
+    assert samples(log) == {t: rows[:200] + rows[300:] for t, rows in samples(original).items()}
     (warning,) = log.warnings
     assert warning.startswith("lost the samples received from 2023-11-14T")
     assert "damaged MCAP chunk" in warning
 
 
-def test_a_damaged_first_chunk_does_not_cost_the_others(path: Path) -> None:
-    held, data = flushed(path)
-    _, end = mcap_chunks(data)[0]
-    path.write_bytes(flipped(data, 8 * (end - 20)))
+def test_a_damaged_first_mcap_chunk_does_not_lose_the_others(path: Path) -> None:
+    original, data = write_flushed(path)
+    _, end = mcap_chunk_ranges(data)[0]
+    path.write_bytes(flip_bit(data, 8 * (end - 20)))
     log = read(path)
-    assert samples(log) == {topic: told[100:] for topic, told in samples(held).items()}
+    assert samples(log) == {topic: rows[100:] for topic, rows in samples(original).items()}
     assert len(log.warnings) == 1
 
 
-def test_samples_that_nothing_describes_any_more_are_counted(path: Path) -> None:
-    _, data = flushed(path)
-    _, end = mcap_chunks(data)[0]
-    (data_end,) = (begin for opcode, begin, _ in top_level(data) if opcode == Opcode.DATA_END)
-    path.write_bytes(flipped(data, 8 * (end - 20))[:data_end])
+def test_lost_samples_without_a_channel_description_are_counted(path: Path) -> None:
+    _, data = write_flushed(path)
+    _, end = mcap_chunk_ranges(data)[0]
+    (data_end,) = (begin for opcode, begin, _ in file_records(data) if opcode == Opcode.DATA_END)
+    path.write_bytes(flip_bit(data, 8 * (end - 20))[:data_end])
     log = read(path)
     assert log.channels == ()
     assert "lost 800 samples: the description of their channel" in log.warnings[1]
@@ -564,44 +568,44 @@ def test_samples_that_nothing_describes_any_more_are_counted(path: Path) -> None
 
 @given(ANYWHERE)
 @settings(derandomize=True, deadline=None, max_examples=120)
-def test_a_bit_flipped_in_the_summary_is_noticed_and_costs_no_sample(
+def test_a_bit_flipped_in_the_summary_is_reported_and_loses_no_sample(
     damaged: tuple[TrialLog, bytes, Path], where: float
 ) -> None:
-    held, whole, path = damaged
-    first = next(end for opcode, _, end in top_level(whole) if opcode == Opcode.DATA_END)
-    path.write_bytes(flipped(whole, within(where, 8 * first, 8 * len(whole))))
+    original, whole, path = damaged
+    first = next(end for opcode, _, end in file_records(whole) if opcode == Opcode.DATA_END)
+    path.write_bytes(flip_bit(whole, offset_between(where, 8 * first, 8 * len(whole))))
     log = read(path)
     assert [samples(TrialLog("t", (c,))) for c in log if len(c)] == [
-        samples(TrialLog("t", (c,))) for c in held
+        samples(TrialLog("t", (c,))) for c in original
     ]
     assert log.warnings
 
 
-def test_an_index_that_names_a_message_twice_is_not_believed(path: Path) -> None:
-    held, data = flushed(path)
-    indexes = [r for r in top_level(data) if r[0] == Opcode.MESSAGE_INDEX]
+def test_an_index_that_has_a_message_twice_is_not_used(path: Path) -> None:
+    original, data = write_flushed(path)
+    indexes = [r for r in file_records(data) if r[0] == Opcode.MESSAGE_INDEX]
     _, start, _ = indexes[4]
     entry = start + 9 + 6
     changed = bytearray(data)
     changed[entry + 8 : entry + 16] = changed[entry + 24 : entry + 32]
     path.write_bytes(bytes(changed))
     log = read(path)
-    assert samples(log) == samples(held)
+    assert samples(log) == samples(original)
     assert any("checksum of the data section is wrong" in warning for warning in log.warnings)
 
 
-def test_an_index_of_another_channel_is_not_believed(path: Path) -> None:
-    held, data = flushed(path)
-    indexes = [r for r in top_level(data) if r[0] == Opcode.MESSAGE_INDEX]
+def test_an_index_of_another_channel_is_not_used(path: Path) -> None:
+    original, data = write_flushed(path)
+    indexes = [r for r in file_records(data) if r[0] == Opcode.MESSAGE_INDEX]
     changed = bytearray(data)
     for _, start, _ in indexes[4:6]:
-        changed[start + 9] ^= 3  # channels 1 and 2 change places
+        changed[start + 9] ^= 3  # exchange channels 1 and 2
     path.write_bytes(bytes(changed))
-    assert samples(read(path)) == samples(held)
+    assert samples(read(path)) == samples(original)
 
 
 @pytest.mark.parametrize("noise", [bytes, lambda n: np.random.default_rng(0).bytes(n)])
-def test_whatever_follows_the_magic_is_read_or_refused(
+def test_any_bytes_after_the_magic_are_read_or_rejected(
     path: Path, noise: Callable[[int], bytes]
 ) -> None:
     for opcode in range(256):
@@ -609,7 +613,7 @@ def test_whatever_follows_the_magic_is_read_or_refused(
             for body in (noise(length), b"\xff" * length):
                 record = struct.pack("<BQ", opcode, length) + body
                 path.write_bytes(b"\x89MCAP0\r\n" + record + noise(20))
-                _read_or_refused(path)
+                _read_or_rejected(path)
 
 
 def test_reading_leaves_the_file_free_to_be_replaced_or_removed(path: Path) -> None:
@@ -622,7 +626,7 @@ def test_reading_leaves_the_file_free_to_be_replaced_or_removed(path: Path) -> N
 
 
 def test_a_topic_described_twice_is_one_channel(tmp_path: Path) -> None:
-    """As a recorder leaves it that was started again within one file."""
+    """A recorder that is restarted within one file writes such files."""
     path = tmp_path / "twice.mcap"
     with path.open("wb") as stream:
         writer = Writer(stream)

@@ -1,4 +1,4 @@
-"""A log in its file, chunk by chunk, is the log that is read whole."""
+"""A log read by chunks from its file is the log that is read into memory."""
 
 import tracemalloc
 from collections import defaultdict
@@ -15,15 +15,15 @@ from mcap.writer import CompressionType, IndexType, Writer
 from mcap_files import (
     START,
     channel,
-    flipped,
-    foreign,
-    mcap_chunks,
+    file_records,
+    flip_bit,
+    mcap_chunk_ranges,
+    offset_between,
     position,
     samples_by_mcap,
     scalar,
-    top_level,
-    within,
-    written,
+    write_by_mcap,
+    write_messages,
 )
 
 import shiplog.mcap.stream
@@ -44,7 +44,7 @@ def path(tmp_path: Path) -> Path:
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Small files are long ones."""
+    """Treat small files as longer than memory."""
     _small(monkeypatch)
 
 
@@ -53,43 +53,43 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shiplog.mcap.stream, "FILE_CHUNK_SAMPLES", CHUNK)
 
 
-def in_its_file(path: Path) -> LogFile:
+def open_as_file(path: Path) -> LogFile:
     log = open_log(path)
     assert isinstance(log, LogFile)
     return log
 
 
-def whole(chunks: Iterator[tuple[Channel, ...]]) -> dict[Any, Channel]:
-    """The chunks of each topic, one after the other."""
+def joined_chunks(chunks: Iterator[tuple[Channel, ...]]) -> dict[Any, Channel]:
+    """Join the parts of each topic."""
     parts: dict[Any, list[Channel]] = defaultdict(list)
     for chunk in chunks:
         for part in chunk:
             parts[part.key].append(part)
-    return {key: concatenate_channels(few) for key, few in parts.items()}
+    return {key: concatenate_channels(channel_parts) for key, channel_parts in parts.items()}
 
 
-def described(c: Channel) -> tuple[object, ...]:
+def description(c: Channel) -> tuple[object, ...]:
     return c.name, c.source, c.unit, c.fields, dict(c.metadata), c.values.dtype, c.values.shape
 
 
-def assert_as_read(log: LogFile, read_whole: TrialLog) -> None:
-    found = {key: c for key, c in whole(log.chunks()).items() if len(c)}
-    expected = {c.key: c for c in read_whole if len(c)}
+def assert_same_log(log: LogFile, expected_log: TrialLog) -> None:
+    found = {key: c for key, c in joined_chunks(log.chunks()).items() if len(c)}
+    expected = {c.key: c for c in expected_log if len(c)}
     assert found.keys() == expected.keys()
     for key, c in expected.items():
-        assert described(found[key]) == described(c)
+        assert description(found[key]) == description(c)
         np.testing.assert_array_equal(found[key].received_ns, c.received_ns)
         np.testing.assert_array_equal(found[key].measured_ns, c.measured_ns)
         assert found[key].values.tobytes() == c.values.tobytes()
-    assert log.name == read_whole.name
-    assert log.metadata == read_whole.metadata
-    assert log.vessel_toml == read_whole.vessel_toml
-    assert log.warnings == read_whole.warnings
-    assert log.data_lost == read_whole.data_lost
+    assert log.name == expected_log.name
+    assert log.metadata == expected_log.metadata
+    assert log.vessel_toml == expected_log.vessel_toml
+    assert log.warnings == expected_log.warnings
+    assert log.data_lost == expected_log.data_lost
 
 
-def recorded(path: Path) -> bytes:
-    """A log of two channels flushed every hundred samples of each; the bytes of its file."""
+def write_recording(path: Path) -> bytes:
+    """Write a log of two channels, flushed every hundred samples; return the file's bytes."""
     with LogWriter(path, metadata={"place": "Neva"}) as writer:
         for start in range(0, 1000, 100):
             at = START + 1000 * np.arange(start, start + 100)
@@ -125,30 +125,30 @@ def trial() -> tuple[Channel, ...]:
     ],
     ids=str,
 )
-def test_the_chunks_are_what_is_read_whole_however_the_file_is_laid_out(
+def test_chunks_joined_are_the_log_read_whole_in_every_file_layout(
     path: Path, options: dict[str, Any]
 ) -> None:
-    written(path, *trial(), **{"chunk_size": 1 << 13, **options})
-    log = in_its_file(path)
-    assert_as_read(log, read(path))
-    assert_as_read(log, read(path))  # a second pass
+    write_by_mcap(path, *trial(), **{"chunk_size": 1 << 13, **options})
+    log = open_as_file(path)
+    assert_same_log(log, read(path))
+    assert_same_log(log, read(path))  # a second pass
 
 
-def test_the_chunks_are_the_samples_that_mcap_reads(path: Path) -> None:
-    held = channel("yaw_rate", 3000, 1), channel("speed", 700, 2)
-    written(path, *held, chunk_size=1 << 13)
-    theirs = samples_by_mcap(path)
-    for c in whole(in_its_file(path).chunks()).values():
-        assert [t[0] for t in theirs[c.topic]] == c.received_ns.tolist()
-        assert b"".join(t[2] for t in theirs[c.topic]) == c.values.tobytes()
+def test_chunks_have_the_samples_that_the_mcap_library_reads(path: Path) -> None:
+    original = channel("yaw_rate", 3000, 1), channel("speed", 700, 2)
+    write_by_mcap(path, *original, chunk_size=1 << 13)
+    by_mcap = samples_by_mcap(path)
+    for c in joined_chunks(open_as_file(path).chunks()).values():
+        assert [t[0] for t in by_mcap[c.topic]] == c.received_ns.tolist()
+        assert b"".join(t[2] for t in by_mcap[c.topic]) == c.values.tobytes()
 
 
-def test_a_chunk_has_about_as_many_samples_as_it_should_and_its_channels_in_order(
+def test_chunks_have_the_intended_size_and_all_channels_in_order(
     path: Path,
 ) -> None:
-    written(path, *trial(), chunk_size=4000)
+    write_by_mcap(path, *trial(), chunk_size=4000)
     topics = [c.topic for c in read(path)]
-    chunks = list(in_its_file(path).chunks())
+    chunks = list(open_as_file(path).chunks())
     assert len(chunks) > 5
     for chunk in chunks[:-1]:
         assert CHUNK <= sum(map(len, chunk)) <= CHUNK + 4000 // 40
@@ -156,28 +156,28 @@ def test_a_chunk_has_about_as_many_samples_as_it_should_and_its_channels_in_orde
         assert [c.topic for c in chunk] == topics
 
 
-def test_what_is_known_before_the_first_pass_is_what_the_summary_says(path: Path) -> None:
+def test_before_the_first_pass_the_log_has_the_content_of_the_summary(path: Path) -> None:
     write(TrialLog("t", trial()[:3], {"place": "Neva"}, "T1 = 1\n"), path)
-    log = in_its_file(path)
+    log = open_as_file(path)
     assert (log.name, log.metadata["place"], log.vessel_toml) == ("trial.mcap", "Neva", "T1 = 1\n")
     assert log.warnings == ()
     assert not log.data_lost
 
 
-def test_a_short_log_is_read_whole(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    data = recorded(path)
+def test_a_short_log_is_read_into_memory(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = write_recording(path)
     for contents in (data, data[:-40]):  # with a summary and without
         path.write_bytes(contents)
-        for enough, kind in ((2000, TrialLog), (1999, LogFile)):
-            monkeypatch.setattr(shiplog.mcap.stream, "MAX_SAMPLES_IN_MEMORY", enough)
+        for limit, kind in ((2000, TrialLog), (1999, LogFile)):
+            monkeypatch.setattr(shiplog.mcap.stream, "MAX_SAMPLES_IN_MEMORY", limit)
             log = open_log(path)
             assert isinstance(log, kind)
             assert log.warnings == read(path).warnings
 
 
 def test_units_are_converted_in_every_chunk(path: Path) -> None:
-    foreign(path, [scalar(float(k)) for k in range(1000)], unit="deg/s")
-    (yaw_rate,) = whole(in_its_file(path).chunks()).values()
+    write_messages(path, [scalar(float(k)) for k in range(1000)], unit="deg/s")
+    (yaw_rate,) = joined_chunks(open_as_file(path).chunks()).values()
     assert yaw_rate.unit == "rad/s"
     np.testing.assert_allclose(yaw_rate.values, np.radians(np.arange(1000.0)), rtol=1e-15)
 
@@ -191,9 +191,11 @@ def test_a_topic_described_twice_is_one_channel_in_every_chunk(
         writer.start()
         schema = schema_for(())
         schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
-        said = {"unit": "rad/s"}
+        metadata = {"unit": "rad/s"}
         first, second = (
-            writer.register_channel("/yaw_rate/gyro", "protobuf", schema_id, said | {"run": run})
+            writer.register_channel(
+                "/yaw_rate/gyro", "protobuf", schema_id, metadata | {"run": run}
+            )
             for run in "12"
         )
         for k in range(1000):
@@ -201,14 +203,14 @@ def test_a_topic_described_twice_is_one_channel_in_every_chunk(
         writer.finish()
     if unfinished:
         path.write_bytes(path.read_bytes()[:-10])
-    log = in_its_file(path)
-    assert_as_read(log, read(path))
-    (yaw_rate,) = whole(log.chunks()).values()
+    log = open_as_file(path)
+    assert_same_log(log, read(path))
+    (yaw_rate,) = joined_chunks(log.chunks()).values()
     assert yaw_rate.values.tolist() == list(range(1000))
     assert yaw_rate.metadata == {"run": "1"}
 
 
-def test_samples_are_put_in_order_within_a_chunk(path: Path) -> None:
+def test_samples_are_sorted_within_a_chunk(path: Path) -> None:
     rng = np.random.default_rng(0)
     with path.open("wb") as stream:
         writer = Writer(stream)
@@ -221,11 +223,11 @@ def test_samples_are_put_in_order_within_a_chunk(path: Path) -> None:
                 writer.add_message(channel_id, k // 2, scalar(rng.normal()), k)
             writer.flush()
         writer.finish()
-    assert_as_read(in_its_file(path), read(path))
+    assert_same_log(open_as_file(path), read(path))
 
 
 @pytest.mark.parametrize("unfinished", [False, True])
-def test_a_file_in_another_order_from_chunk_to_chunk_is_read_whole(
+def test_a_file_with_mcap_chunks_out_of_order_is_read_into_memory(
     path: Path, *, unfinished: bool
 ) -> None:
     with LogWriter(path) as writer:
@@ -240,46 +242,46 @@ def test_a_file_in_another_order_from_chunk_to_chunk_is_read_whole(
     assert np.all(np.diff(log["speed"].received_ns) > 0)
 
 
-def test_messages_outside_chunks_are_read_whole(path: Path) -> None:
-    written(path, *trial(), use_chunking=False)
+def test_messages_outside_of_mcap_chunks_are_read_into_memory(path: Path) -> None:
+    write_by_mcap(path, *trial(), use_chunking=False)
     log = open_log(path)
     assert isinstance(log, TrialLog)
     assert sum(map(len, log)) == 3860
 
 
-def test_a_chosen_source_stands_alone_and_first_in_every_chunk(path: Path) -> None:
-    held = [
+def test_a_selected_source_is_alone_and_first_in_every_chunk(path: Path) -> None:
+    original = [
         channel("speed", 2000, 2),
         channel("yaw_rate", 2000, 1),
         channel("yaw_rate", 900, 3, "imu"),
     ]
-    written(path, *held, chunk_size=4000)
-    chosen = {"yaw_rate": "imu"}
-    log = in_its_file(path).select_sources(chosen)
+    write_by_mcap(path, *original, chunk_size=4000)
+    selected = {"yaw_rate": "imu"}
+    log = open_as_file(path).select_sources(selected)
     for chunk in log.chunks():
         topics = [c.topic for c in chunk]
         assert topics == ["/yaw_rate/imu", "/speed/test"]
-    assert_as_read(log, read(path).select_sources(chosen))
+    assert_same_log(log, read(path).select_sources(selected))
 
 
-@pytest.mark.parametrize("chosen", [{"yaw_rate": "nobody"}, {"rudder": "test"}])
-def test_a_source_that_is_not_there_is_refused_as_by_a_log(
-    path: Path, chosen: dict[str, str]
+@pytest.mark.parametrize("selected", [{"yaw_rate": "compass"}, {"rudder": "test"}])
+def test_a_missing_source_is_the_same_error_as_of_a_log_in_memory(
+    path: Path, selected: dict[str, str]
 ) -> None:
-    written(path, *trial())
-    with pytest.raises(LogError) as ours:
-        in_its_file(path).select_sources(chosen)
-    with pytest.raises(LogError) as theirs:
-        read(path).select_sources(chosen)
-    assert str(ours.value) == str(theirs.value)
+    write_by_mcap(path, *trial())
+    with pytest.raises(LogError) as in_file:
+        open_as_file(path).select_sources(selected)
+    with pytest.raises(LogError) as in_memory:
+        read(path).select_sources(selected)
+    assert str(in_file.value) == str(in_memory.value)
 
 
-def test_what_read_refuses_is_refused_when_opening(path: Path) -> None:
+def test_files_that_read_rejects_are_rejected_when_opening(path: Path) -> None:
     for contents in (b"", b"time,yaw_rate\n"):
         path.write_bytes(contents)
         with pytest.raises(LogError):
             open_log(path)
-    foreign(path, [scalar(1.0)] * 100, unit="m")
+    write_messages(path, [scalar(1.0)] * 100, unit="m")
     with pytest.raises(LogError, match="should be in rad/s"):
         open_log(path)
     with path.open("wb") as stream:
@@ -291,36 +293,36 @@ def test_what_read_refuses_is_refused_when_opening(path: Path) -> None:
         open_log(path)
 
 
-def test_a_pass_that_is_given_up_leaves_the_file_closed(path: Path) -> None:
-    written(path, *trial(), chunk_size=4000)
-    log = in_its_file(path)
+def test_an_abandoned_pass_closes_the_file(path: Path) -> None:
+    write_by_mcap(path, *trial(), chunk_size=4000)
+    log = open_as_file(path)
     chunks = log.chunks()
     next(chunks)
     chunks.close()  # type: ignore[attr-defined]
-    assert_as_read(log, read(path))
+    assert_same_log(log, read(path))
 
 
 @pytest.fixture(scope="module")
 def damaged(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, Path]:
     path = tmp_path_factory.mktemp("damaged") / "trial.mcap"
-    return recorded(path), path
+    return write_recording(path), path
 
 
-def _same_or_both_refused(path: Path) -> None:
+def _assert_same_log_or_both_rejected(path: Path) -> None:
     try:
-        read_whole = read(path)
+        expected_log = read(path)
     except LogError:
         with pytest.raises(LogError):
-            _gone_through(path)
+            _read_all_chunks(path)
         return
     log = open_log(path)
     if isinstance(log, LogFile):
-        assert_as_read(log, read_whole)
+        assert_same_log(log, expected_log)
     else:
-        assert log.warnings == read_whole.warnings
+        assert log.warnings == expected_log.warnings
 
 
-def _gone_through(path: Path) -> None:
+def _read_all_chunks(path: Path) -> None:
     log = open_log(path)
     assert isinstance(log, LogFile)
     list(log.chunks())
@@ -328,51 +330,54 @@ def _gone_through(path: Path) -> None:
 
 @given(ANYWHERE, ANYWHERE, st.booleans())
 @settings(derandomize=True, deadline=None, max_examples=150)
-def test_a_file_with_a_bit_flipped_is_said_to_be_what_it_is_read_as(
+def test_a_file_with_a_flipped_bit_gives_the_same_log_as_read(
     damaged: tuple[bytes, Path], record: float, where: float, in_its_head: bool
 ) -> None:
     data, path = damaged
-    _, start, end = top_level(data)[within(record, 0, len(top_level(data)))]
+    _, start, end = file_records(data)[offset_between(record, 0, len(file_records(data)))]
     if in_its_head:
         end = min(end, start + 60)
-    path.write_bytes(flipped(data, within(where, 8 * start, 8 * end)))
+    path.write_bytes(flip_bit(data, offset_between(where, 8 * start, 8 * end)))
     with pytest.MonkeyPatch.context() as patch:
         _small(patch)
-        _same_or_both_refused(path)
+        _assert_same_log_or_both_rejected(path)
 
 
 @given(ANYWHERE, st.sampled_from([0, 1, 4096]))
 @settings(derandomize=True, deadline=None, max_examples=60)
-def test_an_unfinished_file_is_said_to_be_what_it_is_read_as(
+def test_an_unfinished_file_gives_the_same_log_as_read(
     damaged: tuple[bytes, Path], where: float, zeros: int
 ) -> None:
     data, path = damaged
-    path.write_bytes(data[: within(where, 8, len(data))] + bytes(zeros))
+    path.write_bytes(data[: offset_between(where, 8, len(data))] + bytes(zeros))
     with pytest.MonkeyPatch.context() as patch:
         _small(patch)
-        _same_or_both_refused(path)
+        _assert_same_log_or_both_rejected(path)
 
 
-def test_a_damaged_first_chunk_costs_the_chunks_no_other(path: Path) -> None:
-    data = recorded(path)
-    _, end = mcap_chunks(data)[0]
-    (data_end,) = (begin for opcode, begin, _ in top_level(data) if opcode == Opcode.DATA_END)
-    broken = flipped(data, 8 * (end - 20))
-    for contents in (broken, broken[:data_end]):  # the summary describes it still, or nothing does
+def test_a_damaged_first_mcap_chunk_loses_no_other(path: Path) -> None:
+    data = write_recording(path)
+    _, end = mcap_chunk_ranges(data)[0]
+    (data_end,) = (begin for opcode, begin, _ in file_records(data) if opcode == Opcode.DATA_END)
+    broken = flip_bit(data, 8 * (end - 20))
+    for contents in (
+        broken,
+        broken[:data_end],
+    ):  # with and without a summary
         path.write_bytes(contents)
         log = open_log(path)
         assert isinstance(log, LogFile)
-        assert_as_read(log, read(path))
+        assert_same_log(log, read(path))
 
 
-def test_a_pass_takes_no_more_memory_the_longer_the_file(
+def test_memory_of_a_pass_does_not_grow_with_the_file(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(shiplog.mcap.stream, "FILE_CHUNK_SAMPLES", 1 << 15)
     peaks = []
     for count in (100_000, 400_000):
         write(TrialLog("t", (channel("yaw_rate", count),)), path)
-        log = in_its_file(path)
+        log = open_as_file(path)
         tracemalloc.start()
         samples = sum(len(c) for chunk in log.chunks() for c in chunk)
         peaks.append(tracemalloc.get_traced_memory()[1])

@@ -54,7 +54,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "trial.mcap"
 
 
-def test_what_is_written_is_read(path: Path) -> None:
+def test_a_log_is_read_as_it_was_written(path: Path) -> None:
     fixes = Channel(
         "position", "gnss", "deg", np.arange(5), np.arange(5), np.ones((5, 3)), GEOGRAPHIC
     )
@@ -68,19 +68,19 @@ def test_what_is_written_is_read(path: Path) -> None:
         ("north", "east"),
         {"origin": "59.9 30.2"},
     )
-    written = trial(channel("yaw_rate", 1000), fixes, local, channel("torque", 10))
-    write(written, path)
+    original = trial(channel("yaw_rate", 1000), fixes, local, channel("torque", 10))
+    write(original, path)
     log = read(path)
     assert log.name == "trial.mcap"
     assert log.warnings == ()
-    assert log.vessel_toml == written.vessel_toml
+    assert log.vessel_toml == original.vessel_toml
     assert log.metadata["place"] == "Neva"
-    assert [c.topic for c in log] == [c.topic for c in written]
-    assert all(same(one, other) for one, other in zip(written, log, strict=True))
+    assert [c.topic for c in log] == [c.topic for c in original]
+    assert all(same(one, other) for one, other in zip(original, log, strict=True))
 
 
 OURS = {"format_version", "written_by", "channel", "source", "unit", "positive"}
-keys = st.text(min_size=1).filter(lambda key: key not in OURS)  # these the writer itself says
+keys = st.text(min_size=1).filter(lambda key: key not in OURS)  # OURS are written by the writer
 
 
 @st.composite
@@ -100,19 +100,21 @@ def channels(draw: st.DrawFn, name: str) -> Channel:
 
 @given(st.tuples(channels("yaw_rate"), channels("heave")), st.dictionaries(keys, st.text()))
 @settings(derandomize=True, deadline=None, max_examples=100)
-def test_any_log_comes_back_bit_for_bit(
-    tmp_path_factory: pytest.TempPathFactory, held: tuple[Channel, ...], metadata: dict[str, str]
+def test_any_log_is_read_back_bit_for_bit(
+    tmp_path_factory: pytest.TempPathFactory,
+    original: tuple[Channel, ...],
+    metadata: dict[str, str],
 ) -> None:
     path = tmp_path_factory.mktemp("any") / "trial.mcap"
-    write(TrialLog("any", held, metadata), path)
+    write(TrialLog("any", original, metadata), path)
     log = read(path)
     by_topic = {c.topic: c for c in log}
-    assert all(same(c, by_topic[c.topic]) for c in held)
+    assert all(same(c, by_topic[c.topic]) for c in original)
     assert metadata.items() <= log.metadata.items()
     assert log.warnings == ()
 
 
-def test_mcap_itself_finds_no_fault_with_the_file(path: Path) -> None:
+def test_the_mcap_library_verifies_the_file(path: Path) -> None:
     write(trial(channel("yaw_rate", 30_000), channel("rudder", 10_000)), path)
     with path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
@@ -124,21 +126,21 @@ def test_mcap_itself_finds_no_fault_with_the_file(path: Path) -> None:
         assert sum(1 for _ in reader.iter_messages()) == 40_000
         assert "shiplog" in str(reader.get_header())
         stream.seek(0)
-        whole = NonSeekingReader(stream, validate_crcs=True)  # checks the data as a whole too
+        whole = NonSeekingReader(stream, validate_crcs=True)  # verifies the data section too
         assert sum(1 for _ in whole.iter_messages(log_time_order=False)) == 40_000
 
 
 def test_measured_is_the_publish_time_and_received_the_log_time(path: Path) -> None:
-    written = channel("yaw_rate", 100)
-    write(trial(written), path)
+    original = channel("yaw_rate", 100)
+    write(trial(original), path)
     with path.open("rb") as stream:
         messages = [message for *_, message in make_reader(stream).iter_messages()]
-    assert [m.publish_time for m in messages] == written.measured_ns.tolist()
-    assert [m.log_time for m in messages] == written.received_ns.tolist()
+    assert [m.publish_time for m in messages] == original.measured_ns.tolist()
+    assert [m.log_time for m in messages] == original.received_ns.tolist()
     assert [m.sequence for m in messages] == list(range(100))
 
 
-def test_channels_are_interleaved_in_the_order_in_which_they_were_received(path: Path) -> None:
+def test_channels_are_interleaved_in_the_order_of_reception(path: Path) -> None:
     write(trial(channel("yaw_rate", 300, 1), channel("speed", 200, 2), channel("rpm", 9, 3)), path)
     with path.open("rb") as stream:
         messages = list(make_reader(stream).iter_messages(log_time_order=False))
@@ -147,7 +149,7 @@ def test_channels_are_interleaved_in_the_order_in_which_they_were_received(path:
     assert len({c.topic for _, c, _ in messages[:50]}) >= 2
 
 
-def test_the_file_says_what_each_channel_is(path: Path) -> None:
+def test_the_file_has_the_metadata_of_each_channel(path: Path) -> None:
     rudder = Channel(
         "rudder",
         "feedback",
@@ -161,18 +163,18 @@ def test_the_file_says_what_each_channel_is(path: Path) -> None:
     with path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
     assert summary is not None
-    said = {c.topic: c.metadata for c in summary.channels.values()}
-    assert said["/rudder/feedback"] == {
+    metadata = {c.topic: c.metadata for c in summary.channels.values()}
+    assert metadata["/rudder/feedback"] == {
         "channel": "rudder",
         "source": "feedback",
         "unit": "rad",
         "positive": "turns the bow to starboard",
         "model": "X1",
     }
-    assert "positive" not in said["/torque/test"]
+    assert "positive" not in metadata["/torque/test"]
 
 
-def test_the_file_holds_its_metadata_and_the_vessel(path: Path) -> None:
+def test_the_file_has_its_metadata_and_the_vessel_file(path: Path) -> None:
     log = TrialLog("t", (channel("speed", 3),), {"crew": "two", "format_version": "0"}, "T1 = 1\n")
     write(log, path)
     with path.open("rb") as stream:
@@ -206,7 +208,7 @@ def test_a_log_read_and_written_again_is_the_same_file(tmp_path: Path) -> None:
     assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
 
-def test_chunks_written_one_by_one_make_one_channel(path: Path) -> None:
+def test_parts_written_one_by_one_are_one_channel(path: Path) -> None:
     whole = channel("yaw_rate", 100)
     with LogWriter(path) as writer:
         for at in range(0, 100, 10):
@@ -221,14 +223,14 @@ def test_chunks_written_one_by_one_make_one_channel(path: Path) -> None:
                     whole.values[part],
                 )
             )
-    (held,) = read(path)
-    assert same(held, whole)
+    (original,) = read(path)
+    assert same(original, whole)
     with path.open("rb") as stream:
         sequences = [message.sequence for *_, message in make_reader(stream).iter_messages()]
     assert sequences == list(range(100))
 
 
-def test_chunks_of_many_channels_written_one_by_one_are_whole_again(path: Path) -> None:
+def test_parts_of_many_channels_written_one_by_one_are_joined(path: Path) -> None:
     rng = np.random.default_rng(8)
     whole = [channel("yaw_rate", 5000, 1), channel("speed", 900, 2), channel("torque", 70, 3)]
     times = np.sort(rng.choice(whole[0].received_ns, 400, replace=False))
@@ -250,7 +252,7 @@ def test_chunks_of_many_channels_written_one_by_one_are_whole_again(path: Path) 
         assert of_it == list(range(len(c)))
 
 
-def test_a_long_chunk_takes_little_memory_of_its_own(path: Path) -> None:
+def test_a_long_channel_is_written_in_little_memory(path: Path) -> None:
     count = 1_000_000
     at = START + np.arange(count)
     long = Channel("speed", "log", "m/s", at, at, np.ones(count))
@@ -262,14 +264,14 @@ def test_a_long_chunk_takes_little_memory_of_its_own(path: Path) -> None:
     assert peak < count * 24
 
 
-def test_a_channel_that_never_spoke_is_kept(path: Path) -> None:
+def test_a_channel_without_samples_is_kept(path: Path) -> None:
     write(trial(channel("speed", 3), channel("rpm", 0)), path)
     log = read(path)
     assert len(log["rpm"]) == 0
     assert log.warnings == ()
 
 
-def test_closing_twice_is_closing_once(path: Path) -> None:
+def test_a_second_close_has_no_effect(path: Path) -> None:
     writer = LogWriter(path)
     writer.write(channel("speed", 3))
     writer.close()
@@ -278,7 +280,7 @@ def test_closing_twice_is_closing_once(path: Path) -> None:
     assert path.stat().st_size == size
 
 
-def test_a_killed_process_leaves_all_that_was_flushed(path: Path) -> None:
+def test_a_killed_process_leaves_all_flushed_samples(path: Path) -> None:
     code = """
 import os, sys, numpy as np
 from shiplog import Channel, LogWriter
@@ -302,7 +304,7 @@ os._exit(9)
     assert "1000 complete samples were read" in log.warnings[0]
 
 
-def test_a_unit_that_no_reader_could_convert_is_refused_before_it_is_recorded(path: Path) -> None:
+def test_a_unit_that_no_reader_can_convert_is_rejected_before_recording(path: Path) -> None:
     for unit in ("m/s", "deg/fortnight"):
         with pytest.raises(UsageError, match=unit):
             write(TrialLog("t", (Channel("yaw_rate", "gyro", unit, [0], [0], [0.1]),)), path)  # type: ignore[arg-type]
@@ -310,7 +312,7 @@ def test_a_unit_that_no_reader_could_convert_is_refused_before_it_is_recorded(pa
 
 
 @pytest.mark.parametrize("place", [".", "nowhere/trial.mcap", "file/trial.mcap"])
-def test_a_place_that_cannot_be_written_is_an_error_that_leaves_nothing(
+def test_a_path_that_cannot_be_written_is_an_error_that_leaves_no_file(
     tmp_path: Path, place: str
 ) -> None:
     (tmp_path / "file").touch()
@@ -322,7 +324,7 @@ def test_a_place_that_cannot_be_written_is_an_error_that_leaves_nothing(
 
 
 @pytest.mark.parametrize("stands", [True, False])
-def test_a_failure_midway_leaves_what_was_there(
+def test_a_failed_write_leaves_the_existing_file(
     path: Path, monkeypatch: pytest.MonkeyPatch, *, stands: bool
 ) -> None:
     if stands:
@@ -340,7 +342,7 @@ def test_a_failure_midway_leaves_what_was_there(
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")
-def test_a_full_disk_is_told_when_flushing_and_the_file_is_closed() -> None:
+def test_a_full_disk_is_reported_by_flush_and_the_file_is_closed() -> None:
     writer = LogWriter("/dev/full")
     writer.write(channel("speed", 3))
     with pytest.raises(OSError, match="No space left"):

@@ -26,8 +26,8 @@ def log_of(*channels: Channel) -> TrialLog:
     return TrialLog("trial.mcap", channels)
 
 
-def binned_by_force(measured: Channel, start_ns: int, dt_ns: int, count: int) -> list[float]:
-    """The mean of the samples within half a step of each instant, in whole nanoseconds."""
+def brute_force_means(measured: Channel, start_ns: int, dt_ns: int, count: int) -> list[float]:
+    """Average the samples within half a step of each instant, in integer nanoseconds."""
     means = []
     for k in range(count):
         middle = start_ns + k * dt_ns
@@ -40,10 +40,10 @@ def binned_by_force(measured: Channel, start_ns: int, dt_ns: int, count: int) ->
     return means
 
 
-def interpolated_by_force(
+def brute_force_interpolation(
     commanded: Channel, start_ns: int, dt_ns: int, count: int, gap_ns: float
 ) -> list[float]:
-    """Linear between the samples either side of each instant, in whole nanoseconds."""
+    """Interpolate between the samples on either side of each instant, in integer ns."""
     samples = sorted(
         (at, float(value))
         for at, value in zip(commanded.measured_ns.tolist(), commanded.values, strict=True)
@@ -66,7 +66,7 @@ def interpolated_by_force(
 
 
 def scattered(name: str, rng: np.random.Generator, count: int, span_secs: float) -> Channel:
-    """Unevenly timed, out of order, a tenth of it not measured, in whole odd nanoseconds."""
+    """Make a channel of irregular odd ns times, out of order, a tenth of it not measured."""
     at = START + 2 * rng.choice(round(span_secs * 1e9) // 2, count, replace=False) + 1
     values = rng.normal(size=count)
     values[rng.random(count) < 0.1] = nan
@@ -75,10 +75,10 @@ def scattered(name: str, rng: np.random.Generator, count: int, span_secs: float)
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("dt_ns", [100_000_000, 250_000_000, 1_000_000_000])
-def test_what_is_measured_is_the_mean_of_the_nearest_samples(seed: int, dt_ns: int) -> None:
+def test_a_measured_channel_is_the_mean_of_the_nearest_samples(seed: int, dt_ns: int) -> None:
     measured = scattered("yaw_rate", np.random.default_rng(seed), 60, 20.0)
     signals = resample(log_of(measured), dt_ns * 1e-9)
-    expected = binned_by_force(measured, signals.start_ns, dt_ns, len(signals))
+    expected = brute_force_means(measured, signals.start_ns, dt_ns, len(signals))
     np.testing.assert_allclose(signals["yaw_rate"], expected, rtol=1e-13)
     there = np.isfinite(measured.values)
     assert signals.start_ns == measured.measured_ns[there].min()
@@ -86,11 +86,11 @@ def test_what_is_measured_is_the_mean_of_the_nearest_samples(seed: int, dt_ns: i
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("dt_ns", [100_000_000, 250_000_000, 1_000_000_000])
-def test_what_is_commanded_is_interpolated_but_not_across_a_gap(seed: int, dt_ns: int) -> None:
+def test_a_commanded_channel_is_interpolated_but_not_across_a_gap(seed: int, dt_ns: int) -> None:
     commanded = scattered("rudder", np.random.default_rng(seed), 40, 60.0)
     signals = resample(log_of(commanded), dt_ns * 1e-9)
     gap_ns = compute_log_stats(log_of(commanded))[commanded.name].gap_threshold_secs * 1e9
-    expected = interpolated_by_force(commanded, signals.start_ns, dt_ns, len(signals), gap_ns)
+    expected = brute_force_interpolation(commanded, signals.start_ns, dt_ns, len(signals), gap_ns)
     np.testing.assert_allclose(signals["rudder"], expected, rtol=1e-9, atol=1e-12)
 
 
@@ -114,7 +114,7 @@ def test_the_order_of_the_samples_does_not_matter(name: str, seed: int) -> None:
     np.testing.assert_allclose(once[name], again[name], rtol=1e-12, atol=1e-14)
 
 
-def test_samples_on_the_grid_are_taken_as_they_are() -> None:
+def test_samples_on_the_clock_are_unchanged() -> None:
     seconds = np.arange(1000) * 0.1
     values = np.random.default_rng(1).normal(size=1000)
     for name in ("yaw_rate", "rudder"):
@@ -123,7 +123,7 @@ def test_samples_on_the_grid_are_taken_as_they_are() -> None:
         assert signals.dt_secs == pytest.approx(0.1, rel=1e-12)
 
 
-def test_where_nothing_was_measured_there_is_nan() -> None:
+def test_instants_without_a_measurement_are_nan() -> None:
     rudder = channel("rudder", np.arange(11), np.zeros(11))
     speed = channel("speed", [0, 1, 2, 8, 9, 10], [5, nan, 5, 5, 5, 5])
     signals = resample(log_of(rudder, speed), 1.0)
@@ -133,19 +133,19 @@ def test_where_nothing_was_measured_there_is_nan() -> None:
     assert np.all(np.isfinite(signals["rudder"]))
 
 
-def test_a_gap_of_what_is_commanded_is_nan_inside_and_known_at_its_ends() -> None:
+def test_a_gap_of_a_commanded_channel_is_nan_inside_and_known_at_its_ends() -> None:
     seconds = [0, 1, 2, 3, 13, 14, 15]
     signals = resample(log_of(channel("rudder", seconds, [float(s) for s in seconds])), 1.0)
     np.testing.assert_allclose(signals["rudder"], [0, 1, 2, 3, *[nan] * 9, 13, 14, 15], rtol=1e-12)
 
 
-def test_a_silence_of_a_second_is_no_gap_however_fast_the_channel() -> None:
+def test_an_interval_below_a_second_is_not_a_gap_even_in_a_fast_channel() -> None:
     seconds = [*np.arange(0, 1, 0.01), *np.arange(1.9, 3, 0.01)]
     signals = resample(log_of(channel("rudder", seconds, seconds)), 0.1)
     np.testing.assert_allclose(signals["rudder"], signals.time_secs, atol=1e-9)
 
 
-def test_different_rates_meet_on_one_clock() -> None:
+def test_channels_of_different_rates_are_placed_on_one_clock() -> None:
     log = log_of(
         channel("yaw_rate", np.arange(0, 10.001, 0.01), np.arange(0, 10.001, 0.01)),
         channel("rudder", np.arange(0, 11), np.arange(0, 11)),
@@ -159,7 +159,7 @@ def test_different_rates_meet_on_one_clock() -> None:
     assert np.all(np.isnan(signals["speed"][1::2]))
 
 
-def test_jittered_times_keep_the_usual_period_and_lose_no_sample() -> None:
+def test_jittered_times_keep_the_median_interval_and_lose_no_sample() -> None:
     rng = np.random.default_rng(3)
     seconds = np.arange(500) * 0.1 + rng.uniform(-0.02, 0.02, 500)
     jittered = channel("yaw_rate", seconds, np.arange(500.0))
@@ -171,7 +171,7 @@ def test_jittered_times_keep_the_usual_period_and_lose_no_sample() -> None:
     assert np.isfinite(signals["yaw_rate"]).mean() > 0.9
 
 
-def test_the_step_is_by_default_the_usual_period_of_the_first_channel() -> None:
+def test_the_default_step_is_the_median_interval_of_the_first_channel() -> None:
     log = log_of(
         channel("speed", np.arange(0, 10, 0.5), np.ones(20)),
         channel("rudder", np.arange(0, 10, 0.2), np.ones(50)),
@@ -180,7 +180,7 @@ def test_the_step_is_by_default_the_usual_period_of_the_first_channel() -> None:
     assert resample(log, channels=("rudder", "speed")).dt_secs == pytest.approx(0.2)
 
 
-def test_the_clock_runs_while_every_command_is_known() -> None:
+def test_the_clock_runs_while_all_commanded_channels_are_known() -> None:
     log = log_of(
         channel("rudder", np.arange(2, 21), np.zeros(19)),
         channel("rpm", np.arange(0, 18), np.full(18, 80.0)),
@@ -191,21 +191,21 @@ def test_the_clock_runs_while_every_command_is_known() -> None:
     assert len(signals) == 16
 
 
-def test_one_source_of_a_quantity_is_treated_as_that_quantity() -> None:
+def test_a_channel_named_with_its_source_is_treated_as_its_quantity() -> None:
     log = log_of(channel("rudder", [0, 2, 4], [0, 2, 4], source="feedback"))
     by_name, by_source = resample(log, 1.0), resample(log, 1.0, ("rudder/feedback",))
     np.testing.assert_array_equal(by_source["rudder/feedback"], by_name["rudder"])
     np.testing.assert_array_equal(by_name["rudder"], np.arange(5))
 
 
-def test_a_heading_unwraps() -> None:
+def test_a_heading_is_unwrapped() -> None:
     seconds = np.arange(0, 100, 1.0)
     turned = 0.1 * seconds
     signals = resample(log_of(channel("heading", seconds, turned % (2 * pi))), 0.5)
     np.testing.assert_allclose(signals["heading"], 0.1 * signals.time_secs, atol=1e-9)
 
 
-def test_positions_are_passed_over_and_refused_when_named() -> None:
+def test_positions_are_omitted_by_default_and_rejected_by_name() -> None:
     at = START + np.arange(3) * SEC
     position = Channel("position", "gnss", "m", at, at, np.zeros((3, 2)), ("north", "east"))
     log = log_of(channel("speed", [0, 1, 2], [1, 2, 3]), position)
@@ -217,7 +217,7 @@ def test_positions_are_passed_over_and_refused_when_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seconds", "values", "says"),
+    ("seconds", "values", "error"),
     [
         ([0], [1], "has one sample"),
         ([0, 1], [1, nan], "has one sample"),
@@ -227,10 +227,10 @@ def test_positions_are_passed_over_and_refused_when_named() -> None:
     ],
 )
 def test_too_few_samples_are_an_error_that_names_the_channel(
-    seconds: list[float], values: list[float], says: str
+    seconds: list[float], values: list[float], error: str
 ) -> None:
     log = log_of(channel("speed", [0, 1], [1, 2]), channel("rudder", seconds, values))
-    with pytest.raises(LogError, match=rf"'rudder' .*{says}.*trial\.mcap"):
+    with pytest.raises(LogError, match=rf"'rudder' .*{error}.*trial\.mcap"):
         resample(log)
 
 
@@ -249,7 +249,7 @@ def test_commands_with_no_time_in_common_are_an_error() -> None:
 
 
 @pytest.mark.parametrize("dt_secs", [0.1, 1e-9, 1e-300])
-def test_times_years_apart_are_an_error_and_not_a_want_of_memory(dt_secs: float) -> None:
+def test_times_years_apart_are_an_error_and_do_not_exhaust_memory(dt_secs: float) -> None:
     year = 365.25 * 86400
     log = log_of(channel("rudder", [0, 1, 9 * year], [0, 0, 0]))
     with pytest.raises(LogError, match=r"span 3287 days, too many steps of"):
@@ -257,13 +257,13 @@ def test_times_years_apart_are_an_error_and_not_a_want_of_memory(dt_secs: float)
 
 
 @pytest.mark.parametrize("dt_secs", [0.0, -0.1, nan, float("inf")])
-def test_a_step_that_is_none_is_refused(dt_secs: float) -> None:
+def test_an_invalid_time_step_is_rejected(dt_secs: float) -> None:
     with pytest.raises(UsageError, match="time step must be positive"):
         resample(log_of(channel("rudder", [0, 1], [0, 0])), dt_secs)
 
 
 @pytest.mark.parametrize("silent", ["yaw_rate", "rudder", "heading", "all"])
-def test_a_long_silence_comes_in_chunks_as_it_goes_by(
+def test_a_long_gap_is_resampled_in_bounded_chunks_without_delay(
     silent: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("shiplog.resampling.grid.MAX_CHUNK_INSTANTS", 50)
