@@ -30,6 +30,7 @@ sensors, each setting in SI:
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a simulated trial."""
     parser.description = "Simulate a manoeuvre of a ship and record what its sensors measure."
     parser.epilog = EPILOG
     parser.add_argument("manoeuvre", metavar="MANOEUVRE", help="such as zigzag-20-20")
@@ -70,6 +71,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 
 def _open(arguments: argparse.Namespace) -> "SimulatedTrial":
+    """Simulate the trial; its files are checked before."""
     require_outputs(arguments.truth)
     require_distinct([arguments.output, arguments.truth], [arguments.vessel])
     require_suffix(".mcap", arguments.truth)

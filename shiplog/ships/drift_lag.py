@@ -29,7 +29,33 @@ from .slipstream import SURGE, YAW
 
 
 class DriftLag(NamedTuple):
-    """The coefficients of the equations, dimensionless."""
+    """The coefficients of the equations, dimensionless.
+
+    Attributes
+    ----------
+    a
+        Damping of the yaw acceleration.
+    b1, b2
+        The linear and the quadratic term in the yaw rate.
+    k
+        The effectiveness of the rudder.
+    m
+        The propeller's fraction of the stream in which the rudder works.
+    T3
+        The time constant of the rudder's rate.
+    f, f1, f2
+        The loss of speed by turning, by turning while drifting, and by drifting.
+    g
+        The resistance.
+    h
+        The thrust.
+    c1, c2
+        The linear and the quadratic drift in a steady turn.
+    Td
+        The time constant of the drift.
+    e0
+        The yaw moment of a single screw.
+    """
 
     a: complex
     b1: complex

@@ -26,7 +26,23 @@ from .motion import ComplexArray, Forcing, InputPath, equations, integrate, obse
 
 
 class Norrbin(NamedTuple):
-    """The coefficients of the equations, dimensionless."""
+    """The coefficients of the equations, dimensionless.
+
+    Attributes
+    ----------
+    a
+        Linear damping of the yaw rate; negative for a course-stable ship.
+    a3
+        Cubic damping of the yaw rate; zero in Nomoto's model.
+    k
+        The yaw acceleration by the rudder.
+    f
+        The loss of speed in a turn.
+    g
+        The resistance.
+    h
+        The thrust.
+    """
 
     a: complex
     a3: complex

@@ -29,7 +29,25 @@ from shiplog.types import FloatArray
 
 
 class Coefficients(NamedTuple):
-    """The model's coefficients, in the units of `COEFFICIENT_UNITS`."""
+    """The model's coefficients, in the units of `COEFFICIENT_UNITS`.
+
+    Attributes
+    ----------
+    a
+        Damping of the yaw acceleration.
+    b1, b2, b3
+        The linear, quadratic and cubic term in the yaw rate.
+    d, e
+        The effect of the rudder and of its rate.
+    f
+        The loss of speed in a turn.
+    g
+        The resistance.
+    h
+        The thrust.
+    alpha1, alpha2, alpha3
+        The rudder effectiveness by the ship's speed and by the propeller's slipstream.
+    """
 
     a: float
     b1: float
@@ -80,7 +98,20 @@ def rudder_effect(c: Coefficients, v: float, n: float) -> float:
 
 @compiled
 def rudder_effects(c: Coefficients, v: FloatArray, n: FloatArray) -> FloatArray:
-    """Compute ks over a run, (n,); NaN where the speed or the revolutions are NaN."""
+    """Compute ks over a run.
+
+    Parameters
+    ----------
+    c
+        The coefficients.
+    v, n
+        (n,) the speed ahead, m/s, and the revolutions, rpm.
+
+    Returns
+    -------
+    (n,) array
+        ks; NaN where the speed or the revolutions are NaN.
+    """
     effects = np.empty(len(v))
     for k in range(len(v)):
         effects[k] = rudder_effect(c, v[k], n[k])
@@ -98,7 +129,19 @@ def rudder_effect_rate(c: Coefficients, v: float, v_dot: float, n: float, n_dot:
 def yaw_acceleration_rate(
     c: Coefficients, w: float, w_dot: float, v: float, n: float, delta: float, delta_dot: float
 ) -> float:
-    """Compute w'' of equation (4), rad/s³."""
+    """Compute w'' of equation (4), rad/s³.
+
+    Parameters
+    ----------
+    c
+        The coefficients.
+    w, w_dot
+        The yaw rate, rad/s, and the yaw acceleration, rad/s².
+    v, n
+        The speed ahead, m/s, and the revolutions, rpm.
+    delta, delta_dot
+        The rudder, rad, and its rate, rad/s.
+    """
     hull = c.a * w_dot + c.b1 * w + c.b2 * w * abs(w) + c.b3 * w * w * w
     return hull + rudder_effect(c, v, n) * (c.d * delta + c.e * delta_dot)
 

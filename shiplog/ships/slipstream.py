@@ -31,7 +31,29 @@ from .motion import (
 
 
 class Slipstream(NamedTuple):
-    """The coefficients of the equations, dimensionless."""
+    """The coefficients of the equations, dimensionless.
+
+    Attributes
+    ----------
+    a
+        Damping of the yaw acceleration.
+    b1, b2
+        The linear and the quadratic term in the yaw rate.
+    k
+        The effectiveness of the rudder.
+    m
+        The propeller's fraction of the stream in which the rudder works.
+    T3
+        The time constant of the rudder's rate.
+    f
+        The loss of speed in a turn.
+    g
+        The resistance.
+    h
+        The thrust.
+    c1, c2
+        The linear and the quadratic drift by the yaw rate.
+    """
 
     a: complex
     b1: complex

@@ -54,7 +54,29 @@ RUDDER_ARM = 0.8  # ship lengths: effective lever of the yaw rate at the rudder,
 
 
 class ThreeDof(NamedTuple):
-    """The coefficients of the equations, dimensionless."""
+    """The coefficients of the equations, dimensionless.
+
+    Attributes
+    ----------
+    yv, yr, cy, yd
+        The side force by sway, by the yaw rate, by cross-flow drag and by the rudder.
+    nv, nr, cn, nd
+        The yaw moment by the same.
+    m
+        The propeller's fraction of the stream in which the rudder works.
+    w
+        Flow straightening: the inflow angle at the rudder by the sideways motion of the stern.
+    xvr, x4
+        The surge force by sway and turning, and by large drift.
+    g
+        The imbalance of resistance and thrust on the straight run.
+    h
+        The thrust at the speed and revolutions of the approach.
+    p
+        How the thrust grows where the ship is slower than its propeller.
+    xd
+        The drag of the rudder.
+    """
 
     yv: complex
     yr: complex
