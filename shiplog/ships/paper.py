@@ -90,7 +90,7 @@ def rudder_effect(c: Coefficients, v: float, n: float) -> float:
     Examples
     --------
     >>> from shiplog import load_vessel
-    >>> round(rudder_effect(load_vessel("table1")[0].paper, 9.0, 80.0), 4)
+    >>> round(rudder_effect(load_vessel("table1")[0].paper_coefficients, 9.0, 80.0), 4)
     0.2205
     """
     return c.alpha1 * v + c.alpha2 * n * exp(-c.alpha3 * v)
@@ -164,7 +164,7 @@ def steady_speed(c: Coefficients, n: float) -> float:
     Examples
     --------
     >>> from shiplog import load_vessel
-    >>> round(steady_speed(load_vessel("table1")[0].paper, 80.0), 2)
+    >>> round(steady_speed(load_vessel("table1")[0].paper_coefficients, 80.0), 2)
     10.33
     """
     return sqrt(c.h * n / -c.g) if c.h * n > 0 and c.g < 0 else 0.0

@@ -139,8 +139,8 @@ class Ship:
         Examples
         --------
         >>> from shiplog import load_vessel
-        >>> from shiplog.vessel.ship import ship_of
-        >>> round(ship_of(load_vessel("table1")[0]).steady_speed(80.0), 2)
+        >>> from shiplog.vessel.ship import ship_from_vessel
+        >>> round(ship_from_vessel(load_vessel("table1")[0]).steady_speed(80.0), 2)
         10.33
         """
         if isinstance(self.coefficients, Coefficients):
