@@ -267,7 +267,13 @@ def _check(arguments: argparse.Namespace) -> ExitCode:
             "references are not updated in CI; update them where someone inspects them"
         )
     require_outputs(arguments.json)
-    from analysis.check.compare import compare, comparison_json, logs_in, reference_path, update
+    from analysis.check.compare import (
+        compare,
+        comparison_json,
+        logs_in,
+        reference_path,
+        update_reference,
+    )
 
     comparisons = []
     logs = logs_in(arguments.path)
@@ -287,7 +293,7 @@ def _check(arguments: argparse.Namespace) -> ExitCode:
                 f"no reference was updated: {', '.join(unusable)} cannot be replayed"
             )
         for log, comparison in zip(logs, comparisons, strict=True):
-            update(log, comparison)
+            update_reference(log, comparison)
             print(f"updated: {reference_path(log)}", file=sys.stderr)
         return ExitCode.OK
     for comparison in comparisons:

@@ -1,8 +1,8 @@
-"""A replay against its reference: the regression check.
+"""The regression check: a replay compared with its reference, channel by channel.
 
-The reference of `zigzag.mcap` is `zigzag.ref.mcap` beside it: a log of what the replay found,
-in blocks of four seconds and in the order in which it is found, so that the first channel that
-differs is where to look. Each carries its own tolerance, in its own unit.
+The reference of `zigzag.mcap` is `zigzag.ref.mcap` beside it: a log of the replay's results, in
+blocks of four seconds and in the order in which they are computed, so that the first channel that
+differs is where to look. Each channel carries its own tolerance, in its own unit.
 """
 
 import os
@@ -24,59 +24,96 @@ NOT_LOGS = (SUFFIX, ".truth.mcap")
 
 @dataclass(frozen=True)
 class Difference:
-    """How one channel of a replay differs from its reference."""
+    """The difference between one channel of a replay and that of its reference.
+
+    Attributes
+    ----------
+    topic, unit
+        The channel and its unit.
+    tolerance
+        The largest difference allowed, in `unit`.
+    largest, rms
+        The largest difference and the root mean square of all, in `unit`.
+    first_secs
+        The time of the first difference beyond the tolerance, s since the start of the replay; None
+        where there is none.
+    mismatch
+        A difference other than of values: a missing channel, other times, other missing values.
+    """
 
     topic: str
     unit: str
     tolerance: float
     largest: float
     rms: float
-    first_secs: float | None  # where it first leaves the tolerance, since the replay's start
-    fault: str = ""  # what is wrong beyond values: missing, other times, other gaps
+    first_secs: float | None
+    mismatch: str = ""
 
     @property
     def ok(self) -> bool:
-        """Whether the channel is as it was."""
-        return not self.fault and self.first_secs is None
+        """Whether the channels agree."""
+        return not self.mismatch and self.first_secs is None
+
+    def __str__(self) -> str:
+        """The difference in words."""
+        if self.mismatch:
+            return self.mismatch
+        text = (
+            f"largest difference {self.largest:.3g}, rms {self.rms:.3g}, "
+            f"tolerance {self.tolerance:.3g} {self.unit}"
+        )
+        return text if self.first_secs is None else f"{text}; first at {self.first_secs:.1f} s"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """A replay laid beside its reference; its repr, which pytest shows, is what it says."""
+    """A replay compared with its reference; its repr, which pytest shows, is the report.
+
+    Attributes
+    ----------
+    name
+        The name of the log.
+    differences
+        One for each channel, in the order in which they are computed.
+    error
+        Why nothing was compared; empty where something was.
+    replay, reference
+        The results of the replay and the reference; None where there are none.
+    """
 
     name: str
     differences: tuple[Difference, ...]
-    problem: str = ""  # why there was nothing to compare
+    error: str = ""
     replay: TrialLog | None = None
     reference: TrialLog | None = None
 
     @property
     def ok(self) -> bool:
-        """Whether the replay is as it was."""
-        return not self.problem and all(difference.ok for difference in self.differences)
+        """Whether the replay agrees with its reference."""
+        return not self.error and all(difference.ok for difference in self.differences)
 
     @property
     def changed(self) -> tuple[Difference, ...]:
-        """The channels that differ, the first to be computed first."""
+        """The channels that differ, in the order in which they are computed."""
         return tuple(difference for difference in self.differences if not difference.ok)
 
     def __repr__(self) -> str:
-        """One line if all is well, else a line for each channel that differs."""
+        """One line where all channels agree, else a line for each that differs."""
+        if self.error:
+            return f"{self.name}: {self.error}"
         if self.ok:
-            return f"{self.name}: as it was ({len(self.differences)} channels)"
-        if self.problem:
-            return f"{self.name}: {self.problem}"
+            return f"{self.name}: agrees with its reference ({len(self.differences)} channels)"
         lines = [f"{self.name}: {len(self.changed)} of {len(self.differences)} channels differ"]
-        lines += [f"  {d.topic}: {describe(d)}" for d in self.changed]
+        lines += [f"  {difference.topic}: {difference}" for difference in self.changed]
         return "\n".join(lines)
 
 
 def comparison_json(comparison: Comparison) -> dict[str, object]:
-    """The comparison as plain values; a largest difference that is no number is None."""
+    """Return a comparison as plain values for JSON; a number that is not finite is None."""
     return {
         "log": comparison.name,
         "ok": comparison.ok,
-        "problem": comparison.problem or None,
+        "error": comparison.error or None,
         "channels": [
             {
                 "topic": d.topic,
@@ -86,30 +123,20 @@ def comparison_json(comparison: Comparison) -> dict[str, object]:
                 "largest": d.largest if isfinite(d.largest) else None,
                 "rms": d.rms if isfinite(d.rms) else None,
                 "first_secs": d.first_secs,
-                "fault": d.fault or None,
+                "mismatch": d.mismatch or None,
             }
             for d in comparison.differences
         ],
     }
 
 
-def describe(difference: Difference) -> str:
-    """A difference in words."""
-    if difference.fault:
-        return difference.fault
-    said = (
-        f"largest {difference.largest:.3g}, rms {difference.rms:.3g}, "
-        f"allowed {difference.tolerance:.3g} {difference.unit}"
-    )
-    if difference.first_secs is not None:
-        said += f"; first at {difference.first_secs:.1f} s"
-    return said
-
-
 def logs_in(path: Path) -> list[Path]:
-    """The log itself, or the logs of a folder without references and truths.
+    """Return the log itself, or the logs of a folder without references and simulated truths.
 
-    Raises `ShiplogError` where there is none, or a reference without its log.
+    Raises
+    ------
+    ShiplogError
+        Where there is no log, or a reference without its log.
     """
     if not path.exists():
         raise ShiplogError(f"no such file or folder: {path}")
@@ -117,16 +144,22 @@ def logs_in(path: Path) -> list[Path]:
         return [path]
     logs = sorted(p for p in path.glob("*.mcap") if not p.name.endswith(NOT_LOGS))
     if not logs:
-        raise ShiplogError(f"no logs (*.mcap) in the folder; name one that has some: {path}")
+        raise ShiplogError(f"no logs (*.mcap) in this folder; give one that has some: {path}")
     orphans = set(path.glob(f"*{SUFFIX}")) - {reference_path(log) for log in logs}
     if orphans:
-        names = ", ".join(sorted(ref.name for ref in orphans))
-        raise ShiplogError(f"references whose logs are gone ({names}); delete them: {path}")
+        names = ", ".join(sorted(reference.name for reference in orphans))
+        raise ShiplogError(f"references without their logs ({names}); delete them: {path}")
     return logs
 
 
 def reference_path(log: Path) -> Path:
-    """Where the reference of a log lies."""
+    """Return the path of a log's reference.
+
+    Examples
+    --------
+    >>> reference_path(Path("trials/zigzag.mcap")).as_posix()
+    'trials/zigzag.ref.mcap'
+    """
     return log.with_name(log.name.removesuffix(".mcap") + SUFFIX)
 
 
@@ -136,10 +169,24 @@ def compare(
     *,
     vessel: Vessel | None = None,
 ) -> Comparison:
-    """Replay a log and compare it with its reference, channel by channel.
+    """Replay a log and compare the results with its reference, channel by channel.
 
-    The reference is the file beside the log unless given. A log that does not replay, or has no
-    reference, is a comparison that is not `ok`; its `problem` says why.
+    A log that cannot be replayed, or has no reference, is a comparison that is not `ok`; its
+    `error` says why.
+
+    Parameters
+    ----------
+    log
+        A log or its path.
+    reference
+        Its reference or the path of it; by default the file beside the log.
+    vessel
+        The vessel of the replay; by default the one attached to the log.
+
+    Examples
+    --------
+    >>> compare("sample_data/zigzag_20_20.mcap")
+    zigzag_20_20.mcap: agrees with its reference (98 channels)
     """
     name, replay = log.name if isinstance(log, TrialLog) else Path(log).name, None
     try:
@@ -154,31 +201,32 @@ def compare(
 
 
 def _reference(where: str | os.PathLike[str] | TrialLog, *, beside: bool) -> TrialLog:
-    """The reference itself, its file, or the one beside a log; `ShiplogError` if there is none."""
+    """Return the reference given, or read its file, or the one beside a log."""
     if isinstance(where, TrialLog):
         if beside:
-            raise ShiplogError("a log that is no file needs its reference given")
+            raise ShiplogError("a log that is not a file needs its reference given")
         known = where
     else:
         path = reference_path(Path(where)) if beside else Path(where)
         if beside and not path.exists():
             raise ShiplogError(
-                f"has no reference; look at its replay, then run `shiplog check {where} --update`"
+                f"no reference; inspect its replay, then run `shiplog check {where} --update`"
             )
         known = read(path)
     if "reference_of" not in known.metadata:
-        raise ShiplogError(f"{known.name} is a log, not a reference; move it away")
+        raise ShiplogError(f"{known.name} is a log, not a reference; move it elsewhere")
     return known
 
 
-def update(log: Path, comparison: Comparison) -> None:
-    """Make a replay that was compared the reference of its log."""
+def update_reference(log: Path, comparison: Comparison) -> None:
+    """Write the results of a replay that was compared as the new reference of its log."""
     if comparison.replay is None:
-        raise ShiplogError(f"nothing to keep of {comparison.name}: {comparison.problem}")
+        raise ShiplogError(f"no results to keep of {comparison.name}: {comparison.error}")
     write(comparison.replay, reference_path(log))
 
 
 def _differences(replay: TrialLog, reference: TrialLog) -> tuple[Difference, ...]:
+    """Compare all channels: those of the replay in order, then those only in the reference."""
     now = {channel.topic: channel for channel in replay}
     before = {channel.topic: channel for channel in reference}
     start_ns, _ = reference.span_ns
@@ -189,33 +237,34 @@ def _differences(replay: TrialLog, reference: TrialLog) -> tuple[Difference, ...
 def _difference(
     topic: str, now: Mapping[str, Channel], before: Mapping[str, Channel], start_ns: int
 ) -> Difference:
+    """Compare times, then missing values, then values."""
     if topic not in before:
-        return _fault(now[topic], "is new: it is not in the reference")
+        return _mismatch(now[topic], "new: not in the reference")
     known = before[topic]
     if topic not in now:
-        return _fault(known, "is gone: it is only in the reference")
+        return _mismatch(known, "missing: only in the reference")
     new = now[topic]
     if not np.array_equal(new.measured_ns, known.measured_ns):
-        return _fault(known, f"has other times: {len(new)} against {len(known)} samples")
+        return _mismatch(known, f"other times: {len(new)} samples, {len(known)} in the reference")
     missing, was_missing = np.isnan(new.values), np.isnan(known.values)
     if not np.array_equal(missing, was_missing):
         at = (known.measured_ns[np.flatnonzero(missing != was_missing)[0]] - start_ns) * 1e-9
-        return _fault(
+        return _mismatch(
             known,
-            f"has other gaps: {missing.sum()} values missing against {was_missing.sum()}, "
+            f"other gaps: {missing.sum()} values missing, {was_missing.sum()} in the reference; "
             f"first at {at:.1f} s",
         )
     tolerance = float(known.metadata["tolerance"])
-    away = np.abs(new.values - known.values)[~missing]
-    beyond = np.flatnonzero(away > tolerance)
+    distance = np.abs(new.values - known.values)[~missing]
+    beyond = np.flatnonzero(distance > tolerance)
     first = None
     if len(beyond):
         first = float((known.measured_ns[~missing][beyond[0]] - start_ns) * 1e-9)
-    largest = float(np.max(away, initial=0.0))
-    rms = float(np.sqrt(np.mean(away**2))) if len(away) else 0.0
+    largest = float(np.max(distance, initial=0.0))
+    rms = float(np.sqrt(np.mean(distance**2))) if len(distance) else 0.0
     return Difference(topic, known.unit, tolerance, largest, rms, first)
 
 
-def _fault(channel: Channel, fault: str) -> Difference:
+def _mismatch(channel: Channel, text: str) -> Difference:
     tolerance = float(channel.metadata.get("tolerance", "nan"))
-    return Difference(channel.topic, channel.unit, tolerance, np.inf, np.inf, 0.0, fault)
+    return Difference(channel.topic, channel.unit, tolerance, np.inf, np.inf, 0.0, text)

@@ -1,4 +1,4 @@
-"""A failed check as a picture: the reference and the replay, one over the other."""
+"""A failed check in Rerun: the replay drawn over its reference."""
 
 import os
 
@@ -13,20 +13,25 @@ from shiplog.types import FloatArray, TimeArray
 
 from .compare import Comparison
 
-MOST_VIEWS = 9  # the first to differ are where to look
+MAX_VIEWS = 9  # of the first channels to differ, which are where to look
 
 
 def write_overlay(comparison: Comparison, path: str | os.PathLike[str]) -> None:
-    """Write the channels that differ to an .rrd, the reference grey, the replay red over it.
+    """Write the channels that differ to an .rrd file, the reference grey, the replay red over it.
 
-    Raises `ShiplogError` where `path` cannot be written to.
+    Raises
+    ------
+    ShiplogError
+        Where `path` cannot be written to.
     """
     with atomic_write(path) as part:
         recording = rr.RecordingStream("shiplog check", recording_id=comparison.name)
         try:
             recording.save(part, default_blueprint=_blueprint(comparison))
-        except RuntimeError as error:  # what Rerun makes of a full disk
-            raise ShiplogError(f"cannot write the overlay; is the disk full? {path}") from error
+        except RuntimeError as error:  # raised by Rerun where the disk is full
+            raise ShiplogError(
+                f"cannot write the overlay; is the disk full? {path}"
+            ) from error
         for difference in comparison.changed:
             for label, log, colour, width in (
                 ("reference", comparison.reference, (150, 150, 150), 3.0),
@@ -45,6 +50,7 @@ def write_overlay(comparison: Comparison, path: str | os.PathLike[str]) -> None:
 def _send(
     recording: rr.RecordingStream, entity: str, stamps_ns: TimeArray, values: FloatArray
 ) -> None:
+    """Send the finite values of a channel on the timeline of its times of measurement."""
     known = np.isfinite(values)
     time = rr.TimeColumn("stamp", timestamp=stamps_ns[known].astype("M8[ns]"))
     recording.send_columns(entity, [time], rr.Scalars.columns(scalars=values[known]))
@@ -57,7 +63,7 @@ def _blueprint(comparison: Comparison) -> rrb.Blueprint:
             origin=difference.topic,
             axis_x=WHOLE_RUN,
         )
-        for difference in comparison.changed[:MOST_VIEWS]
+        for difference in comparison.changed[:MAX_VIEWS]
     ]
     panel = rrb.TimePanel(state="collapsed", timeline="stamp", play_state="Paused")
     return rrb.Blueprint(rrb.Grid(*views), panel, auto_views=False, auto_layout=False)

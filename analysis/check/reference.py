@@ -1,4 +1,4 @@
-"""What a replay found, as a log: the reference of the regression check.
+"""The results of a replay as a log: the reference of the regression check.
 
 Series are means over blocks of time; each channel carries its own tolerance, in its own unit.
 """
@@ -16,21 +16,22 @@ from shiplog.ships.paper import COEFFICIENT_UNITS, PAPER_OUTPUTS
 from shiplog.types import FloatArray, TimeArray
 
 BLOCK_SECS = 4.0
+WEIGHT_PERIOD = 97  # samples, a prime: two samples of a block that change places have other weights
 
-# How far a channel may stray, as a share of its largest value when the reference was made: what
-# another processor's rounding may do to it, amplified by the condition of what is solved.
-_SHARES = {
+# The tolerance of each kind of channel, as a share of its largest value when the reference was
+# made: the rounding of another processor, amplified by the condition of what is solved.
+_TOLERANCES = {
     "measured": 1e-12,
-    "moment": 1e-12,
+    "weighted": 1e-12,
     "share": 1e-12,
     "model": 1e-12,
-    "assumed": 1e-6,
+    "noise_model": 1e-6,
     "estimate": 1e-9,
     "std": 1e-9,
     "innovation": 1e-9,
-    "verdict": 1e-6,
-    "whole": 1e-8,
-    "whole_std": 1e-7,
+    "residual_test": 1e-6,
+    "trial": 1e-8,
+    "trial_std": 1e-7,
     "history": 1e-7,
     "history_std": 1e-6,
     "track": 1e-9,
@@ -55,68 +56,86 @@ _UNITS = {
 
 
 def make_reference(analysis: Analysis) -> TrialLog:
-    """What a replay found, as a log: short blocks, in which nothing slips between."""
+    """Return the results of a replay as a log, in the order in which they are computed.
+
+    Series are means over `BLOCK_SECS`, short enough that every change shows.
+
+    Returns
+    -------
+    TrialLog
+        A channel for each result: its name is the quantity, its source the kind of result, and its
+        metadata hold the tolerance.
+    """
+    plan = analysis.findings.plan
     channels = [
         *_measured(analysis),
-        *_assumed(analysis),
-        *_estimated(analysis),
-        *_identified(analysis, analysis.findings.yaw, analysis.yaw_history),
-        *_identified(analysis, analysis.findings.surge, analysis.surge_history),
-        *_tracked(analysis),
+        *_model_and_noise(analysis),
+        *_estimates(analysis),
+        *_residual_tests(analysis),
+        *_disturbances(analysis),
+        *_coefficients(analysis, analysis.findings.yaw, analysis.yaw_history),
+        *_coefficients(analysis, analysis.findings.surge, analysis.surge_history),
+        *_track_and_warnings(analysis),
     ]
-    metadata = {
-        "reference_of": analysis.findings.plan.name,
-        "model": analysis.findings.plan.model_origin,
-    }
-    return TrialLog(analysis.findings.plan.name, tuple(channels), metadata)
+    metadata = {"reference_of": plan.name, "model": plan.model_origin}
+    return TrialLog(plan.name, tuple(channels), metadata)
 
 
 def _measured(analysis: Analysis) -> Iterator[Channel]:
-    """The mean of each block, a mean that minds the order, and the share that was measured."""
+    """For each signal: its mean, a mean that depends on the order, and the share measured."""
     for name, values in analysis.signals.values.items():
-        place = np.arange(len(values)) % 97 / 97
+        weights = np.arange(len(values)) % WEIGHT_PERIOD / WEIGHT_PERIOD
         yield _blocks(analysis, name, "measured", values)
-        yield _blocks(analysis, name, "moment", values * place)
-        yield _blocks(analysis, f"{name}_known", "share", np.isfinite(values).astype(float))
+        yield _blocks(analysis, name, "weighted", values * weights)
+        yield _blocks(analysis, f"{name}_measured", "share", np.isfinite(values).astype(float))
 
 
-def _assumed(analysis: Analysis) -> Iterator[Channel]:
-    for name, value in analysis.findings.plan.vessel.paper_coefficients._asdict().items():
+def _model_and_noise(analysis: Analysis) -> Iterator[Channel]:
+    plan = analysis.findings.plan
+    for name, value in plan.vessel.paper_coefficients._asdict().items():
         yield _single(analysis, name, "model", value)
-    noise = analysis.findings.plan.noise
+    noise = plan.noise
     for i, name in enumerate(PAPER_OUTPUTS):
-        yield _single(analysis, f"{name}_noise", "assumed", float(noise.measurement_std[i]))
-        yield _single(analysis, f"{name}_ratio", "assumed", float(noise.process_ratio[i]))
+        std, ratio = float(noise.measurement_std[i]), float(noise.process_ratio[i])
+        yield _single(analysis, f"{name}_measurement_std", "noise_model", std)
+        yield _single(analysis, f"{name}_process_ratio", "noise_model", ratio)
 
 
-def _estimated(analysis: Analysis) -> Iterator[Channel]:
-    estimates, found = analysis.estimates, analysis.disturbance
+def _estimates(analysis: Analysis) -> Iterator[Channel]:
+    estimates = analysis.estimates
     for i, name in enumerate(STATES):
         yield _blocks(analysis, name, "estimate", estimates.states[:, i])
         yield _blocks(analysis, name, "std", estimates.stds[:, i])
+
+
+def _residual_tests(analysis: Analysis) -> Iterator[Channel]:
     for i, name in enumerate(PAPER_OUTPUTS):
-        yield _blocks(analysis, name, "innovation", estimates.innovations[:, i])
-        judged = analysis.findings.residuals[i]
-        yield _single(analysis, f"{name}_rms", "verdict", judged.rms)
-        yield _single(analysis, f"{name}_squared", "verdict", judged.mean_nis)
-        yield _single(analysis, f"{name}_expected", "verdict", judged.nis_band[1])
-        yield _single(analysis, f"{name}_whiteness", "verdict", judged.whiteness_p)
-        yield _single(analysis, f"{name}_gated", "count", float(judged.gated))
-    for kind, course in analysis.findings.disturbances.items():
-        yield _blocks(analysis, f"{kind}_disturbance", "estimate", getattr(found, kind))
-        yield _single(analysis, f"{kind}_disturbance", "std", course.std)
+        yield _blocks(analysis, name, "innovation", analysis.estimates.innovations[:, i])
+        residuals = analysis.findings.residuals[i]
+        yield _single(analysis, f"{name}_rms", "residual_test", residuals.rms)
+        yield _single(analysis, f"{name}_nis", "residual_test", residuals.mean_nis)
+        yield _single(analysis, f"{name}_nis_limit", "residual_test", residuals.nis_band[1])
+        yield _single(analysis, f"{name}_whiteness", "residual_test", residuals.whiteness_p)
+        yield _single(analysis, f"{name}_rejected", "count", float(residuals.gated))
 
 
-def _identified(analysis: Analysis, found: CoefficientFit, history: History) -> Iterator[Channel]:
+def _disturbances(analysis: Analysis) -> Iterator[Channel]:
+    for kind, summary in analysis.findings.disturbances.items():
+        values = getattr(analysis.disturbance, kind)
+        yield _blocks(analysis, f"{kind}_disturbance", "estimate", values)
+        yield _single(analysis, f"{kind}_disturbance", "std", summary.std)
+
+
+def _coefficients(analysis: Analysis, fit: CoefficientFit, history: History) -> Iterator[Channel]:
     at = history.time_secs
-    for i, (name, whole) in enumerate(found.coefficients.items()):
-        yield _single(analysis, name, "whole", whole.value)
-        yield _single(analysis, name, "whole_std", whole.std)
+    for i, (name, coefficient) in enumerate(fit.coefficients.items()):
+        yield _single(analysis, name, "trial", coefficient.value)
+        yield _single(analysis, name, "trial_std", coefficient.std)
         yield _blocks(analysis, name, "history", history.values[:, i], at)
         yield _blocks(analysis, name, "history_std", history.stds[:, i], at)
 
 
-def _tracked(analysis: Analysis) -> Iterator[Channel]:
+def _track_and_warnings(analysis: Analysis) -> Iterator[Channel]:
     track = analysis.track
     yield _blocks(analysis, "north", "track", track.north, track.time_secs)
     yield _blocks(analysis, "east", "track", track.east, track.time_secs)
@@ -126,13 +145,16 @@ def _tracked(analysis: Analysis) -> Iterator[Channel]:
 def _blocks(
     analysis: Analysis, name: str, kind: str, values: FloatArray, at: FloatArray | None = None
 ) -> Channel:
-    """The means of what was there in each block of time; NaN where there was nothing."""
+    """Return the mean of the finite values in each block of time; NaN where there are none.
+
+    `at` are their times, s since the start; by default those of the signals.
+    """
     time_secs = analysis.signals.time_secs if at is None else at
     block = (np.maximum(time_secs, 0) // BLOCK_SECS).astype(np.int64)
-    there = np.isfinite(values)
+    finite = np.isfinite(values)
     size = int(np.max(block, initial=0)) + 1
-    count = np.bincount(block[there], minlength=size)
-    total = np.bincount(block[there], weights=values[there], minlength=size)
+    count = np.bincount(block[finite], minlength=size)
+    total = np.bincount(block[finite], weights=values[finite], minlength=size)
     with np.errstate(invalid="ignore"):
         means = total / count
     starts = np.round(np.arange(size) * BLOCK_SECS * 1e9).astype(np.int64)
@@ -140,12 +162,12 @@ def _blocks(
 
 
 def _single(analysis: Analysis, name: str, kind: str, value: float) -> Channel:
-    """A number that is of the whole trial."""
+    """Return a number of the whole trial as a channel of one sample."""
     return _channel(name, kind, np.array([analysis.signals.start_ns]), np.array([value]))
 
 
-def _channel(name: str, kind: str, stamps: TimeArray, values: FloatArray) -> Channel:
+def _channel(name: str, kind: str, timestamps: TimeArray, values: FloatArray) -> Channel:
     largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
-    tolerance = {"tolerance": repr(_SHARES[kind] * largest)}
+    tolerance = {"tolerance": repr(_TOLERANCES[kind] * largest)}
     unit = _UNITS.get(name, "1")
-    return Channel(name, kind, unit, stamps, stamps, values, metadata=tolerance)
+    return Channel(name, kind, unit, timestamps, timestamps, values, metadata=tolerance)

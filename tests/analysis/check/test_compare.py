@@ -12,7 +12,7 @@ from analysis.check.compare import (
     comparison_json,
     logs_in,
     reference_path,
-    update,
+    update_reference,
 )
 from analysis.check.reference import make_reference
 from analysis.replay.replay import Analysis, analyse
@@ -79,7 +79,7 @@ def test_a_millionth_of_one_identified_coefficient_turns_it_red(
         with_findings(zigzag_analysis, **{equation: replace(found, coefficients=coefficients)})
     )
     changed = [c.topic for c in moved if not _same(c.values, reference, c.topic)]
-    assert changed == [f"/{name}/whole"]
+    assert changed == [f"/{name}/trial"]
 
 
 def with_findings(analysis: Analysis, **changed: object) -> Analysis:
@@ -111,7 +111,7 @@ def test_two_samples_that_change_places_turn_their_own_channel_red_first(
             values[[1003, 1005]] = values[[1005, 1003]]
         swapped.append(replace(c, values=values))
     found = compare(replace(zigzag_log, channels=tuple(swapped)), reference)
-    assert found.changed[0].topic == "/yaw_rate/moment"
+    assert found.changed[0].topic == "/yaw_rate/weighted"
 
 
 def test_every_number_of_the_summary_is_watched(
@@ -126,17 +126,17 @@ def test_every_number_of_the_summary_is_watched(
         findings.disturbances["yaw"],
     )
     careless = {
-        "/yaw_rate_noise/assumed": with_findings(
+        "/yaw_rate_measurement_std/noise_model": with_findings(
             a,
             plan=replace(
                 findings.plan,
                 noise=replace(noise, measurement_std=noise.measurement_std * [1.01, 1]),
             ),
         ),
-        "/speed_rms/verdict": with_findings(
+        "/speed_rms/residual_test": with_findings(
             a, residuals=(findings.residuals[0], replace(judged, rms=judged.rms * 1.0001))
         ),
-        "/speed_whiteness/verdict": with_findings(
+        "/speed_whiteness/residual_test": with_findings(
             a, residuals=(findings.residuals[0], replace(judged, whiteness_p=0.5))
         ),
         "/rudder_disturbance/estimate": replace(
@@ -145,7 +145,7 @@ def test_every_number_of_the_summary_is_watched(
         "/yaw_disturbance/std": with_findings(
             a, disturbances=findings.disturbances | {"yaw": replace(yaw_summary, std=0.0)}
         ),
-        "/b1/whole_std": with_findings(
+        "/b1/trial_std": with_findings(
             a,
             yaw=replace(yaw, coefficients=yaw.coefficients | {"b1": replace(b1, std=1.1 * b1.std)}),
         ),
@@ -173,10 +173,10 @@ def test_a_channel_that_is_gone_or_new_turns_it_red(
     zigzag_log: TrialLog, reference: TrialLog
 ) -> None:
     less = replace(reference, channels=reference.channels[1:])
-    assert "is new" in str(compare(zigzag_log, less))
+    assert "new: not in the reference" in str(compare(zigzag_log, less))
     extra = replace(reference.channels[0], name="heave")
     more = replace(reference, channels=(*reference.channels, extra))
-    assert "is gone" in str(compare(zigzag_log, more))
+    assert "missing: only in the reference" in str(compare(zigzag_log, more))
 
 
 def test_a_shorter_log_turns_it_red(zigzag: SimulatedTrial, reference: TrialLog) -> None:
@@ -213,7 +213,7 @@ def test_a_missing_reference_fails_with_the_remedy(zigzag: SimulatedTrial, tmp_p
     assert not found.ok
     assert "no reference" in str(found)
     assert "--update" in str(found)
-    update(tmp_path / "z.mcap", found)
+    update_reference(tmp_path / "z.mcap", found)
     assert compare(tmp_path / "z.mcap").ok
 
 
@@ -228,8 +228,8 @@ def test_a_log_that_lost_data_is_no_success(zigzag_log: TrialLog, reference: Tri
     found = compare(damaged, reference)
     assert not found.ok
     assert "a chunk was damaged" in str(found)
-    with pytest.raises(ShiplogError, match="nothing to keep"):
-        update(Path("z.mcap"), found)
+    with pytest.raises(ShiplogError, match="no results to keep"):
+        update_reference(Path("z.mcap"), found)
 
 
 def test_a_new_warning_and_a_moved_position_turn_it_red(
@@ -261,7 +261,7 @@ def test_a_folders_logs_are_those_that_are_no_references(tmp_path: Path) -> None
 def test_a_reference_without_its_log_is_an_error(tmp_path: Path) -> None:
     for name in ("a.mcap", "a.ref.mcap", "b.ref.mcap"):
         (tmp_path / name).touch()
-    with pytest.raises(ShiplogError, match=r"logs are gone \(b\.ref\.mcap\)"):
+    with pytest.raises(ShiplogError, match=r"references without their logs \(b\.ref\.mcap\)"):
         logs_in(tmp_path)
 
 
@@ -279,7 +279,7 @@ def test_the_comparison_as_json_names_the_channel(
     )
     assert said["ok"] is False
     assert next(c["topic"] for c in said["channels"] if not c["ok"]) == topic
-    assert comparison_json(Comparison("x", (), "lost"))["problem"] == "lost"
+    assert comparison_json(Comparison("x", (), "lost"))["error"] == "lost"
 
 
 def test_analyses_of_the_same_log_are_the_same_to_the_last_bit(
