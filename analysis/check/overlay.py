@@ -29,9 +29,7 @@ def write_overlay(comparison: Comparison, path: str | os.PathLike[str]) -> None:
         try:
             recording.save(part, default_blueprint=_blueprint(comparison))
         except RuntimeError as error:  # raised by Rerun where the disk is full
-            raise ShiplogError(
-                f"cannot write the overlay; is the disk full? {path}"
-            ) from error
+            raise ShiplogError(f"cannot write the overlay; is the disk full? {path}") from error
         for difference in comparison.changed:
             for label, log, colour, width in (
                 ("reference", comparison.reference, (150, 150, 150), 3.0),
