@@ -24,7 +24,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .check.compare import Comparison, compare
-    from .identification.identify import IdentifiedShip, identify
+    from .identification.identified_ship import IdentifiedShip
+    from .identification.identify import identify
     from .replay.plan import Plan, plan_replay
     from .replay.replay import Analysis, Findings, Replay, ReplayChunk, analyse
 
@@ -32,7 +33,7 @@ _MODULES = {
     "Analysis": "replay.replay",
     "Comparison": "check.compare",
     "Findings": "replay.replay",
-    "IdentifiedShip": "identification.identify",
+    "IdentifiedShip": "identification.identified_ship",
     "Plan": "replay.plan",
     "Replay": "replay.replay",
     "ReplayChunk": "replay.replay",

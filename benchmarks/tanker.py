@@ -11,7 +11,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
-from analysis.identification.identify import IdentifiedShip, identify
+from analysis.identification.identified_ship import IdentifiedShip
+from analysis.identification.identify import identify
 from analysis.identification.prediction import zigzag_overshoots
 from analysis.identification.runs import run_from_log
 from analysis.identification.validation import Validation, validate

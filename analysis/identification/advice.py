@@ -1,4 +1,4 @@
-"""Which manoeuvres identify a parameter, and whether the ties of the paper's model hold."""
+"""Manoeuvres that identify a parameter, and the ties of the paper's model."""
 
 from dataclasses import dataclass
 

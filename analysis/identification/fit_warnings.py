@@ -1,4 +1,4 @@
-"""Warnings about a fit: large residuals, contradicting runs, other minima, divergence."""
+"""Warnings about a fit: residuals, contradicting runs, other minima."""
 
 from collections.abc import Iterator, Sequence
 

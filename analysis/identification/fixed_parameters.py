@@ -1,4 +1,4 @@
-"""Parameters that are given instead of estimated: checks, and the values for each model."""
+"""Parameters that are given, not estimated: checks, and values by model."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""Choice of a model by cross-validation: the one that best predicts runs it was not fitted to.
+"""Choice of a model by cross-validation over the runs.
 
 Each run is left out in turn and predicted by a fit to the others. A run is a manoeuvre to one side,
 so that this validates across manoeuvres and across sides. How well a model fits is no criterion:

@@ -1,4 +1,4 @@
-"""Dependence of a fit on its priors, found by a second fit from other priors and another start."""
+"""Dependence of a fit on its priors, by a second fit from other priors."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""Open-loop prediction of runs that were not fitted, and how far it is from the measurement.
+"""Open-loop prediction of runs that were not fitted, and its errors.
 
 The simulation starts in the run's initial state and is given only the recorded rudder and
 revolutions.

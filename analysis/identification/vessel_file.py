@@ -1,4 +1,4 @@
-"""Vessel file of an identified ship, for `shiplog record simulate` and `shiplog replay`.
+"""Vessel file of an identified ship, for simulation and replay.
 
 `[model]` holds the identified model, which simulations use. `[yaw]`, `[surge]` and `[rudder]` hold
 the paper's model, on which filters and observers are designed: where another model was identified,
@@ -19,7 +19,7 @@ from shiplog.vessel.vessel import Vessel
 
 from .advice import RUDDER_PARAMETERS
 from .fixed_parameters import fixed_values
-from .identify import IdentifiedShip
+from .identified_ship import IdentifiedShip
 from .output_error import USUAL_LENGTH, OutputError, output_error
 from .segment import initial_level
 from .uncertainty import ECHO, UNIDENTIFIABLE, Uncertainty, uncertainty

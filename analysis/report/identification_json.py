@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.identification.identify import IdentifiedShip
+from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
 from analysis.identification.validation import Validation
 from shiplog import __version__

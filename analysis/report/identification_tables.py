@@ -6,7 +6,7 @@ from math import isfinite
 import numpy as np
 
 from analysis.identification.comparison.history import PRIOR_OFFSET
-from analysis.identification.identify import IdentifiedShip
+from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
 from analysis.identification.validation import Validation
 from analysis.manoeuvres.manoeuvre import ManoeuvreIndex

@@ -1,4 +1,4 @@
-"""Panels of an identified ship: each run measured and simulated, and each parameter over time."""
+"""Panels of an identified ship: runs, residuals and parameter histories."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from analysis.identification.comparison.history import ParameterHistory, total_d
 from analysis.identification.comparison.paper_scheme import PAPER_METHOD
 from analysis.identification.comparison.parameter_ekf import EKF_METHOD
 from analysis.identification.comparison.windows import WINDOW_METHOD
-from analysis.identification.identify import IdentifiedShip
+from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.segment import Segment
 from analysis.identification.validation import Validation
 from shiplog.ships.motion import MODEL_OUTPUTS

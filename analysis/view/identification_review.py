@@ -1,4 +1,4 @@
-"""Rerun review of an identified ship: a tab of its parameters, and one for each run."""
+"""Rerun review of an identified ship: its parameters, and each run."""
 
 import os
 import re
@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from analysis.identification.comparison.history import total_duration_secs
-from analysis.identification.identify import IdentifiedShip
+from analysis.identification.identified_ship import IdentifiedShip
 from analysis.report.identification_tables import identification_tables
 from analysis.report.markdown import markdown_page
 

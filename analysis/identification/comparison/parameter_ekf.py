@@ -1,4 +1,4 @@
-"""Extended Kalman filter with the parameters, rudder offset and biases among its states.
+"""Extended Kalman filter with the parameters among its states.
 
 The state is augmented by the parameters, the rudder offset and the sensor biases, which are
 constant. All samples of a stride are processed in one update, linearised by the derivatives of the

@@ -1,4 +1,4 @@
-"""Sliding-window estimates over a fit's runs: the equations in integral form, without a prior."""
+"""Sliding-window estimates over a fit's runs, without a prior."""
 
 import numpy as np
 

@@ -8,7 +8,8 @@ import pytest
 from trial_logs import as_log
 
 from analysis.identification.agreement import Agreement, assess_agreement
-from analysis.identification.identify import IdentifiedShip, identify
+from analysis.identification.identified_ship import IdentifiedShip
+from analysis.identification.identify import identify
 from analysis.identification.output_error import output_error
 from analysis.identification.runs import run_from_log
 from analysis.identification.segment import Segment

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from trial_logs import as_log
 
-from analysis.identification.identify import STEPS, IdentifiedShip, _best_fit, identify
+from analysis.identification.identified_ship import IdentifiedShip
+from analysis.identification.identify import STEPS, _best_fit, identify
 from analysis.identification.model_selection import rank_models
 from analysis.identification.prediction import predict
 from analysis.identification.runs import run_from_log

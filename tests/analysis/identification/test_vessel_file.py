@@ -9,7 +9,8 @@ from model_ships import LENGTH, SHIPS, toml_of, vessel_of
 from trial_logs import as_log
 
 from analysis.identification import vessel_file
-from analysis.identification.identify import IdentifiedShip, identify
+from analysis.identification.identified_ship import IdentifiedShip
+from analysis.identification.identify import identify
 from analysis.identification.model_selection import Candidate
 from analysis.identification.output_error import fit_problem
 from analysis.identification.uncertainty import uncertainty
