@@ -606,3 +606,25 @@ def test_a_short_run_and_a_straight_one_identify_nothing(
     said = refusal(capsys, FAILURE, "identify", "straight.mcap", "-o", "v.toml")
     assert "the rudder moves by 1.0° in all" in said
     assert not Path("v.toml").exists()
+
+
+def test_a_word_that_is_no_verb_is_refused_with_the_list_of_verbs(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["inspect", "replay"])
+    assert caught.value.code == USAGE
+    assert "'record', 'info', 'convert', 'replay', 'identify', 'check'" in capsys.readouterr().err
+
+
+def test_a_replay_imports_no_library_that_it_does_not_need(recorded: Path) -> None:
+    code = (
+        "import sys\n"
+        f"sys.argv = ['shiplog', 'replay', {str(recorded)!r}, '-o', 'z.rrd', '--json', 'z.json']\n"
+        "from shiplog.cli.main import main\n"
+        "assert main() == 0\n"
+        "slow = ('pandas', 'control', 'scipy.signal', 'scipy.stats', 'scipy.optimize')\n"
+        "print([name for name in slow if sys.modules.get(name)], file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip().split("\n")[-1] == "[]"

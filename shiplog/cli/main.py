@@ -34,14 +34,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         An `ExitCode`. Errors of the input are reported in one line on stderr.
     """
+    is_process = arguments is None
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
         parser = _parser(arguments)
         parsed = parser.parse_args(arguments)
-        if "run" not in parsed:
+        if "verb" not in parsed:
             parser.print_help(sys.stderr)
             return ExitCode.USAGE
-        code: ExitCode = parsed.run(parsed)
+        verb: Verb = parsed.verb
+        if is_process:
+            _block(verb.unneeded)
+        code = verb.run(parsed)
         sys.stdout.flush()
     except UsageError as error:
         code = _fail(error, ExitCode.USAGE)
@@ -57,6 +61,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
+def _block(modules: Sequence[str]) -> None:
+    """Make an import of these modules fail, as where they are not installed."""
+    for name in modules:
+        sys.modules.setdefault(name, None)  # type: ignore[arg-type]
+
+
 def _fail(error: object, code: ExitCode) -> ExitCode:
     print(f"shiplog: {' '.join(str(error).split())}", file=sys.stderr)
     return code
@@ -65,7 +75,8 @@ def _fail(error: object, code: ExitCode) -> ExitCode:
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser: of the verb that is asked for, or, to list them, of all."""
     names = _verb_names()
-    asked = next((text for text in arguments if text in names), None)
+    first = next((text for text in arguments if not text.startswith("-")), None)
+    asked = first if first in names else None
     parser = argparse.ArgumentParser(
         prog="shiplog",
         description="Record, convert, replay, identify and check sea trials.",
@@ -84,7 +95,7 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         verb.configure(own)
-        own.set_defaults(run=verb.run)
+        own.set_defaults(verb=verb)
     return parser
 
 

@@ -34,9 +34,14 @@ class Verb:
         one line on stderr.
     examples
         Command lines for the end of the help text, one a line.
+    unneeded
+        Modules that libraries import only where they are installed, that this verb does not need
+        and whose import takes longer than its work. The process of the command does not import
+        them.
     """
 
     help: str
     configure: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace], ExitCode]
     examples: tuple[str, ...]
+    unneeded: tuple[str, ...] = ()
