@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
@@ -86,6 +85,8 @@ def _likeliest(
         surprise = np.minimum((e / s) ** 2, settings.gate**2)
         score = float(np.nansum(surprise + 2 * np.log(s)))
         return score if np.isfinite(score) else 1e300
+
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415 - it takes long to import
 
     best = minimize_scalar(
         unlikelihood,
