@@ -436,7 +436,7 @@ class TrialLog(ChannelsByName[Channel]):
         """Convert the trial to a wide data frame: one row per instant of a uniform clock.
 
         Every channel with at least two valid samples is resampled, as `resample` does it; NaN means
-        not measured. `shiplog.tables.table.to_frame` gives the long form instead, which keeps
+        not measured. `shiplog.tables.long_form.to_frame` gives the long form instead, which keeps
         every sample.
 
         Parameters

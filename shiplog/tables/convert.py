@@ -1,4 +1,4 @@
-"""One file to another, by their endings: a foreign table to a log, a log to a table."""
+"""Conversion between logs, tables and foreign tables, chosen by the endings of file names."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,67 +12,87 @@ from shiplog.mcap.reader import read
 from shiplog.mcap.writer import write
 from shiplog.types import TrialLog
 
+from .csv_form import CSV_MARK, read_csv, write_csv
 from .foreign import read_table
 from .layout import load_layout
-from .table import CSV_MARK, read_csv, read_parquet, write_csv, write_parquet
+from .parquet_form import read_parquet, write_parquet
 
 SUFFIXES = (".mcap", ".csv", ".parquet")
 
 
 def convert(source: Path, target: Path, layout: Path | None = None) -> tuple[TrialLog, list[str]]:
-    """Write what `source` holds to `target`, each in the form that its suffix says.
+    """Convert a file to another format.
 
-    A foreign table needs a layout. From MCAP to MCAP each channel is sorted by measured time.
-    Returns what was written, and warnings.
+    Parameters
+    ----------
+    source
+        A log (`.mcap`), a table that shiplog wrote (`.csv`, `.parquet`), or a foreign table.
+    target
+        File to write, in the format of its suffix: one of `SUFFIXES`. From MCAP to MCAP each
+        channel is sorted by measured time.
+    layout
+        Layout file of a foreign table.
 
-    Raises `UsageError` where the suffixes or the layout do not fit; otherwise as the reading and
-    the writing do.
+    Returns
+    -------
+    log
+        The trial written.
+    warnings
+        One line each.
+
+    Raises
+    ------
+    UsageError
+        The suffixes or the layout do not fit the files.
+    LogError, LayoutError
+        The source cannot be read.
     """
     if target.suffix.lower() not in SUFFIXES:
         raise UsageError(
             f"cannot write {target.suffix or 'a file without suffix'!r}; "
-            f"known are {', '.join(SUFFIXES)}: {target}"
+            f"possible are {', '.join(SUFFIXES)}: {target}"
         )
     if source.resolve() == target.resolve():
         raise UsageError(f"source and target are the same file; name another target: {target}")
     log = _read_any(source, layout)
     warnings = list(log.warnings)
     if source.suffix.lower() == target.suffix.lower() == ".mcap":
-        log, notes = sorted_by_time(log)
-        warnings += notes
+        log, sort_warnings = sorted_by_time(log)
+        warnings += sort_warnings
     if layout is not None:
-        contrary = rudder_sign_warning(log)
-        warnings += [contrary] if contrary else []
+        sign_warning = rudder_sign_warning(log)
+        warnings += [sign_warning] if sign_warning else []
     writers = {".mcap": write, ".csv": write_csv, ".parquet": write_parquet}
     writers[target.suffix.lower()](log, target)
     return log, warnings
 
 
 def _read_any(source: Path, layout: Path | None) -> TrialLog:
-    suffix = Path(source.name.removesuffix(".part")).suffix.lower()  # a recording not finished
-    ours = {".mcap": read, ".parquet": read_parquet}
+    """Read a source in any format."""
+    suffix = Path(source.name.removesuffix(".part")).suffix.lower()  # of an unfinished recording
+    readers = {".mcap": read, ".parquet": read_parquet}
     if layout is not None:
-        if suffix in ours or (suffix == ".csv" and _is_ours(source)):
+        if suffix in readers or (suffix == ".csv" and _is_shiplog_csv(source)):
             raise UsageError(
-                f"a layout describes foreign tables, this is a log; leave --layout out: {source}"
+                f"a layout is for foreign tables, but this is a log; omit --layout: {source}"
             )
         return read_table(source, load_layout(layout))
-    if suffix in ours:
-        return ours[suffix](source)
-    if suffix == ".csv" and (not source.is_file() or _is_ours(source)):
+    if suffix in readers:
+        return readers[suffix](source)
+    if suffix == ".csv" and (not source.is_file() or _is_shiplog_csv(source)):
         return read_csv(source)
     if not source.exists():
         raise LogError(f"no such file: {source}")
     if source.is_dir():
         raise LogError(f"a folder, not a log; name one file in it: {source}")
     raise UsageError(
-        f"a foreign table: say with --layout LAYOUT.toml what its columns are "
-        f"(without one, {', '.join(SUFFIXES)} of shiplog are read): {source}"
+        f"a foreign table; describe its columns with --layout LAYOUT.toml "
+        f"(without a layout, {', '.join(SUFFIXES)} of shiplog can be read): {source}"
     )
 
 
-def _is_ours(path: Path) -> bool:
-    """Whether a file begins as our CSV does, of whichever version."""
+def _is_shiplog_csv(path: Path) -> bool:
+    """Whether a file begins like a CSV of shiplog, of any version."""
     mark = CSV_MARK.rpartition(" ")[0].encode()
     try:
         with path.open("rb") as stream:
@@ -82,12 +102,19 @@ def _is_ours(path: Path) -> bool:
 
 
 def sorted_by_time(log: TrialLog) -> tuple[TrialLog, list[str]]:
-    """The log with each channel's samples in the order of measurement, and what that changed.
+    """Sort the samples of each channel by measured time.
 
-    A reader puts samples in the order in which they were received; so a sample that moves back
-    behind others takes the latest time at which one before it was received.
+    Readers put samples in the order of reception. So a sample that moves behind others takes the
+    latest time of reception of those before it.
+
+    Returns
+    -------
+    log
+        The sorted trial.
+    warnings
+        One line for each channel that was not in order.
     """
-    channels, notes = [], []
+    channels, warnings = [], []
     for channel in log:
         late = int(np.count_nonzero(np.diff(channel.measured_ns) < 0))
         if late:
@@ -95,9 +122,9 @@ def sorted_by_time(log: TrialLog) -> tuple[TrialLog, list[str]]:
             channel = channel.take(order)  # noqa: PLW2901 - the same channel, in order
             received_ns = np.maximum.accumulate(channel.received_ns)
             channel = replace(channel, received_ns=received_ns)  # noqa: PLW2901
-            notes.append(
+            warnings.append(
                 f"{channel.topic}: the measured times ran backwards {times_in_words(late)}; "
                 "now sorted"
             )
         channels.append(channel)
-    return replace(log, channels=tuple(channels)), notes
+    return replace(log, channels=tuple(channels)), warnings

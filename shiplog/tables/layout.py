@@ -1,4 +1,4 @@
-"""The layout file: what the columns of a foreign table are."""
+"""Layout files, which describe the columns of a foreign table."""
 
 import codecs
 import os
@@ -17,26 +17,37 @@ DELIMITERS = {"whitespace": None, ",": ",", ";": ";", "tab": "\t"}
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 VELOCITIES = ("velocity_north", "velocity_east")
+# what a column can hold, with its SI unit: the time, a channel, or an earth-fixed velocity
 ROLES = {"time": "s"} | {name: kind.unit for name, kind in CATALOGUE.items()}
 ROLES |= dict.fromkeys(VELOCITIES, "m/s")
 _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     # key of the top level: its type, and that type in words
-    "name": (str, "a text"),
-    "source": (str, "a text"),
-    "encoding": (str, "a text"),
+    "name": (str, "a string"),
+    "source": (str, "a string"),
+    "encoding": (str, "a string"),
     "skip_rows": (int, "a whole number, 0 or more"),
     "delimiter": (str, "one of " + ", ".join(map(repr, DELIMITERS))),
     "decimal_comma": (bool, "true or false"),
     "header": (bool, "true or false"),
-    "start": (datetime, "a time with its zone, as 2008-04-14T00:00:00Z"),
+    "start": (datetime, "a time with its zone, such as 2008-04-14T00:00:00Z"),
     "froude_scale": ((int, float), "a positive number"),
 }
-_REBUILDS = {"time": "uniform", "heading": "from yaw_rate"}
+_REBUILDS = {"time": "uniform", "heading": "from yaw_rate"}  # role: the only value of `rebuild`
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a table: where it stands (from 1, or its header), its unit and its sign."""
+    """One column of a table.
+
+    Attributes
+    ----------
+    place
+        Number of the column, from 1, or its name in the header.
+    unit
+        Unit of its numbers.
+    sign
+        1, or -1 where the sign is opposite to the convention of the channel.
+    """
 
     place: int | str
     unit: str
@@ -45,14 +56,39 @@ class Column:
 
 @dataclass(frozen=True)
 class Layout:
-    """What a layout file says of a table.
+    """The description of a foreign table.
 
-    `columns` has the channels' names as keys, besides "time", "velocity_north", "velocity_east"
-    and the components of the position: "north" and "east", or "latitude" and "longitude".
+    Attributes
+    ----------
+    name
+        Name of the layout; by default that of its file.
+    where
+        File of the layout, for error messages.
+    columns
+        Columns by role: the name of a channel, "time", "velocity_north", "velocity_east", or a
+        component of the position: "north" and "east", or "latitude", "longitude" and "altitude".
+    source
+        Source of the channels.
+    encoding
+        Encoding of the text.
+    skip_rows
+        Number of lines before the header or the first row.
+    delimiter
+        Key of `DELIMITERS`.
+    decimal_comma
+        Whether numbers have a decimal comma.
+    header
+        Whether the first row has the names of the columns.
+    start_ns
+        Instant of the printed time zero, ns since 1970-01-01 UTC.
+    froude_scale
+        Length of the ship over that of the model.
+    rebuild
+        Roles to be rebuilt from a coarse print: some of "time" and "heading".
     """
 
     name: str
-    where: str  # the layout's file, for errors
+    where: str
     columns: Mapping[str, Column]
     source: str = "table"
     encoding: str = "utf-8"
@@ -60,54 +96,73 @@ class Layout:
     delimiter: str = ","
     decimal_comma: bool = False
     header: bool = False
-    start_ns: int = 0  # of the printed time's zero, since 1970-01-01 UTC
-    froude_scale: float = 1.0  # ship's length over model's
-    rebuild: frozenset[str] = frozenset()  # of "time" and "heading"
+    start_ns: int = 0
+    froude_scale: float = 1.0
+    rebuild: frozenset[str] = frozenset()
 
 
 def load_layout(path: str | os.PathLike[str]) -> Layout:
-    """A layout from its TOML file.
+    """Load a layout from its TOML file.
 
-    Raises `LayoutError` with all the faults of the file at once.
+    Raises
+    ------
+    LayoutError
+        The file cannot be read or has errors; the message lists all of them.
+
+    Examples
+    --------
+    >>> layout = load_layout("sample_data/layouts/simman_marin.toml")
+    >>> layout.columns["rudder"]
+    Column(place=10, unit='deg', sign=-1)
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise LayoutError(f"no layout file: {path}") from None
+        raise LayoutError(f"no such layout file: {path}") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise LayoutError(f"cannot read the layout file ({error}): {path}") from error
+        raise LayoutError(f"cannot read the layout file ({error}); name another: {path}") from error
     return parse_layout(text, os.fspath(path))
 
 
 def parse_layout(text: str, where: str) -> Layout:
-    """A layout from the text of its file; `where` names it in errors.
+    """Parse the text of a layout file.
 
-    Raises `LayoutError` with all the faults at once.
+    Parameters
+    ----------
+    text
+        TOML; docs/tables.md describes the keys.
+    where
+        Name of the file, for messages.
+
+    Raises
+    ------
+    LayoutError
+        The text has errors; the message lists all of them.
     """
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise LayoutError(f"not a TOML file ({error}); mend that line: {where}") from error
-    faults: list[str] = []
+        raise LayoutError(f"not a TOML file ({error}); correct that line: {where}") from error
+    errors: list[str] = []
     top: dict[str, Any] = {}
     columns: dict[str, Column] = {}
-    rebuild = set()
+    rebuild: set[str] = set()
     for key, value in table.items():
         if key in _KINDS:
-            top[key] = _top_value(key, value, faults)
+            top[key] = _top_value(key, value, errors)
         elif key not in ROLES:
-            faults.append(f"unknown key {key!r}{_hint(key, (*_KINDS, *ROLES))}")
+            errors.append(f"unknown key {key!r}{_hint(key, (*_KINDS, *ROLES))}")
         elif not isinstance(value, dict):
-            faults.append(f"[{key}] must be a section")
+            errors.append(f"[{key}] must be a section")
         elif key == "position":
-            columns |= _position(value, faults)
+            columns |= _parse_position(value, errors)
         else:
-            columns |= _section(key, value, faults)
+            columns |= _parse_column(key, value, errors)
             rebuild |= {key} & {role for role in _REBUILDS if "rebuild" in value}
-    faults += _contradictions(table, top, columns)
-    if faults:
-        count = f"{len(faults)} faults" if len(faults) > 1 else "one fault"
-        raise LayoutError(f"{count} in the layout file: {'; '.join(faults)}: {where}")
+    errors += _contradictions(table, top, columns)
+    if errors:
+        count = "one error" if len(errors) == 1 else f"{len(errors)} errors"
+        raise LayoutError(f"{count} in the layout file: {'; '.join(errors)}: {where}")
     start = top.pop("start", EPOCH)
     start_ns = (start - EPOCH) // timedelta(microseconds=1) * 1000
     top = {"name": Path(where).stem} | top
@@ -116,7 +171,8 @@ def parse_layout(text: str, where: str) -> Layout:
     )
 
 
-def _top_value(key: str, value: object, faults: list[str]) -> object:
+def _top_value(key: str, value: object, errors: list[str]) -> object:
+    """Check a value of the top level."""
     kind, words = _KINDS[key]
     good = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
     if key == "skip_rows" and good:
@@ -128,102 +184,104 @@ def _top_value(key: str, value: object, faults: list[str]) -> object:
     elif key == "start" and isinstance(value, datetime):
         good = value.tzinfo is not None
     elif key == "source" and good:
-        good, words = bool(value) and "/" not in str(value), "a text without '/'"
+        good, words = bool(value) and "/" not in str(value), "a string without '/'"
     elif key == "encoding" and good:
         try:
             codecs.lookup(str(value))
         except LookupError:
             good, words = False, "an encoding such as 'utf-8' or 'cp1252'"
     if not good:
-        faults.append(f"{key} must be {words}, got {value!s}")
+        errors.append(f"{key} must be {words}, got {value!s}")
     return value
 
 
-def _section(role: str, said: Mapping[str, Any], faults: list[str]) -> dict[str, Column]:
-    """The column of one role; what is wrong with it goes to `faults`."""
-    known = ["column", "unit", *(["sign"] if role != "time" else [])]
-    known += ["rebuild"] if role in _REBUILDS else []
-    _unknown(role, said, known, faults)
-    faults += [f"[{role}] lacks {key}" for key in ("column", "unit") if key not in said]
-    if said.get("sign", 1) not in (1, -1):
-        faults.append(f"{role}.sign must be 1 or -1, got {said['sign']!r}")
-    if said.get("rebuild", wanted := _REBUILDS.get(role)) != wanted:
-        faults.append(f"{role}.rebuild must be {wanted!r}, got {said['rebuild']!r}")
-    if "unit" in said:
-        _check_unit(f"{role}.unit", said["unit"], ROLES[role], faults)
-    return _column(role, "column", said, faults)
+def _parse_column(role: str, section: Mapping[str, Any], errors: list[str]) -> dict[str, Column]:
+    """Parse the column of one role."""
+    allowed = ["column", "unit", *(["sign"] if role != "time" else [])]
+    allowed += ["rebuild"] if role in _REBUILDS else []
+    _check_keys(role, section, allowed, errors)
+    errors += [f"[{role}] lacks {key}" for key in ("column", "unit") if key not in section]
+    if section.get("sign", 1) not in (1, -1):
+        errors.append(f"{role}.sign must be 1 or -1, got {section['sign']!r}")
+    if section.get("rebuild", wanted := _REBUILDS.get(role)) != wanted:
+        errors.append(f"{role}.rebuild must be {wanted!r}, got {section['rebuild']!r}")
+    if "unit" in section:
+        _check_unit(f"{role}.unit", section["unit"], ROLES[role], errors)
+    return _column_at(role, "column", section, errors)
 
 
-def _position(said: Mapping[str, Any], faults: list[str]) -> dict[str, Column]:
-    """The two or three columns of a position: on a plane, or on the globe."""
+def _parse_position(section: Mapping[str, Any], errors: list[str]) -> dict[str, Column]:
+    """Parse the two or three columns of a position: in metres, or geographic."""
     plane, globe = ("north", "east"), GEOGRAPHIC[:2]
-    _unknown("position", said, [*plane, "unit", *GEOGRAPHIC], faults)
-    geographic = any(name in said for name in GEOGRAPHIC)
-    if geographic and any(name in said for name in plane):
-        faults.append("[position] mixes north and east with latitude and longitude")
+    _check_keys("position", section, [*plane, "unit", *GEOGRAPHIC], errors)
+    geographic = any(name in section for name in GEOGRAPHIC)
+    if geographic and any(name in section for name in plane):
+        errors.append("[position] mixes north and east with latitude and longitude")
     needed = (*globe, "unit") if geographic else (*plane, "unit")
-    faults += [f"[position] lacks {key}" for key in needed if key not in said]
-    if "unit" in said:
-        _check_unit("position.unit", said["unit"], "rad" if geographic else "m", faults)
+    errors += [f"[position] lacks {key}" for key in needed if key not in section]
+    if "unit" in section:
+        _check_unit("position.unit", section["unit"], "rad" if geographic else "m", errors)
     columns: dict[str, Column] = {}
     for name in GEOGRAPHIC if geographic else plane:
-        unit = "m" if name == "altitude" else said.get("unit")
-        columns |= _column("position", name, {**said, "unit": unit, "sign": 1}, faults)
+        unit = "m" if name == "altitude" else section.get("unit")
+        columns |= _column_at("position", name, {**section, "unit": unit, "sign": 1}, errors)
     return {place.partition(".")[2]: column for place, column in columns.items()}
 
 
-def _column(role: str, key: str, said: Mapping[str, Any], faults: list[str]) -> dict[str, Column]:
-    if key not in said:
+def _column_at(
+    role: str, key: str, section: Mapping[str, Any], errors: list[str]
+) -> dict[str, Column]:
+    if key not in section:
         return {}
-    label, place = f"{role}.{key}", said[key]
+    label, place = f"{role}.{key}", section[key]
     number = isinstance(place, int) and not isinstance(place, bool) and place >= 1
     if not number and not (isinstance(place, str) and place):
-        faults.append(f"{label} must be a number from 1 on or a header's name, got {place!r}")
+        errors.append(f"{label} must be a number from 1 or the name of a header, got {place!r}")
     name = label if role == "position" else role
-    return {name: Column(place, str(said.get("unit")), said.get("sign", 1))}
+    return {name: Column(place, str(section.get("unit")), section.get("sign", 1))}
 
 
-def _unknown(role: str, said: Iterable[str], known: list[str], faults: list[str]) -> None:
-    faults += [f"unknown key '{role}.{k}'{_hint(k, known)}" for k in said if k not in known]
+def _check_keys(role: str, section: Iterable[str], allowed: list[str], errors: list[str]) -> None:
+    errors += [f"unknown key '{role}.{k}'{_hint(k, allowed)}" for k in section if k not in allowed]
 
 
-def _check_unit(label: str, unit: object, si: str, faults: list[str]) -> None:
+def _check_unit(label: str, unit: object, si: str, errors: list[str]) -> None:
     try:
         conversion_factor(str(unit), si)
     except UsageError as error:
-        faults.append(f"{label}: {str(error).replace(';', ',')}")
+        errors.append(f"{label}: {str(error).replace(';', ',')}")
 
 
-def _hint(name: str, known: Iterable[str]) -> str:
-    return did_you_mean(name, known).replace(";", ",")
+def _hint(name: str, allowed: Iterable[str]) -> str:
+    return did_you_mean(name, allowed).replace(";", ",")
 
 
 def _contradictions(
     table: Mapping[str, Any], top: Mapping[str, Any], columns: Mapping[str, Column]
 ) -> list[str]:
-    """What is wrong with a layout as a whole, though each of its values may be right."""
-    faults = [] if "time" in table else ["[time] is missing"]
+    """Check values that are right by themselves but contradict each other."""
+    errors = [] if "time" in table else ["[time] is missing"]
     if not set(table) & (set(ROLES) - {"time"}):
-        faults.append(f"no channel is given; known are {', '.join(CATALOGUE)}".replace(";", ","))
+        errors.append(f"no channel is given; possible are {', '.join(CATALOGUE)}".replace(";", ","))
     velocities = [name for name in VELOCITIES if name in table]
     if len(velocities) == 1:
-        faults.append(f"[{velocities[0]}] is of use only with its other component")
+        errors.append(f"[{velocities[0]}] needs the other component, too")
     if velocities and "heading" not in table:
-        faults.append("earth-fixed velocities need a [heading] to be turned by")
-    faults += [f"[{n}] stands beside earth-fixed velocities, which give it; leave one out"
+        errors.append("earth-fixed velocities need a [heading], by which they are rotated")
+    errors += [f"[{n}] follows from the earth-fixed velocities; remove one of them"
                for n in ("speed", "sway") if velocities and n in table]  # fmt: skip
     heading = table.get("heading")
     if isinstance(heading, dict) and "rebuild" in heading and "yaw_rate" not in table:
-        faults.append("heading.rebuild needs a [yaw_rate]")
+        errors.append("heading.rebuild needs a [yaw_rate]")
     if top.get("decimal_comma") and top.get("delimiter", ",") == ",":
-        faults.append("decimal_comma cannot go with the delimiter ','")
+        errors.append("decimal_comma cannot be combined with the delimiter ','")
     if "latitude" in columns and "froude_scale" in top:
-        faults.append("froude_scale cannot be applied to latitude and longitude")
+        errors.append("froude_scale cannot be applied to latitude and longitude")
     taken: dict[int | str, str] = {}
     for role, column in columns.items():
         if isinstance(column.place, str) and not top.get("header"):
-            faults.append(f"{role} names the column {column.place!r}: that needs header = true")
+            errors.append(f"{role} names the column {column.place!r}, which needs header = true")
         if column.place in taken:
-            faults.append(f"{role} and {taken[column.place]} name the same column {column.place}")
+            errors.append(f"{role} and {taken[column.place]} name the same column {column.place}")
         taken[column.place] = role
-    return faults
+    return errors

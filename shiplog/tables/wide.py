@@ -1,7 +1,7 @@
 """Wide tables of a trial: one row per instant of a uniform clock, one column per quantity.
 
-The long form of `shiplog.tables.table` keeps every sample and every time stamp, for storage. The
-wide form is resampled, for analysis and plots in pandas and xarray.
+The long form of `shiplog.tables.long_form` keeps every sample and every time stamp, for storage.
+The wide form is resampled, for analysis and plots in pandas and xarray.
 """
 
 from collections.abc import Iterator

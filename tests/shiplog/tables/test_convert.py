@@ -1,4 +1,4 @@
-"""One file to another: which ways there are, and what is refused."""
+"""Conversion between files: the possible formats, and the errors."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -36,7 +36,7 @@ def test_a_foreign_table_is_converted_by_its_layout(
 
 
 @pytest.mark.parametrize("source", ["run.dat", "run.csv"])
-def test_a_foreign_table_without_layout_is_refused_with_the_option(
+def test_a_foreign_table_without_layout_is_an_error_that_names_the_option(
     foreign: tuple[Path, Path], source: str
 ) -> None:
     folder = foreign[0].parent
@@ -45,17 +45,17 @@ def test_a_foreign_table_without_layout_is_refused_with_the_option(
     assert not (folder / "a.mcap").exists()
 
 
-def test_a_layout_for_a_log_of_ours_is_refused(foreign: tuple[Path, Path]) -> None:
+def test_a_layout_for_a_log_is_an_error(foreign: tuple[Path, Path]) -> None:
     folder = foreign[0].parent
     for name in ("a.mcap", "a.csv", "a.parquet"):
         convert(foreign[0], folder / name, foreign[1])
-        with pytest.raises(UsageError, match="leave --layout out"):
+        with pytest.raises(UsageError, match="omit --layout"):
             convert(folder / name, folder / "b.mcap", foreign[1])
 
 
-def test_a_target_of_unknown_suffix_is_refused_with_the_known_ones(tmp_path: Path) -> None:
+def test_a_target_of_unknown_suffix_is_an_error_that_lists_the_others(tmp_path: Path) -> None:
     for name in ("a.xlsx", "a"):
-        with pytest.raises(UsageError, match=r"known are \.mcap, \.csv, \.parquet"):
+        with pytest.raises(UsageError, match=r"possible are \.mcap, \.csv, \.parquet"):
             convert(tmp_path / "b.mcap", tmp_path / name)
 
 
@@ -68,7 +68,7 @@ def test_source_and_target_must_differ(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["gone.mcap", "gone.csv", "gone.dat", "gone.parquet"])
-def test_a_source_that_is_not_there_is_said_so(tmp_path: Path, name: str) -> None:
+def test_a_missing_source_is_an_error(tmp_path: Path, name: str) -> None:
     with pytest.raises(LogError, match="no such file"):
         convert(tmp_path / name, tmp_path / "b.mcap")
 
@@ -88,8 +88,8 @@ def test_mcap_to_mcap_sorts_by_measured_time_and_stays_sorted_when_read(tmp_path
     assert back["rpm"].values.tolist() == [80, 81]
 
 
-def test_what_is_in_order_stays_as_it_is() -> None:
+def test_a_sorted_log_stays_unchanged() -> None:
     log = replace(trial(), channels=trial().channels[:3])
-    same, notes = sorted_by_time(log)
-    assert notes == []
+    same, warnings = sorted_by_time(log)
+    assert warnings == []
     require_same(log, same)

@@ -1,4 +1,4 @@
-"""Foreign tables: what must be read, and what must be refused and how."""
+"""Foreign tables: what is read, and the errors of a text that does not fit its layout."""
 
 from pathlib import Path
 
@@ -9,8 +9,9 @@ from places import KVLCC2, LAYOUTS
 from scipy.signal import savgol_filter
 
 from shiplog.errors import LayoutError
-from shiplog.tables.foreign import read_table, rebuilt_heading, uniform_times
+from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import Layout, load_layout
+from shiplog.tables.rebuild import rebuilt_heading, uniform_times
 from shiplog.types import TrialLog
 
 
@@ -20,9 +21,9 @@ def table(tmp_path: Path, text: str, encoding: str = "utf-8") -> Path:
     return path
 
 
-def refusal(tmp_path: Path, text: str, its: Layout | None = None) -> str:
+def error_of(tmp_path: Path, text: str, given_layout: Layout | None = None) -> str:
     with pytest.raises(LayoutError) as caught:
-        read_table(table(tmp_path, text), its or layout())
+        read_table(table(tmp_path, text), given_layout or layout())
     message = str(caught.value)
     assert "\n" not in message
     assert message.endswith(str(tmp_path / "run.txt"))
@@ -33,12 +34,12 @@ def refusal(tmp_path: Path, text: str, its: Layout | None = None) -> str:
 
 
 def test_a_table_is_read_in_si_with_its_sign_and_its_times(tmp_path: Path) -> None:
-    its = layout(
+    given_layout = layout(
         "[time]\ncolumn = 1\nunit = 'ms'\n[rudder]\ncolumn = 3\nunit = 'deg'\nsign = -1\n"
         "[speed]\ncolumn = 2\nunit = 'kn'\n",
         "source = 'bridge'\nstart = 2001-09-09T01:46:40Z",
     )
-    log = read_table(table(tmp_path, "0,10,5\n100,20,-5\n"), its)
+    log = read_table(table(tmp_path, "0,10,5\n100,20,-5\n"), given_layout)
     assert [c.topic for c in log] == ["/speed/bridge", "/rudder/bridge"]
     np.testing.assert_allclose(log["speed"].values, [18520 / 3600, 37040 / 3600])
     np.testing.assert_allclose(log["rudder"].values, np.radians([-5, 5]))
@@ -49,22 +50,24 @@ def test_a_table_is_read_in_si_with_its_sign_and_its_times(tmp_path: Path) -> No
 
 def test_columns_are_found_by_their_headers(tmp_path: Path) -> None:
     text = "[time]\ncolumn = 't [s]'\nunit = 's'\n[rpm]\ncolumn = 'shaft'\nunit = 'rpm'\n"
-    its = layout(text, "header = true\nskip_rows = 1\ndelimiter = ';'\ndecimal_comma = true")
+    given_layout = layout(
+        text, "header = true\nskip_rows = 1\ndelimiter = ';'\ndecimal_comma = true"
+    )
     path = table(tmp_path, '\ufeffFerry trials\n"shaft";note;"t [s]"\n80,5;a;0\n81,5;;0,1\n')
-    log = read_table(path, its)
+    log = read_table(path, given_layout)
     assert log["rpm"].values.tolist() == [80.5, 81.5]
     assert log["rpm"].measured_ns.tolist() == [0, 100_000_000]
 
 
-def test_a_header_that_is_not_there_is_an_error_with_the_nearest_one(tmp_path: Path) -> None:
+def test_a_missing_header_is_an_error_with_the_nearest_one(tmp_path: Path) -> None:
     text = "[time]\ncolumn = 't'\nunit = 's'\n[rpm]\ncolumn = 'shaft rpm'\nunit = 'rpm'\n"
-    said = refusal(tmp_path, "t,shaft_rpm\n0,1\n", layout(text, "header = true"))
-    assert "no column is headed 'shaft rpm'; did you mean 'shaft_rpm'?" in said
+    message = error_of(tmp_path, "t,shaft_rpm\n0,1\n", layout(text, "header = true"))
+    assert "no column is headed 'shaft rpm'; did you mean 'shaft_rpm'?" in message
 
 
 def test_a_header_given_twice_is_an_error(tmp_path: Path) -> None:
     text = "[time]\ncolumn = 't'\nunit = 's'\n[rpm]\ncolumn = 'n'\nunit = 'rpm'\n"
-    assert "more than one" in refusal(tmp_path, "t,n,n\n0,1,2\n", layout(text, "header = true"))
+    assert "more than one" in error_of(tmp_path, "t,n,n\n0,1,2\n", layout(text, "header = true"))
 
 
 @pytest.mark.parametrize(
@@ -76,69 +79,69 @@ def test_a_header_given_twice_is_an_error(tmp_path: Path) -> None:
         ("tab", "0\t1\tx\n\t\t\n1\t2\ty\n"),
     ],
 )
-def test_every_delimiter_is_read_and_blank_lines_are_passed_over(
+def test_every_delimiter_is_read_and_blank_lines_are_skipped(
     tmp_path: Path, delimiter: str, text: str
 ) -> None:
     log = read_table(table(tmp_path, text), layout(top=f"delimiter = '{delimiter}'"))
     np.testing.assert_allclose(log["yaw_rate"].values, np.radians([1, 2]))
 
 
-def test_empty_and_nan_cells_were_not_measured(tmp_path: Path) -> None:
+def test_empty_and_nan_cells_are_not_measured(tmp_path: Path) -> None:
     log = read_table(table(tmp_path, '0,\n1,nan\n2 ,NaN \n3," "\n4, 1 \n'), layout())
     assert np.isnan(log["yaw_rate"].values).tolist() == [True, True, True, True, False]
 
 
 @pytest.mark.parametrize("cell", ["n/a", "1_000", "1,5", "--", "0x10"])
-def test_a_cell_that_is_no_number_is_named_with_line_column_and_text(
+def test_a_cell_that_is_not_a_number_is_an_error_with_line_column_and_text(
     tmp_path: Path, cell: str
 ) -> None:
-    said = refusal(tmp_path, f'\n0,1\n\n1,"{cell}"\n')
-    assert f"line 4, column 2: {cell!r} is not a number" in said
+    message = error_of(tmp_path, f'\n0,1\n\n1,"{cell}"\n')
+    assert f"line 4, column 2: {cell!r} is not a number" in message
 
 
-def test_a_point_beside_a_decimal_comma_is_not_guessed_at(tmp_path: Path) -> None:
-    its = layout(top="delimiter = ';'\ndecimal_comma = true")
-    assert "'1.234'" in refusal(tmp_path, "0;1.234\n", its)
+def test_a_point_beside_a_decimal_comma_is_an_error(tmp_path: Path) -> None:
+    given_layout = layout(top="delimiter = ';'\ndecimal_comma = true")
+    assert "'1.234'" in error_of(tmp_path, "0;1.234\n", given_layout)
 
 
-def test_infinity_and_a_missing_time_are_named_with_their_line(tmp_path: Path) -> None:
-    assert "line 2 has an infinite yaw_rate" in refusal(tmp_path, "0,1\n1,-inf\n")
-    assert "line 2 has an infinite yaw_rate" in refusal(tmp_path, "0,1\n1,1e999\n")
-    assert "line 2 has no time" in refusal(tmp_path, "0,1\nnan,1\n")
-    assert "line 1 has an infinite time" in refusal(tmp_path, "inf,1\n0,1\n")
+def test_infinity_and_a_missing_time_are_errors_with_their_line(tmp_path: Path) -> None:
+    assert "line 2 has an infinite yaw_rate" in error_of(tmp_path, "0,1\n1,-inf\n")
+    assert "line 2 has an infinite yaw_rate" in error_of(tmp_path, "0,1\n1,1e999\n")
+    assert "line 2 has no time" in error_of(tmp_path, "0,1\nnan,1\n")
+    assert "line 1 has an infinite time" in error_of(tmp_path, "inf,1\n0,1\n")
 
 
-def test_times_that_run_backwards_are_named_with_line_and_remedy(tmp_path: Path) -> None:
-    said = refusal(tmp_path, "0,1\n2,1\n\n1,1\n")
-    assert "backwards at line 4" in said
-    assert "put the lines in the order of time" in said
+def test_times_that_run_backwards_are_an_error_with_line_and_remedy(tmp_path: Path) -> None:
+    message = error_of(tmp_path, "0,1\n2,1\n\n1,1\n")
+    assert "backwards at line 4" in message
+    assert "put the lines in the order of time" in message
 
 
-def test_times_outside_what_a_log_can_hold_are_refused(tmp_path: Path) -> None:
-    assert "line 1 is before 1970" in refusal(tmp_path, "-1,1\n0,1\n")
-    assert "line 2 is before 1970 or after 2262" in refusal(tmp_path, "0,1\n1e10,1\n")
+def test_times_beyond_the_range_of_a_log_are_an_error(tmp_path: Path) -> None:
+    assert "line 1 is before 1970" in error_of(tmp_path, "-1,1\n0,1\n")
+    assert "line 2 is before 1970 or after 2262" in error_of(tmp_path, "0,1\n1e10,1\n")
 
 
-def test_a_row_of_another_length_is_named_with_both_counts(tmp_path: Path) -> None:
-    assert "line 3 has 3 columns where line 1 has 2" in refusal(tmp_path, "0,1\n\n1,2,3\n")
+def test_a_row_of_another_length_is_an_error_with_both_counts(tmp_path: Path) -> None:
+    assert "line 3 has 3 columns where line 1 has 2" in error_of(tmp_path, "0,1\n\n1,2,3\n")
 
 
 def test_a_column_beyond_the_table_is_an_error(tmp_path: Path) -> None:
-    assert "line 1 has 1 columns, but yaw_rate is to be column 2" in refusal(tmp_path, "0\n1\n")
+    assert "line 1 has 1 columns, but yaw_rate should be column 2" in error_of(tmp_path, "0\n1\n")
 
 
 def test_a_table_without_rows_is_an_error(tmp_path: Path) -> None:
-    assert "no rows" in refusal(tmp_path, "")
-    assert "no rows" in refusal(tmp_path, "t,r\n", layout(top="header = true"))
+    assert "no rows" in error_of(tmp_path, "")
+    assert "no rows" in error_of(tmp_path, "t,r\n", layout(top="header = true"))
 
 
-def test_a_wrong_encoding_is_named_with_its_line_and_remedy(tmp_path: Path) -> None:
+def test_a_wrong_encoding_is_an_error_with_its_line_and_remedy(tmp_path: Path) -> None:
     path = table(tmp_path, "0,1\n1,5°\n", "cp1252")
     with pytest.raises(LayoutError, match="line 2 is not utf-8; give the encoding"):
         read_table(path, layout())
 
 
-def test_a_table_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+def test_a_missing_table_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(LayoutError, match="no such file"):
         read_table(tmp_path / "gone.txt", layout())
     with pytest.raises(LayoutError, match="cannot read"):
@@ -146,13 +149,13 @@ def test_a_table_that_is_not_there_is_an_error(tmp_path: Path) -> None:
 
 
 def test_a_model_is_scaled_to_the_ship_at_equal_froude_number(tmp_path: Path) -> None:
-    its = layout(
+    given_layout = layout(
         "[time]\ncolumn = 1\nunit = 's'\n[speed]\ncolumn = 2\nunit = 'm/s'\n"
         "[yaw_rate]\ncolumn = 3\nunit = 'rad/s'\n[rpm]\ncolumn = 4\nunit = 'rev/s'\n"
         "[rudder]\ncolumn = 5\nunit = 'rad'\n[position]\nnorth = 6\neast = 7\nunit = 'm'\n",
         "froude_scale = 25",
     )
-    log = read_table(table(tmp_path, "0,1,1,1,1,1,2\n1,1,1,1,1,1,2\n"), its)
+    log = read_table(table(tmp_path, "0,1,1,1,1,1,2\n1,1,1,1,1,1,2\n"), given_layout)
     assert log["speed"].measured_ns.tolist() == [0, 5 * 10**9]
     wanted = {"speed": 5.0, "yaw_rate": 0.2, "rpm": 12.0, "rudder": 1.0}
     assert {name: log[name].values[0] for name in wanted} == pytest.approx(wanted)
@@ -160,26 +163,26 @@ def test_a_model_is_scaled_to_the_ship_at_equal_froude_number(tmp_path: Path) ->
     assert log.metadata["froude_scale"] == "25.0"
 
 
-def test_a_position_on_the_globe_keeps_its_degrees(tmp_path: Path) -> None:
+def test_a_geographic_position_keeps_its_degrees(tmp_path: Path) -> None:
     text = "[time]\ncolumn = 1\nunit = 's'\n[position]\nlatitude = 2\nlongitude = 3\nunit = 'deg'\n"
     position = read_table(table(tmp_path, "0,59.5,24.25\n1,59.6,24.5\n"), layout(text))["position"]
     assert (position.fields, position.unit) == (("latitude", "longitude", "altitude"), "deg")
     np.testing.assert_array_equal(position.values, [[59.5, 24.25, np.nan], [59.6, 24.5, np.nan]])
 
 
-def test_earth_fixed_velocities_are_turned_into_speed_and_sway(tmp_path: Path) -> None:
-    its = layout(
+def test_earth_fixed_velocities_are_converted_to_speed_and_sway(tmp_path: Path) -> None:
+    given_layout = layout(
         "[time]\ncolumn = 1\nunit = 's'\n[heading]\ncolumn = 2\nunit = 'deg'\n"
         "[velocity_north]\ncolumn = 3\nunit = 'm/s'\n[velocity_east]\ncolumn = 4\nunit = 'm/s'\n"
     )
     # north bound and drifting east; east bound and drifting south: both to starboard
-    log = read_table(table(tmp_path, "0,0,5,1\n1,90,-1,5\n"), its)
+    log = read_table(table(tmp_path, "0,0,5,1\n1,90,-1,5\n"), given_layout)
     np.testing.assert_allclose(log["speed"].values, [5, 5])
     np.testing.assert_allclose(log["sway"].values, [1, 1])
     assert "over the ground" in log["speed"].metadata["computed_from"]
 
 
-# ---- what was printed coarsely
+# ---- values of few digits
 
 
 def three_digits(values: np.ndarray) -> np.ndarray:
@@ -201,14 +204,14 @@ def test_exact_uniform_times_stay_as_they_are() -> None:
     np.testing.assert_allclose(uniform_times(times)[0], times, atol=1e-9)
 
 
-def test_times_that_are_not_uniform_are_not_made_so(tmp_path: Path) -> None:
-    its = layout(MINIMAL.replace('unit = "s"', 'unit = "s"\nrebuild = "uniform"'))
+def test_times_that_are_not_uniform_are_an_error(tmp_path: Path) -> None:
+    given_layout = layout(MINIMAL.replace('unit = "s"', 'unit = "s"\nrebuild = "uniform"'))
     lines = [f"{i if i < 50 else i + 40},0\n" for i in range(100)]
-    assert "the times are not uniform" in refusal(tmp_path, "".join(lines), its)
-    assert "the times are not uniform" in refusal(tmp_path, "1,0\n1,0\n1,0\n", its)
+    assert "the times are not uniform" in error_of(tmp_path, "".join(lines), given_layout)
+    assert "the times are not uniform" in error_of(tmp_path, "1,0\n1,0\n1,0\n", given_layout)
 
 
-def test_a_coarse_heading_is_rebuilt_though_the_gyro_has_a_bias() -> None:
+def test_a_heading_of_few_digits_is_rebuilt_despite_a_gyro_bias() -> None:
     time_secs = np.arange(0, 900, 0.2)
     heading = np.radians(120 + 25 * np.sin(time_secs / 40) + 0.1 * time_secs)
     rate = np.radians(25 / 40 * np.cos(time_secs / 40) + 0.1) + np.radians(0.005)

@@ -1,4 +1,4 @@
-"""The layout file: what it may say, and what is refused and how."""
+"""Layout files: their values, and their errors."""
 
 from pathlib import Path
 
@@ -9,16 +9,13 @@ from shiplog.errors import LayoutError
 from shiplog.tables.layout import load_layout, parse_layout
 
 
-def faults(text: str) -> str:
+def errors_of(text: str) -> str:
     with pytest.raises(LayoutError) as caught:
         parse_layout(text, "gyro.toml")
     message = str(caught.value)
     assert "\n" not in message
     assert message.endswith(": gyro.toml")
     return message
-
-
-# ---- the layout file
 
 
 def test_a_minimal_layout_has_the_documented_defaults() -> None:
@@ -32,23 +29,23 @@ def test_the_start_is_an_instant_whatever_its_zone() -> None:
     assert layout(top="start = 1970-01-01T02:00:00.25+02:00").start_ns == 250_000_000
 
 
-def test_all_faults_of_a_layout_are_told_at_once_in_one_line() -> None:
-    said = faults(
+def test_all_errors_of_a_layout_are_reported_at_once_in_one_line() -> None:
+    message = errors_of(
         'encodng = "utf-8"\nskip_rows = -1\nstart = 2008-04-14T00:00:00\n'
         '[time]\ncolumn = 0\nunit = "sec"\n[ruder]\ncolumn = 3\n[yaw_rate]\ncolumn = 2\nsign = 2\n'
     )
-    assert said.startswith("8 faults")
+    assert message.startswith("8 errors")
     for part in (
         "unknown key 'encodng', did you mean 'encoding'?",
         "skip_rows must be",
         "start must be a time with its zone",
-        "time.column must be a number from 1 on",
+        "time.column must be a number from 1 or the name of a header",
         "time.unit: unknown unit 'sec'",
         "unknown key 'ruder', did you mean 'rudder'?",
         "[yaw_rate] lacks unit",
         "yaw_rate.sign must be 1 or -1, got 2",
     ):
-        assert part in said
+        assert part in message
 
 
 @pytest.mark.parametrize(
@@ -58,20 +55,20 @@ def test_all_faults_of_a_layout_are_told_at_once_in_one_line() -> None:
         ("[time]\ncolumn = 1\nunit = 's'", "no channel is given"),
         (f"delimiter = '|'\n{MINIMAL}", "delimiter must be one of 'whitespace'"),
         (f"encoding = 'latin-99'\n{MINIMAL}", "encoding must be"),
-        (f"source = 'a/b'\n{MINIMAL}", "source must be a text without '/'"),
+        (f"source = 'a/b'\n{MINIMAL}", "source must be a string without '/'"),
         (f"header = 1\n{MINIMAL}", "header must be true or false, got 1"),
         (f"skip_rows = true\n{MINIMAL}", "skip_rows must be"),
         (f"froude_scale = 0\n{MINIMAL}", "froude_scale must be a positive number"),
         (f"froude_scale = nan\n{MINIMAL}", "froude_scale must be a positive number"),
-        (f"decimal_comma = true\n{MINIMAL}", "decimal_comma cannot go with"),
+        (f"decimal_comma = true\n{MINIMAL}", "decimal_comma cannot be combined with"),
         (f"rudder = 3\n{MINIMAL}", "[rudder] must be a section"),
         (f"{MINIMAL}[rudder]\ncolumn = 2\nunit = 'deg'", "name the same column 2"),
-        (f"{MINIMAL}[rudder]\ncolumn = 'd'\nunit = 'deg'", "that needs header = true"),
+        (f"{MINIMAL}[rudder]\ncolumn = 'd'\nunit = 'deg'", "which needs header = true"),
         (f"{MINIMAL}[rudder]\ncolumn = true\nunit = 'deg'", "rudder.column must be a number"),
         (f"{MINIMAL}[rudder]\ncolumn = 3\nunit = 'm'", "cannot convert 'm' to 'rad'"),
         (f"{MINIMAL}[rudder]\ncolumn = 3\nunit = 'deg'\nrebuild = 'x'", "'rudder.rebuild'"),
         (f"{MINIMAL}[heading]\ncolumn = 3\nunit = 'deg'\nrebuild = 'x'", "must be 'from yaw_rate'"),
-        (f"{MINIMAL}[velocity_north]\ncolumn = 3\nunit = 'kn'", "only with its other component"),
+        (f"{MINIMAL}[velocity_north]\ncolumn = 3\nunit = 'kn'", "needs the other component"),
         (f"{MINIMAL}[position]\nnorth = 3\nunit = 'm'", "[position] lacks east"),
         (f"{MINIMAL}[position]\nnorth = 3\nlatitude = 4\nunit = 'm'", "mixes north and east"),
         (
@@ -90,18 +87,18 @@ def test_all_faults_of_a_layout_are_told_at_once_in_one_line() -> None:
                 f"{MINIMAL}[velocity_north]\ncolumn = 3\nunit = 'kn'\n"
                 "[velocity_east]\ncolumn = 4\nunit = 'kn'\n[speed]\ncolumn = 5\nunit = 'kn'"
             ),
-            "[speed] stands beside earth-fixed velocities",
+            "[speed] follows from the earth-fixed velocities",
         ),
     ],
 )
-def test_a_fault_of_a_layout_is_named(text: str, part: str) -> None:
-    assert part in faults(text)
+def test_an_error_of_a_layout_names_the_key(text: str, part: str) -> None:
+    assert part in errors_of(text)
 
 
-def test_what_is_no_toml_is_refused_with_its_line() -> None:
-    assert "line 2" in faults("header = true\n= 1")
+def test_a_text_that_is_not_toml_is_an_error_with_its_line() -> None:
+    assert "line 2" in errors_of("header = true\n= 1")
 
 
-def test_a_layout_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(LayoutError, match=r"no layout file: .*gone\.toml$"):
+def test_a_missing_layout_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(LayoutError, match=r"no such layout file: .*gone\.toml$"):
         load_layout(tmp_path / "gone.toml")

@@ -1,4 +1,4 @@
-"""Trials in frames, CSV and Parquet: nothing may be lost on the way there and back."""
+"""Trials in data frames, CSV and Parquet: nothing is lost on the way there and back."""
 
 import subprocess
 import sys
@@ -17,14 +17,9 @@ from shiplog.errors import LogError, ShiplogError
 from shiplog.mcap.reader import read
 from shiplog.mcap.writer import write
 from shiplog.tables.convert import convert
-from shiplog.tables.table import (
-    from_frame,
-    read_csv,
-    read_parquet,
-    to_frame,
-    write_csv,
-    write_parquet,
-)
+from shiplog.tables.csv_form import read_csv, write_csv
+from shiplog.tables.long_form import from_frame, to_frame
+from shiplog.tables.parquet_form import read_parquet, write_parquet
 from shiplog.types import Channel, TrialLog
 
 Write, Read = Callable[[TrialLog, Path], None], Callable[[Path], TrialLog]
@@ -50,10 +45,13 @@ def test_an_empty_trial_stays_empty(tmp_path: Path, write_form: Write, read_form
 
 
 @FORMS
-def test_what_cannot_be_written_leaves_what_stood_there(
+def test_a_failed_write_leaves_the_file_unchanged(
     tmp_path: Path, write_form: Write, read_form: Read
 ) -> None:
-    good, bad = tmp_path / "good", replace(trial(), vessel_toml="\ud800")  # no text in UTF-8
+    good, bad = (
+        tmp_path / "good",
+        replace(trial(), vessel_toml="\ud800"),
+    )  # cannot be encoded in UTF-8
     write_form(trial(), good)
     with pytest.raises(UnicodeEncodeError):
         write_form(bad, good)
@@ -142,24 +140,24 @@ def test_a_frame_may_be_cut_and_changed() -> None:
     assert [len(channel) for channel in from_frame(cut)] == [2, 2, 0, 2]
 
 
-def test_a_frame_that_lost_its_header_is_refused() -> None:
+def test_a_frame_without_its_header_is_an_error() -> None:
     frame = to_frame(trial())
     frame.attrs.clear()
     with pytest.raises(LogError, match="keep the attrs"):
         from_frame(frame)
 
 
-def test_a_frame_with_half_a_position_is_refused() -> None:
+def test_a_frame_with_half_a_position_is_an_error() -> None:
     frame = to_frame(trial())
     half = frame[~((frame["field"] == "east") & (frame["value"] > 2))]
-    with pytest.raises(LogError, match="'east' does not pair with 'north'"):
+    with pytest.raises(LogError, match="rows of its field 'east' do not match those of 'north'"):
         from_frame(half)
 
 
-# ---- the CSV itself
+# ---- CSV
 
 
-def test_a_csv_begins_with_its_mark_and_reads_with_pandas_alone(tmp_path: Path) -> None:
+def test_a_csv_begins_with_its_mark_and_can_be_read_with_pandas(tmp_path: Path) -> None:
     path, values = tmp_path / "a.csv", np.array([1 / 7, np.nan, -np.nan, -0.0, 3])
     log = replace(trial(), channels=(replace(trial().channels[3], values=values),))
     write_csv(log, path)
@@ -170,7 +168,7 @@ def test_a_csv_begins_with_its_mark_and_reads_with_pandas_alone(tmp_path: Path) 
     np.testing.assert_allclose(frame["value"], values, rtol=1e-15)
 
 
-def spoilt(tmp_path: Path, old: str, new: str) -> str:
+def damage_error(tmp_path: Path, old: str, new: str) -> str:
     path = tmp_path / "a.csv"
     write_csv(trial(), path)
     text = path.read_text(encoding="utf-8")
@@ -189,7 +187,7 @@ def spoilt(tmp_path: Path, old: str, new: str) -> str:
     [
         ("# shiplog csv 1", "# shiplog csv 2", "install a newer shiplog"),
         ("# shiplog csv 1", "t,r", "it needs a layout"),
-        ("topic,field,", "theme,field,", "line 11 should say 'topic,field,"),
+        ("topic,field,", "theme,field,", "line 11 should be 'topic,field,"),
         (
             "\n/position/gps,north,",
             "\n/position/gps,up,",
@@ -201,31 +199,31 @@ def spoilt(tmp_path: Path, old: str, new: str) -> str:
         (",1700000000000000001,", ",17000000000000000010,", "more than 64 bits"),
         (",1700000000000000001,", ",-1,", "times before 1970"),
         (",1700000000000000001,", ",1.7e18,", "line 12 cannot be read (invalid literal"),
-        ("# vessel", "# vassel", "'vassel' is not known"),
+        ("# vessel", "# vassel", "unknown key 'vassel'"),
         ('"fields": [],', '"fields": ["up"],', "no message schema has"),
         ('"unit": "rad/s", ', "", "missing 1 required"),
     ],
 )
-def test_a_spoilt_csv_is_refused_with_its_line(
+def test_a_damaged_csv_is_an_error_with_its_line(
     tmp_path: Path, old: str, new: str, part: str
 ) -> None:
-    assert part in spoilt(tmp_path, old, new)
+    assert part in damage_error(tmp_path, old, new)
 
 
-def test_a_csv_that_was_cut_is_refused(tmp_path: Path) -> None:
+def test_a_csv_that_was_cut_off_is_an_error(tmp_path: Path) -> None:
     write_csv(trial(), tmp_path / "a.csv")
     text = (tmp_path / "a.csv").read_bytes()
     for cut in (len(text) - 2, len(text) - 8, len(text) - 40):
         (tmp_path / "b.csv").write_bytes(text[:cut])
-        with pytest.raises(LogError, match=r"cut|cannot be read"):
+        with pytest.raises(LogError, match=r"cut off|cannot be read"):
             read_csv(tmp_path / "b.csv")
 
 
-def test_rows_behind_the_end_of_a_csv_are_refused(tmp_path: Path) -> None:
+def test_rows_after_the_end_of_a_csv_are_an_error(tmp_path: Path) -> None:
     write_csv(trial(), tmp_path / "a.csv")
     with (tmp_path / "a.csv").open("a") as stream:
         stream.write("/speed/log,value,1,1,2.0\n")
-    with pytest.raises(LogError, match="rows stand behind"):
+    with pytest.raises(LogError, match="rows after the last line"):
         read_csv(tmp_path / "a.csv")
 
 
@@ -237,17 +235,17 @@ def test_a_csv_saved_with_other_line_ends_still_reads(tmp_path: Path) -> None:
     require_same(log, read_csv(path))
 
 
-def test_what_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
+def test_a_missing_file_and_binary_data_are_errors(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"no such file.*gone\.csv$"):
         read_csv(tmp_path / "gone.csv")
     with pytest.raises(LogError, match="no such file"):
         read_parquet(tmp_path / "gone.parquet")
     (tmp_path / "a.csv").write_bytes(b"# shiplog csv 1\n\xff\n")
-    with pytest.raises(LogError, match="not text in UTF-8"):
+    with pytest.raises(LogError, match="not UTF-8 text"):
         read_csv(tmp_path / "a.csv")
 
 
-def test_a_parquet_file_of_others_is_refused(tmp_path: Path) -> None:
+def test_a_parquet_file_of_another_program_is_an_error(tmp_path: Path) -> None:
     pd.DataFrame({"a": [1.0]}).to_parquet(tmp_path / "a.parquet")
     with pytest.raises(LogError, match="not of shiplog"):
         read_parquet(tmp_path / "a.parquet")
@@ -256,9 +254,9 @@ def test_a_parquet_file_of_others_is_refused(tmp_path: Path) -> None:
         read_parquet(tmp_path / "b.parquet")
 
 
-def test_pandas_and_its_like_are_not_loaded_before_they_are_needed() -> None:
+def test_heavy_packages_are_imported_only_where_they_are_needed() -> None:
     code = (
-        "import sys, shiplog.tables.table, shiplog.tables.layout, shiplog.checks.data_quality; "
+        "import sys, shiplog.tables.convert, shiplog.tables.wide, shiplog.checks.data_quality; "
         "print({'pandas', 'pyarrow', 'scipy', 'numba', 'rerun', 'control'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

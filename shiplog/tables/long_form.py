@@ -1,0 +1,244 @@
+"""Long form of a trial: one row per sample and component, from which nothing is lost.
+
+What is not a number (units, sources, metadata, the vessel file, channels without samples) is in a
+header of JSON lines. A data frame carries it in its `attrs`, a CSV in comments, a Parquet file in
+the metadata of its schema.
+"""
+
+import json
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shiplog.errors import LogError
+from shiplog.mcap.schema import schema_for
+from shiplog.types import Channel, FloatArray, TimeArray, TrialLog
+from shiplog.units import did_you_mean
+
+if TYPE_CHECKING:  # slow to import: only what makes a frame waits for it
+    import pandas as pd
+
+COLUMNS = ("topic", "field", "measured_ns", "received_ns", "value")
+HEADER_KEY = "shiplog"  # of the header in a frame's attrs and in the metadata of a Parquet file
+
+Codes = NDArray[np.int32]
+Rows = NDArray[np.intp]
+
+
+def to_frame(log: TrialLog) -> "pd.DataFrame":
+    """Convert a trial to a long data frame: one row per sample and component.
+
+    The rows are in the order of the channels and of their samples. `TrialLog.to_pandas` gives the
+    wide form, one column per quantity on a uniform clock.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns topic, field, measured_ns, received_ns and value. `attrs` has the header (units,
+        metadata, the vessel), from which `from_frame` restores the whole trial.
+
+    Examples
+    --------
+    >>> import shiplog
+    >>> frame = to_frame(shiplog.read("sample_data/zigzag_20_20.mcap"))
+    >>> list(frame.columns)
+    ['topic', 'field', 'measured_ns', 'received_ns', 'value']
+    """
+    import pandas as pd  # noqa: PLC0415 - slow to import
+
+    topics, topic_codes, fields, field_codes = row_labels(log)
+    measured, received, values = long_columns(log)
+    frame = pd.DataFrame(
+        {
+            "topic": pd.Categorical.from_codes(topic_codes, pd.Index(topics, dtype=str)),
+            "field": pd.Categorical.from_codes(field_codes, pd.Index(fields, dtype=str)),
+            "measured_ns": measured,
+            "received_ns": received,
+            "value": values,
+        }
+    )
+    frame.attrs[HEADER_KEY] = header_lines(log)
+    return frame
+
+
+def from_frame(frame: "pd.DataFrame", name: str = "frame") -> TrialLog:
+    """Convert a long data frame back to a trial.
+
+    Parameters
+    ----------
+    frame
+        A frame from `to_frame`; rows may have been changed, dropped or added.
+    name
+        Name of the trial, also for error messages.
+
+    Raises
+    ------
+    LogError
+        The frame has lost its header, or has rows that belong to no channel.
+    """
+    if HEADER_KEY not in frame.attrs:
+        raise LogError(
+            f"the attrs of the frame have no {HEADER_KEY!r} with the units of the channels; "
+            f"make it with to_frame and keep the attrs: {name}"
+        )
+    columns = [frame[column].to_numpy() for column in COLUMNS]
+    return assemble(name, str(frame.attrs[HEADER_KEY]).split("\n"), *columns)
+
+
+def field_names(channel: Channel) -> tuple[str, ...]:
+    """Return the components of a channel; `value` for one value per sample."""
+    return channel.fields or ("value",)
+
+
+def long_columns(log: TrialLog) -> tuple[TimeArray, TimeArray, FloatArray]:
+    """Return measured times, received times and values, each (n,) with a row per component."""
+    none: list[Any] = [np.zeros(0, np.int64)]
+    measured = [np.repeat(c.measured_ns, len(field_names(c))) for c in log]
+    received = [np.repeat(c.received_ns, len(field_names(c))) for c in log]
+    values = [c.values.ravel() for c in log]
+    return (
+        np.concatenate(none + measured),
+        np.concatenate(none + received),
+        np.concatenate([np.zeros(0), *values]),
+    )
+
+
+def row_labels(log: TrialLog) -> tuple[list[str], Codes, list[str], Codes]:
+    """Return topics and components by name, and the index of each for every row."""
+    topics = list(dict.fromkeys(c.topic for c in log))
+    fields = list(dict.fromkeys(f for c in log for f in field_names(c)))
+    codes: list[Any] = [np.zeros(0, np.int32)]
+    topic_codes = [np.full(c.values.size, topics.index(c.topic), np.int32) for c in log]
+    field_codes = [
+        np.tile(np.array([fields.index(f) for f in field_names(c)], np.int32), len(c)) for c in log
+    ]
+    return topics, np.concatenate(codes + topic_codes), fields, np.concatenate(codes + field_codes)
+
+
+def header_lines(log: TrialLog) -> str:
+    """Return the header: JSON lines of the metadata, of each channel, and of the vessel file."""
+    lines = ["metadata " + _json(dict(log.metadata))]
+    for c in log:
+        entry = {"name": c.name, "source": c.source, "unit": c.unit, "fields": list(c.fields)}
+        lines.append("channel " + _json(entry | {"metadata": dict(c.metadata)}))
+    if log.vessel_toml is not None:
+        lines += ["vessel " + _json(line) for line in log.vessel_toml.split("\n")]
+    return "\n".join(lines)
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def assemble(
+    name: str,
+    header: list[str],
+    topics: Iterable[str],
+    fields: Iterable[str],
+    measured_ns: TimeArray,
+    received_ns: TimeArray,
+    values: FloatArray,
+) -> TrialLog:
+    """Assemble a trial from its header and its rows.
+
+    Parameters
+    ----------
+    name
+        Name of the trial, also for error messages.
+    header
+        Lines of `header_lines`.
+    topics, fields
+        Topic and component of each row.
+    measured_ns, received_ns
+        (n,) times.
+    values
+        (n,) values.
+
+    Raises
+    ------
+    LogError
+        The header cannot be read, or a row belongs to no channel of it.
+    """
+    empty, metadata, vessel_toml = _read_header(name, header)
+    place = {(c.topic, field): i for i, (c, field) in enumerate(_components(empty))}
+    labels = zip(topics, fields, strict=True)
+    of_row = np.fromiter((place.get(label, -1) for label in labels), np.int32, len(values))
+    if np.any(of_row < 0):
+        topic, field = list(zip(topics, fields, strict=True))[int(np.argmin(of_row))]
+        raise LogError(
+            f"the header has no channel {topic!r} with a field {field!r}"
+            f"{did_you_mean(topic, [t for t, _ in place])}; convert the log again: {name}"
+        )
+    rows = iter([np.flatnonzero(of_row == i) for i in range(len(_components(empty)))])
+    channels = []
+    for channel in empty:
+        its = [next(rows) for _ in field_names(channel)]
+        channels.append(_filled(name, channel, its, measured_ns, received_ns, values))
+    return TrialLog(name, tuple(channels), metadata, vessel_toml)
+
+
+def _read_header(name: str, header: list[str]) -> tuple[list[Channel], dict[str, str], str | None]:
+    """Parse the channels, without samples, the metadata and the vessel file."""
+    metadata: dict[str, str] = {}
+    channels: list[Channel] = []
+    vessel: list[str] = []
+    for line in header:
+        key, _, text = line.partition(" ")
+        try:
+            entry = json.loads(text)
+            if key == "metadata":
+                metadata |= entry
+            elif key == "channel":
+                channels.append(_empty_channel(**entry))
+            elif key == "vessel":
+                vessel.append(entry)
+            else:
+                raise ValueError(f"unknown key {key!r}")
+        except (ValueError, TypeError) as error:
+            raise LogError(
+                f"header line {line[:60]!r} cannot be read ({error}); convert the log again: {name}"
+            ) from error
+    return channels, metadata, "\n".join(vessel) if vessel else None
+
+
+def _components(channels: list[Channel]) -> list[tuple[Channel, str]]:
+    return [(channel, field) for channel in channels for field in field_names(channel)]
+
+
+def _empty_channel(
+    name: str, source: str, unit: str, fields: list[str], metadata: dict[str, str]
+) -> Channel:
+    schema_for(tuple(fields))  # raises ValueError for fields without a message schema
+    none = np.zeros(0, np.int64)
+    values = np.zeros((0, len(fields)) if fields else 0)
+    return Channel(name, source, unit, none, none, values, tuple(fields), metadata)
+
+
+def _filled(
+    name: str,
+    channel: Channel,
+    rows: list[Rows],
+    measured_ns: TimeArray,
+    received_ns: TimeArray,
+    values: FloatArray,
+) -> Channel:
+    """Fill a channel with samples; `rows` has the indices of the rows of each component."""
+    first = rows[0]
+    for field, its in zip(field_names(channel), rows, strict=True):
+        paired = len(its) == len(first) and all(
+            np.array_equal(stamps[its], stamps[first]) for stamps in (measured_ns, received_ns)
+        )
+        if not paired:
+            raise LogError(
+                f"{channel.topic}: the rows of its field {field!r} do not match those of "
+                f"{field_names(channel)[0]!r}; keep or drop all rows of an instant together: {name}"
+            )
+    stamps = measured_ns[first], received_ns[first]
+    if len(first) and min(int(s.min()) for s in stamps) < 0:
+        raise LogError(f"{channel.topic} has times before 1970; correct its clock: {name}")
+    columns = [values[its] for its in rows]
+    together = np.stack(columns, axis=1) if channel.fields else columns[0]
+    return replace(channel, measured_ns=stamps[0], received_ns=stamps[1], values=together)
