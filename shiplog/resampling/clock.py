@@ -52,8 +52,9 @@ def choose_clock(
 ) -> Clock:
     """Choose the clock for a log whose channel statistics are known.
 
-    The clock starts at a sample of the first channel, when all channels are known. It ends with
-    the commanded channels (rudder, rpm), or, if there are none, with the last of the others.
+    The clock starts at a sample of the first channel, as soon as all channels have a valid sample.
+    It ends with the commanded channels (rudder, rpm), or, if there are none, with the last of the
+    others.
 
     Parameters
     ----------
@@ -115,14 +116,14 @@ def _require_samples(log: Log, name: str, channel: ChannelStats) -> None:
 
 def _common_span(log: Log, channels: list[ChannelStats]) -> tuple[int, int]:
     """Return the start and the end of the clock as `choose_clock` defines them, ns."""
-    all_known_ns = max(channel.valid_span_ns[0] for channel in channels)
+    all_valid_ns = max(channel.valid_span_ns[0] for channel in channels)
     commanded: list[int] = []
     measured: list[int] = []
     for channel in channels:
         is_commanded = channel.name in CATALOGUE and CATALOGUE[channel.name].commanded
         (commanded if is_commanded else measured).append(channel.valid_span_ns[1])
     end = min([max(measured or commanded), *commanded])
-    start = _first_sample(log, channels[0], all_known_ns)
+    start = _first_sample(log, channels[0], all_valid_ns)
     if end <= start:
         names = ", ".join(c.name for c in channels)
         raise LogError(
@@ -132,11 +133,11 @@ def _common_span(log: Log, channels: list[ChannelStats]) -> tuple[int, int]:
 
 
 def _first_sample(log: Log, channel: ChannelStats, earliest_ns: int) -> int:
-    """Return the time of the first known sample from `earliest_ns` on; that itself if none is."""
+    """Return the time of the first valid sample from `earliest_ns` on; that itself if none is."""
     for chunk in log.chunks():
         part = channel.select(chunk)
         if part is not None:
-            known = part.measured_ns[np.isfinite(part.values)]
-            if np.any(known >= earliest_ns):
-                return int(known[known >= earliest_ns].min())
+            valid = part.measured_ns[np.isfinite(part.values)]
+            if np.any(valid >= earliest_ns):
+                return int(valid[valid >= earliest_ns].min())
     return earliest_ns

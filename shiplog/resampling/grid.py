@@ -43,8 +43,8 @@ def resample(
     Returns
     -------
     signals
-        From the first sample of the first channel at which all `channels` are known to the end of
-        the commanded ones.
+        From the first sample of the first channel after all `channels` have a valid sample to the
+        end of the commanded ones.
 
     Raises
     ------
@@ -105,12 +105,12 @@ def _resampler(channel: ChannelStats, clock: Clock) -> "_MeanResampler | _Linear
 
 
 class _ChannelResampler:
-    """The known samples of one channel that are still needed for instants to come."""
+    """The valid samples of one channel that are still needed for instants to come."""
 
     def __init__(self, channel: ChannelStats, clock: Clock) -> None:
         self._channel, self._clock = channel, clock
         self._times, self._values = np.zeros(0), np.zeros(0)  # s since the clock's start
-        self._seen = 0  # known samples so far
+        self._seen = 0  # valid samples so far
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
         """Add the channel's samples in the next chunk of the log."""
@@ -185,9 +185,9 @@ class _LinearResampler(_ChannelResampler):
         left = times[np.clip(after - 1, 0, None)]
         right = times[np.clip(after, None, len(times) - 1)]
         on_sample = np.abs(right - grid) <= INSTANT_TOLERANCE * dt
-        known = on_sample | (inside & (right - left <= self._channel.gap_threshold_secs))
+        is_valid = on_sample | (inside & (right - left <= self._channel.gap_threshold_secs))
         self._drop(max(int(after[-1]) - 1, 0))
-        return np.where(known, interpolated, np.nan)
+        return np.where(is_valid, interpolated, np.nan)
 
     def _prepared(self, values: FloatArray) -> FloatArray:
         """Unwrap angles, so that they do not jump by a full turn."""

@@ -1,0 +1,287 @@
+"""Logs: the channels of a trial, in memory or in a file."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Generic, Protocol, Self, TypeVar
+
+import numpy as np
+
+from shiplog.errors import LogError
+from shiplog.units import did_you_mean
+
+from .arrays import ReadOnlyMapping, is_sorted
+from .channel import Channel
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+CHUNK_SAMPLES = 1 << 16  # of the longest channel in a chunk of a `TrialLog`: fits the CPU cache
+
+
+class NamedChannel(Protocol):
+    """Anything about one quantity from one source: a channel, or statistics of it."""
+
+    @property
+    def name(self) -> str:
+        """The quantity."""
+
+    @property
+    def source(self) -> str:
+        """The sensor or program it comes from."""
+
+
+C_co = TypeVar("C_co", bound=NamedChannel, covariant=True)
+
+
+class ChannelsByName(Generic[C_co]):
+    """A collection of channels, or of something about each of them, indexed by name.
+
+    ``log["yaw_rate"]`` is the first source of that quantity in the file, ``log["yaw_rate/gyro"]``
+    the source named. Iteration yields the channels in the order of the file and `len` counts
+    them; ``in`` accepts a name, a name with its source, and a channel.
+
+    Attributes
+    ----------
+    name
+        The name of the log, for messages.
+    channels
+        The channels in the order of the file.
+    """
+
+    name: str
+    channels: tuple[C_co, ...]
+
+    def __getitem__(self, key: str) -> C_co:
+        """Return the channel of a name, or of a name and a source.
+
+        Raises
+        ------
+        LogError
+            There is no such channel; the message lists those that the log has.
+        """
+        found = self.get(key)
+        if found is None:
+            raise LogError(self._no_channel(key))
+        return found
+
+    def get(self, key: str) -> C_co | None:
+        """Return ``log[key]``, or None if there is no such channel."""
+        name, _, source = key.strip("/").partition("/")
+        for channel in self.channels:
+            if channel.name == name and source in ("", channel.source):
+                return channel
+        return None
+
+    def _no_channel(self, key: str) -> str:
+        name, _, source = key.strip("/").partition("/")
+        sources = [channel.source for channel in self.channels if channel.name == name]
+        if sources:
+            return f"no source {source!r} of {name!r} in {self.name}; it has {', '.join(sources)}"
+        names = sorted({channel.name for channel in self.channels})
+        return (
+            f"no channel {key!r} in {self.name}; it has {', '.join(names) or 'none'}"
+            f"{did_you_mean(key, names)}"
+        )
+
+    def __contains__(self, key: object) -> bool:
+        """Whether a name, a name with its source, or a channel is in the log."""
+        if isinstance(key, str):
+            return self.get(key) is not None
+        return any(channel is key for channel in self.channels)
+
+    def __iter__(self) -> Iterator[C_co]:
+        """Iterate over the channels in the order of the file."""
+        return iter(self.channels)
+
+    def __len__(self) -> int:
+        """Return the number of channels."""
+        return len(self.channels)
+
+
+class Log(Protocol):
+    """The interface of a log, whether it is in memory (`TrialLog`) or in its file (`LogFile`).
+
+    Of a log in its file, `warnings` and `data_lost` are complete after a first pass over `chunks`.
+    """
+
+    @property
+    def name(self) -> str:
+        """The name of the file."""
+
+    @property
+    def metadata(self) -> Mapping[str, str]:
+        """Text about the trial, by key."""
+
+    @property
+    def vessel_toml(self) -> str | None:
+        """The attached vessel file."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Problems met in reading the file."""
+
+    @property
+    def data_lost(self) -> bool:
+        """Whether a part of the file could not be read."""
+
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
+        """Iterate over the samples in chunks, each topic in the order of reception.
+
+        Each call is one pass over the log; a log allows any number of them.
+        """
+
+    def select_sources(self, sources: Mapping[str, str]) -> Self:
+        """Return the log with a single source for each of the names given.
+
+        Parameters
+        ----------
+        sources
+            The source to keep, by channel name.
+
+        Raises
+        ------
+        LogError
+            The log has no such channel.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class TrialLog(ChannelsByName[Channel]):
+    """A recorded trial in memory: its channels, each with its own times.
+
+    ``log["rudder"]`` is a channel, iteration yields the channels, `len` counts them, and ``in``
+    accepts a name, a name with its source, and a channel.
+
+    Attributes
+    ----------
+    name
+        The name of the file.
+    channels
+        The channels in the order of the file; no two have the same topic and fields.
+    metadata
+        Text about the trial, by key.
+    vessel_toml
+        The attached vessel file, or None.
+    warnings
+        Problems met in reading the file: an unfinished file, damage, topics of other programs.
+    data_lost
+        Whether a part of the file could not be read.
+
+    Examples
+    --------
+    >>> import shiplog
+    >>> log = shiplog.read("sample_data/zigzag_20_20.mcap")
+    >>> sorted(channel.name for channel in log)
+    ['heading', 'position', 'rpm', 'rudder', 'speed', 'yaw_rate']
+    >>> "rudder" in log, len(log)
+    (True, 6)
+    """
+
+    name: str
+    channels: tuple[Channel, ...]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    vessel_toml: str | None = None
+    warnings: tuple[str, ...] = ()
+    data_lost: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "metadata", ReadOnlyMapping(self.metadata))
+        topics = [channel.key for channel in self.channels]
+        if len(set(topics)) < len(topics):
+            raise ValueError(f"{self.name}: two channels of one topic; merge them: {topics}")
+
+    def select_sources(self, sources: Mapping[str, str]) -> "TrialLog":
+        """Return the log with a single source for each of the names given.
+
+        Parameters
+        ----------
+        sources
+            The source to keep, by channel name.
+
+        Raises
+        ------
+        LogError
+            The log has no such channel.
+        """
+        selected = [self[f"{name}/{source}"] for name, source in sources.items()]
+        others = [channel for channel in self.channels if channel.name not in sources]
+        return replace(self, channels=(*selected, *others))
+
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
+        """Iterate over the samples in chunks, all channels cut at the same times of reception.
+
+        A chunk has all channels; some may be empty. Its longest channel has about 65,000 samples
+        (`CHUNK_SAMPLES`). A log whose times run backwards comes in one chunk.
+        """
+        longest = max(self.channels, key=len, default=None)
+        times = (
+            [] if longest is None else longest.received_ns[CHUNK_SAMPLES::CHUNK_SAMPLES].tolist()
+        )
+        if not all(is_sorted(c.received_ns) and is_sorted(c.measured_ns) for c in self.channels):
+            times = []
+        cuts = [[0, *np.searchsorted(c.received_ns, times), len(c)] for c in self.channels]
+        for number in range(len(times) + 1):
+            yield tuple(
+                channel.part(ends[number], ends[number + 1])
+                for channel, ends in zip(self.channels, cuts, strict=True)
+            )
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """The first and the last time of measurement, ns; (0, 0) for a log without samples."""
+        times = [c.measured_ns for c in self.channels if len(c)]
+        if not times:
+            return (0, 0)
+        return min(int(t.min()) for t in times), max(int(t.max()) for t in times)
+
+    @property
+    def duration_secs(self) -> float:
+        """The time from the first measurement to the last, s."""
+        start, end = self.span_ns
+        return (end - start) * 1e-9
+
+    def to_pandas(
+        self, dt_secs: float | None = None, *, display_units: bool = False
+    ) -> "pd.DataFrame":
+        """Convert the trial to a wide data frame: one row per instant of a uniform clock.
+
+        Every channel with at least two valid samples is resampled, as `resample` does it; NaN means
+        not measured. `shiplog.tables.long_form.to_frame` gives the long form instead, which keeps
+        every sample.
+
+        Parameters
+        ----------
+        dt_secs
+            Step of the clock in s; by default the sampling interval of the fastest channel.
+        display_units
+            Use `deg`, `deg/s` and `kn` instead of SI and radians, with the unit in the name of
+            each column, such as `speed [kn]`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns by quantity, such as `yaw_rate` and `position_north`; a second source of a
+            quantity as `yaw_rate/mems`. The index has the time in UTC, `attrs["units"]` the unit
+            of each column.
+
+        Examples
+        --------
+        >>> import shiplog
+        >>> frame = shiplog.read("sample_data/zigzag_20_20.mcap").to_pandas(dt_secs=1.0)
+        >>> frame["speed"].shape
+        (601,)
+        """
+        from shiplog.tables.wide import to_wide_frame  # noqa: PLC0415 - tables imports this module
+
+        return to_wide_frame(self, dt_secs, display_units=display_units)
+
+    def to_xarray(self, dt_secs: float | None = None) -> "xr.Dataset":
+        """Convert the trial to an xarray dataset on a uniform clock, in SI units and radians.
+
+        The variables are the columns of `to_pandas`, each with its unit in `attrs["units"]`; the
+        coordinate `time` is in UTC. Needs the package xarray (`pip install 'shiplog[xarray]'`).
+        """
+        from shiplog.tables.wide import to_dataset  # noqa: PLC0415 - tables imports this module
+
+        return to_dataset(self, dt_secs)
