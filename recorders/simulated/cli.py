@@ -14,59 +14,77 @@ from shiplog.errors import UsageError
 if TYPE_CHECKING:
     from .simulate import SimulatedTrial
 
-EPILOG = """examples:
+EPILOG = """manoeuvres, all angles in degrees; -port begins to port instead of to starboard:
+  turning-circle[-ANGLE][-port]  rudder put over and held; ANGLE is 35 by default
+  zigzag-RUDDER-HEADING[-port]   rudder reversed at HEADING to either side of the approach
+  pull-out[-ANGLE][-port]        rudder over, amidships, over to the other side; ANGLE is 20
+  spiral[-port]                  rudder in steps from 15 on one side to 15 on the other and back
+  pseudo-random                  random steps of rudder and revolutions
+  paper                          the identification paper's run: from slow speed two circles
+settings of the sensors yaw_rate, speed, rudder, rpm, heading, position and sway, in SI:
+  rate_hz, jitter_secs           sampling rate, standard deviation of the sampling instants
+  delay_secs                     longest delay from measurement to reception
+  white, uniform                 standard deviation or half width of white noise
+  uniform_relative               half width of white noise as a fraction of the value
+  wave, wave_tau_secs            amplitude and tau of a slow error sin(t / tau)
+  bias                           constant error
+  spikes, spike_size             fraction of samples with a spike, its size
+  dropout, dropout_secs          fraction of samples lost, length of one loss
+  sway is measured only where a setting of it is given
+examples:
   shiplog record simulate zigzag-20-20 --seed 1 -o trial.mcap
   shiplog record simulate zigzag-20-20 --gust 2@200 --noise white -o gust.mcap
-manoeuvres:
-  turning-circle[-ANGLE][-port] (35 degrees)  zigzag-RUDDER-HEADING[-port]
-  pull-out[-ANGLE] (20)
-  spiral  pseudo-random  paper
-sensors, each setting in SI:
-  --sensor yaw_rate.bias=1e-4 --sensor speed.rate_hz=2 --sensor rudder.dropout=0.02
-  --sensor yaw_rate.spikes=0.001 --sensor yaw_rate.spike_size=0.05
-  --sensor sway.white=0.05 measures the sway as well, which a model may have
-  rate_hz, jitter_secs, delay_secs, white, uniform, uniform_relative, wave, wave_tau_secs,
-  bias, spikes (share of samples), spike_size, dropout (share of samples lost), dropout_secs"""
+  shiplog record simulate spiral --sensor yaw_rate.bias=1e-4 --sensor sway.white=0.05 -o s.mcap"""
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     """Add the options of a simulated trial."""
     parser.description = "Simulate a manoeuvre of a ship and record what its sensors measure."
     parser.epilog = EPILOG
-    parser.add_argument("manoeuvre", metavar="MANOEUVRE", help="such as zigzag-20-20")
+    parser.add_argument("manoeuvre", metavar="MANOEUVRE", help="such as zigzag-20-20; see below")
     parser.add_argument(
-        "--vessel", default="table1", help="a preset (table1, table1-rad) or a vessel.toml"
+        "--vessel",
+        default="table1",
+        help="the ship: a preset (table1, table1-rad) or a vessel file (default: table1)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, help="of the random numbers; the same seed repeats a trial"
+        "--seed", type=int, default=0, help="a number; the same seed repeats a trial (default: 0)"
     )
     parser.add_argument(
-        "--duration", type=float, default=600.0, metavar="S", help="in seconds (default: 600)"
+        "--duration",
+        type=float,
+        default=600.0,
+        metavar="S",
+        help="length in seconds (default: 600)",
     )
     parser.add_argument(
-        "--noise", default="paper", help="of the sensors: none, white, paper (default)"
+        "--noise", default="paper", help="of the sensors: none, white or paper (default: paper)"
     )
     parser.add_argument(
-        "--sensor", action="append", default=[], metavar="CHANNEL.SETTING=VALUE", help="see below"
+        "--sensor", action="append", default=[], metavar="SENSOR.SETTING=VALUE", help="see below"
     )
     parser.add_argument(
         "--gust",
         action="append",
         default=[],
         metavar="DEG@START[+LENGTH]",
-        help="a yaw moment worth DEG of rudder at the approach speed (to port: --gust=-2@100)",
+        help="a yaw moment as large as that of DEG degrees of rudder at the approach speed, from "
+        "START seconds on, for LENGTH seconds or to the end (to port: --gust=-2@100)",
     )
     parser.add_argument(
-        "--wave", metavar="DEG@PERIOD", help="a sinusoidal yaw moment worth DEG of rudder"
+        "--wave",
+        metavar="DEG@PERIOD",
+        help="a sinusoidal yaw moment with an amplitude of DEG degrees of rudder and a period in "
+        "seconds",
     )
     parser.add_argument(
         "--random-forcing",
         metavar="DEG[,MM]",
-        help="a white yaw moment and surge force: the standard deviations of their means over a "
-        "second, in degrees of rudder at the approach speed and in mm/s²",
+        help="a yaw moment and a surge force of white noise: standard deviations of their means "
+        "over one second, in degrees of rudder at the approach speed and in mm/s²",
     )
     parser.add_argument(
-        "--truth", metavar="FILE", help="write the true motion and disturbances there, at 10 Hz"
+        "--truth", metavar="FILE", help="another log, of the true motion and disturbances at 10 Hz"
     )
 
 

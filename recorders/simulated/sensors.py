@@ -129,7 +129,8 @@ def _check_known(channel: str, setting: str, sensors: Suite) -> None:
     known = sorted(field.name for field in fields(Sensor))
     if channel not in sensors:
         raise UsageError(
-            f"no sensor {channel!r}{did_you_mean(channel, sensors)}; there are {', '.join(sensors)}"
+            f"no sensor {channel!r}{did_you_mean(channel, sensors)}; "
+            f"the sensors are {', '.join(sensors)}"
         )
     if setting not in known:
         raise UsageError(

@@ -165,8 +165,8 @@ def _require_valid(
     for gust in gusts:
         if not (0 <= gust.start_secs < duration_secs and gust.duration_secs > 0):
             raise UsageError(
-                f"a gust must start within the trial and have a positive length, got a start at "
-                f"{gust.start_secs:g} s of {duration_secs:g} s and a length of "
+                "a gust must start within the trial and last longer than 0 s, got a start at "
+                f"{gust.start_secs:g} s in a trial of {duration_secs:g} s, and a length of "
                 f"{gust.duration_secs:g} s"
             )
     if random_forcing and not all(
