@@ -27,7 +27,7 @@ class Occurrences:
     first_secs
         Time of the first one, in s since the channel's first sample.
     extent
-        Size of the first one, or of the worst; the field that holds it says which, and its unit.
+        Size of the first one, or of the worst; see the field that holds it, also for the unit.
     """
 
     count: int = 0

@@ -68,8 +68,8 @@ def _csv_header(path: Path, stream: IO[str]) -> list[str]:
     """Read the header, without the comment signs; the stream is then at the first sample."""
     mark = stream.readline().rstrip("\r\n")
     if mark != CSV_MARK:
-        ours = CSV_MARK.rpartition(" ")[0]
-        remedy = "install a newer shiplog" if mark.startswith(ours) else "it needs a layout"
+        any_version = CSV_MARK.rpartition(" ")[0]
+        remedy = "install a newer shiplog" if mark.startswith(any_version) else "it needs a layout"
         raise LogError(f"the first line is not {CSV_MARK!r} but {mark[:40]!r}; {remedy}: {path}")
     header = []
     while (line := stream.readline().rstrip("\r\n")).startswith("# "):

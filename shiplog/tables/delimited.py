@@ -32,7 +32,7 @@ class CellTable:
 
 
 def read_cells(path: Path, layout: Layout) -> CellTable:
-    """Split a text into cells as its layout says; blank lines are left out.
+    """Split a text into cells as its layout describes it; blank lines are left out.
 
     Raises
     ------

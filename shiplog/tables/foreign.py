@@ -1,4 +1,4 @@
-"""Foreign tables: delimited text of other programs, read as its layout says."""
+"""Foreign tables: delimited text of other programs, read by a layout."""
 
 import os
 from math import sqrt

@@ -203,8 +203,8 @@ def _parse_column(role: str, section: Mapping[str, Any], errors: list[str]) -> d
     errors += [f"[{role}] lacks {key}" for key in ("column", "unit") if key not in section]
     if section.get("sign", 1) not in (1, -1):
         errors.append(f"{role}.sign must be 1 or -1, got {section['sign']!r}")
-    if section.get("rebuild", wanted := _REBUILDS.get(role)) != wanted:
-        errors.append(f"{role}.rebuild must be {wanted!r}, got {section['rebuild']!r}")
+    if section.get("rebuild", allowed_value := _REBUILDS.get(role)) != allowed_value:
+        errors.append(f"{role}.rebuild must be {allowed_value!r}, got {section['rebuild']!r}")
     if "unit" in section:
         _check_unit(f"{role}.unit", section["unit"], ROLES[role], errors)
     return _column_at(role, "column", section, errors)

@@ -95,13 +95,13 @@ def field_names(channel: Channel) -> tuple[str, ...]:
 
 def long_columns(log: TrialLog) -> tuple[TimeArray, TimeArray, FloatArray]:
     """Return measured times, received times and values, each (n,) with a row per component."""
-    none: list[Any] = [np.zeros(0, np.int64)]
+    empty: list[Any] = [np.zeros(0, np.int64)]
     measured = [np.repeat(c.measured_ns, len(field_names(c))) for c in log]
     received = [np.repeat(c.received_ns, len(field_names(c))) for c in log]
     values = [c.values.ravel() for c in log]
     return (
-        np.concatenate(none + measured),
-        np.concatenate(none + received),
+        np.concatenate(empty + measured),
+        np.concatenate(empty + received),
         np.concatenate([np.zeros(0), *values]),
     )
 
@@ -175,8 +175,8 @@ def assemble(
     rows = iter([np.flatnonzero(of_row == i) for i in range(len(_components(empty)))])
     channels = []
     for channel in empty:
-        its = [next(rows) for _ in field_names(channel)]
-        channels.append(_filled(name, channel, its, measured_ns, received_ns, values))
+        channel_rows = [next(rows) for _ in field_names(channel)]
+        channels.append(_filled(name, channel, channel_rows, measured_ns, received_ns, values))
     return TrialLog(name, tuple(channels), metadata, vessel_toml)
 
 
@@ -212,9 +212,9 @@ def _empty_channel(
     name: str, source: str, unit: str, fields: list[str], metadata: dict[str, str]
 ) -> Channel:
     schema_for(tuple(fields))  # raises ValueError for fields without a message schema
-    none = np.zeros(0, np.int64)
+    empty = np.zeros(0, np.int64)
     values = np.zeros((0, len(fields)) if fields else 0)
-    return Channel(name, source, unit, none, none, values, tuple(fields), metadata)
+    return Channel(name, source, unit, empty, empty, values, tuple(fields), metadata)
 
 
 def _filled(
@@ -227,9 +227,10 @@ def _filled(
 ) -> Channel:
     """Fill a channel with samples; `rows` has the indices of the rows of each component."""
     first = rows[0]
-    for field, its in zip(field_names(channel), rows, strict=True):
-        paired = len(its) == len(first) and all(
-            np.array_equal(stamps[its], stamps[first]) for stamps in (measured_ns, received_ns)
+    for field, field_rows in zip(field_names(channel), rows, strict=True):
+        paired = len(field_rows) == len(first) and all(
+            np.array_equal(stamps[field_rows], stamps[first])
+            for stamps in (measured_ns, received_ns)
         )
         if not paired:
             raise LogError(
@@ -239,6 +240,6 @@ def _filled(
     stamps = measured_ns[first], received_ns[first]
     if len(first) and min(int(s.min()) for s in stamps) < 0:
         raise LogError(f"{channel.topic} has times before 1970; correct its clock: {name}")
-    columns = [values[its] for its in rows]
+    columns = [values[field_rows] for field_rows in rows]
     together = np.stack(columns, axis=1) if channel.fields else columns[0]
     return replace(channel, measured_ns=stamps[0], received_ns=stamps[1], values=together)

@@ -1,4 +1,4 @@
-"""Faults as they happen on board, as pure functions TrialLog -> TrialLog."""
+"""Sensor faults that happen on board, as pure functions TrialLog -> TrialLog."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,54 +12,54 @@ Fault = Callable[[TrialLog], TrialLog]
 
 
 def dropout(name: str, start_secs: float, length_secs: float) -> Fault:
-    """The samples of a while are lost."""
+    """Remove the samples of an interval."""
 
     def change(channel: Channel) -> Channel:
-        at = _secs(channel)
-        return _kept(channel, (at < start_secs) | (at >= start_secs + length_secs))
+        at = _time_secs(channel)
+        return _with_rows(channel, (at < start_secs) | (at >= start_secs + length_secs))
 
-    return _to(name, change)
+    return _on_channel(name, change)
 
 
 def freeze(name: str, start_secs: float, length_secs: float) -> Fault:
-    """The sensor says the same for a while."""
+    """Repeat the first value of an interval throughout it."""
 
     def change(channel: Channel) -> Channel:
-        at, values = _secs(channel), channel.values.copy()
+        at, values = _time_secs(channel), channel.values.copy()
         stuck = (at >= start_secs) & (at < start_secs + length_secs)
         values[stuck] = values[stuck][0]
         return replace(channel, values=values)
 
-    return _to(name, change)
+    return _on_channel(name, change)
 
 
 def spike(name: str, at_secs: float, size: float) -> Fault:
-    """One sample is off."""
+    """Add an error to one sample."""
 
     def change(channel: Channel) -> Channel:
         values = channel.values.copy()
-        values[np.searchsorted(_secs(channel), at_secs)] += size
+        values[np.searchsorted(_time_secs(channel), at_secs)] += size
         return replace(channel, values=values)
 
-    return _to(name, change)
+    return _on_channel(name, change)
 
 
 def clock_jump(name: str, at_secs: float, jump_secs: float) -> Fault:
-    """The sensor's clock is set: all that follows is stamped later."""
+    """Set the sensor's clock: all later samples have a later time stamp."""
 
     def change(channel: Channel) -> Channel:
-        later = (_secs(channel) >= at_secs) * round(jump_secs * 1e9)
+        later = (_time_secs(channel) >= at_secs) * round(jump_secs * 1e9)
         return replace(channel, measured_ns=channel.measured_ns + later)
 
-    return _to(name, change)
+    return _on_channel(name, change)
 
 
 def bias(name: str, offset: float) -> Fault:
-    """The sensor is off by a constant."""
-    return _to(name, lambda channel: replace(channel, values=channel.values + offset))
+    """Add a constant error to all samples."""
+    return _on_channel(name, lambda channel: replace(channel, values=channel.values + offset))
 
 
-def _to(name: str, change: Callable[[Channel], Channel]) -> Fault:
+def _on_channel(name: str, change: Callable[[Channel], Channel]) -> Fault:
     def fault(log: TrialLog) -> TrialLog:
         changed = tuple(change(c) if c.name == name else c for c in log.channels)
         return replace(log, channels=changed)
@@ -67,11 +67,11 @@ def _to(name: str, change: Callable[[Channel], Channel]) -> Fault:
     return fault
 
 
-def _secs(channel: Channel) -> np.ndarray:
+def _time_secs(channel: Channel) -> np.ndarray:
     return (channel.measured_ns - channel.measured_ns[0]) * 1e-9
 
 
-def _kept(channel: Channel, kept: np.ndarray) -> Channel:
+def _with_rows(channel: Channel, kept: np.ndarray) -> Channel:
     return replace(
         channel,
         measured_ns=channel.measured_ns[kept],
@@ -80,7 +80,7 @@ def _kept(channel: Channel, kept: np.ndarray) -> Channel:
     )
 
 
-# each with the channel that a check must name first
+# each with the channel that the regression check must name first
 FAULTS: dict[str, tuple[Fault, str]] = {
     "dropout of the gyro": (dropout("yaw_rate", 100.0, 5.0), "/yaw_rate/measured"),
     "dropout of the log": (dropout("speed", 100.0, 5.0), "/speed/measured"),

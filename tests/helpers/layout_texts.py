@@ -1,4 +1,4 @@
-"""A minimal layout file, and layouts parsed from text."""
+"""A minimal layout file, and a function that parses layouts from text."""
 
 from shiplog.tables.layout import Layout, parse_layout
 

@@ -1,4 +1,4 @@
-"""A small log with every oddity a table must keep, and its comparison with another."""
+"""A small log with unusual values that a table must keep, and a comparison of two logs."""
 
 import numpy as np
 
@@ -18,13 +18,13 @@ unit = "deg/s"
 def trial() -> TrialLog:
     stamps = 1_700_000_000_000_000_001 + 100_000_000 * np.arange(5)
     places = np.arange(10.0).reshape(5, 2) / 3
-    none = stamps[:0]
+    empty = stamps[:0]
     return TrialLog(
         "trial.mcap",
         (
             Channel("yaw_rate", "gyro, main", "rad/s", stamps, stamps + 7, ODD, (), {"a": 'b,"\n'}),
             Channel("position", "gps", "m", stamps, stamps, places, ("north", "east")),
-            Channel("speed", "log", "m/s", none, none, none.astype(float)),
+            Channel("speed", "log", "m/s", empty, empty, empty.astype(float)),
             Channel("yaw_rate", "mems", "rad/s", stamps[::-1], stamps, np.arange(5) / 7),
         ),
         {"trial": "zig-zag 20/20 °", "format_version": "1"},

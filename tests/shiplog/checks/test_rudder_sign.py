@@ -28,8 +28,8 @@ def sailed(
     dt, heading, rate, rudder, swell = 0.1, 0.0, 0.0, 0.0, 0.0
     rates, rudders = [], []
     for step in range(int(secs / dt)):
-        wanted = steering(step * dt, heading, rate)
-        rudder += np.clip(wanted - rudder, -0.04 * dt, 0.04 * dt)
+        ordered = steering(step * dt, heading, rate)
+        rudder += np.clip(ordered - rudder, -0.04 * dt, 0.04 * dt)
         swell += dt * (-swell / 5) + waves * rng.normal(0, np.sqrt(dt))
         rate += dt * ((0.05 * rudder - rate) / 40 + swell)
         heading += dt * rate

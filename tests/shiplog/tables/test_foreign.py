@@ -157,8 +157,8 @@ def test_a_model_is_scaled_to_the_ship_at_equal_froude_number(tmp_path: Path) ->
     )
     log = read_table(table(tmp_path, "0,1,1,1,1,1,2\n1,1,1,1,1,1,2\n"), given_layout)
     assert log["speed"].measured_ns.tolist() == [0, 5 * 10**9]
-    wanted = {"speed": 5.0, "yaw_rate": 0.2, "rpm": 12.0, "rudder": 1.0}
-    assert {name: log[name].values[0] for name in wanted} == pytest.approx(wanted)
+    expected = {"speed": 5.0, "yaw_rate": 0.2, "rpm": 12.0, "rudder": 1.0}
+    assert {name: log[name].values[0] for name in expected} == pytest.approx(expected)
     assert log["position"].values.tolist() == [[25, 50], [25, 50]]
     assert log.metadata["froude_scale"] == "25.0"
 

@@ -19,10 +19,11 @@ def errors_of(text: str) -> str:
 
 
 def test_a_minimal_layout_has_the_documented_defaults() -> None:
-    its = layout()
-    assert (its.name, its.source, its.encoding, its.delimiter) == ("gyro", "table", "utf-8", ",")
-    assert (its.skip_rows, its.header, its.decimal_comma) == (0, False, False)
-    assert (its.start_ns, its.froude_scale, its.rebuild) == (0, 1.0, frozenset())
+    minimal = layout()
+    assert (minimal.name, minimal.source, minimal.encoding) == ("gyro", "table", "utf-8")
+    assert minimal.delimiter == ","
+    assert (minimal.skip_rows, minimal.header, minimal.decimal_comma) == (0, False, False)
+    assert (minimal.start_ns, minimal.froude_scale, minimal.rebuild) == (0, 1.0, frozenset())
 
 
 def test_the_start_is_an_instant_whatever_its_zone() -> None:
