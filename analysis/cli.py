@@ -210,7 +210,7 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
     require_inputs(*arguments.log, *arguments.validate)
     require_outputs(*outputs)
     from analysis.identification.identify import identify
-    from analysis.identification.runs import require_distinct as require_distinct_logs
+    from analysis.identification.runs import require_distinct_logs
     from analysis.identification.vessel_file import vessel_toml
     from analysis.report.identification_json import identification_json
     from analysis.report.identification_tables import identification_tables

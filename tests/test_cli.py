@@ -575,7 +575,7 @@ def test_the_best_model_is_chosen_on_the_command_line(
     ("code", "arguments", "said"),
     [
         (USAGE, "Z Z", "named twice"),
-        (USAGE, "Z --validate Z", "not validated on a log it has seen"),
+        (USAGE, "Z --validate Z", "both fitted and used for validation"),
         (USAGE, "Z --fix T3", "--fix takes NAME=VALUE, such as T3=0.5"),
         (USAGE, "Z --fix T4=1", "no parameter 'T4'; it has a, b1"),
         (USAGE, "Z --model burylon", "did you mean 'burylin'?"),

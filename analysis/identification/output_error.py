@@ -1,7 +1,15 @@
-"""Output error: the parameters whose simulated runs come nearest to the runs recorded.
+"""Output error: fit a model's simulated outputs to the recorded ones.
 
-All segments at once, each with its own initial state, sensor biases and rudder offset. The noise is
-found from what the fit leaves, and the fit repeated with it.
+The parameters minimise the sum of squared differences between the measured outputs and those
+simulated from the recorded rudder and revolutions, over all segments at once. Each segment has its
+own initial state, rudder offset and sensor biases. The noise is estimated from the residuals, and
+the fit repeated with it (iterative reweighting); for Gaussian noise this is the maximum likelihood
+estimate.
+
+References
+----------
+L. Ljung, "System Identification: Theory for the User", 2nd edition, 1999, section 7.
+R. V. Jategaonkar, "Flight Vehicle System Identification", 2nd edition, 2015, chapter 4.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,8 +28,8 @@ from .initial_guess import initial_guesses
 from .least_squares import Minimum, ResidualStd, minimise
 from .problem import Nuisance, Problem, residuals
 from .residual_noise import (
-    FINEST_SHARE,
-    LEAST_SHARE,
+    FINE_WHITE_SHARE,
+    MIN_WHITE_SHARE,
     OutputResiduals,
     ResidualNoise,
     fit_residual_noise,
@@ -30,28 +38,40 @@ from .residual_noise import (
 from .segment import Segment, initial_level
 from .swell import swell_frequency
 
-USUAL_LENGTH = 150.0  # m, of a ship whose length nobody gave: its scale only
-LEAST_SPEED, LEAST_RPM = 0.1, 1.0  # m/s, rpm
-UNEXPLAINED = 0.2  # of what stays off: if a wave leaves more, it was none
-ROUNDS = 3
-GIVEN_UP = 1.5  # times what an output was off: noise that lets it grow so explains it away
-MIN_STDS = {  # of what any instrument is off
+DEFAULT_LENGTH = 150.0  # m, for the scale of dimensionless models where no length is given
+MIN_SPEED, MIN_RPM = 0.1, 1.0  # m/s, rpm: initial values of a ship under way
+MAX_SLOW_SHARE = 0.2  # of the slow noise that may remain when waves are fitted
+REWEIGHTINGS = 3
+MAX_RMS_GROWTH = 1.5  # of an output's residuals in a reweighted fit
+MIN_STDS = {  # of any instrument: rad/s, m/s, m/s, rad
     "yaw_rate": radians(1e-5), "speed": 1e-4, "sway": 1e-4, "heading": radians(0.02)
 }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class OutputError:
-    """A fit."""
+    """A fitted model.
+
+    Attributes
+    ----------
+    problem
+        What was fitted to what.
+    minimum
+        The unknowns and their information.
+    noises
+        The noise of each output, in the order of ``problem.outputs``.
+    residual_stds
+        For each segment.
+    """
 
     problem: Problem
     minimum: Minimum
-    noises: tuple[ResidualNoise, ...]  # of each output
-    residual_stds: tuple[ResidualStd, ...]  # of each segment
+    noises: tuple[ResidualNoise, ...]
+    residual_stds: tuple[ResidualStd, ...]
 
     @property
     def parameters(self) -> FloatArray:
-        """(p,) all the model's parameters."""
+        """(p,) all the model's parameters, free and fixed."""
         return self.problem.parameters(self.minimum.unknowns)
 
 
@@ -68,8 +88,37 @@ def output_error(
 ) -> OutputError:
     """Fit a model to segments.
 
-    `known` parameters keep the value given, those of `free` are sought though the model takes them
-    for known; `start` is where the others begin.
+    Parameters
+    ----------
+    segments
+        One or more, of one ship.
+    model
+        One of `shiplog.ships`.
+    start
+        Initial values of free parameters, in the model's units; by default the model's own.
+    fixed
+        Parameters that keep the given value.
+    free
+        Parameters to estimate although the model holds them fixed.
+    length
+        The ship's length, m, for the scale of a dimensionless model; default `DEFAULT_LENGTH`.
+    nuisance
+        The unknowns of each segment besides its initial state; default `Nuisance()`.
+    outputs
+        The outputs to fit; default all that the model predicts and that were measured.
+
+    Returns
+    -------
+    OutputError
+        The fit, with its noise.
+
+    Raises
+    ------
+    UsageError
+        No segments, or a parameter that the model does not have.
+    LogError
+        Logs that cannot identify a model: no rudder or yaw motion, no speed, or a simulation that
+        diverges from every start.
     """
     problem = make_problem(
         segments, model, start=start, fixed=fixed, free=free, length=length,
@@ -87,7 +136,7 @@ def make_problem(
     nuisance: Nuisance | None = None,
     outputs: Sequence[str] | None = None,
 ) -> Problem:  # fmt: skip
-    """The problem of fitting a model to segments, as `output_error` has it."""
+    """Check the segments and lay out the unknowns; the parameters are those of `output_error`."""
     if not segments:
         raise UsageError("no segment to identify from; give at least one log")
     _require_steering(segments)
@@ -95,27 +144,26 @@ def make_problem(
     values = model.start_values()
     for name, value in {**(start or {}), **(fixed or {})}.items():
         values[model.names.index(model.parameter(name).name)] = value
-    sought = {model.parameter(name).name for name in free}
-    sought |= {p.name for p in model.parameters if not p.fixed}
-    sought -= set(fixed or {})
+    free_names = {model.parameter(name).name for name in free}
+    free_names |= {p.name for p in model.parameters if not p.fixed}
+    free_names -= set(fixed or {})
     speed, rpm = initial_level(segments, "speed"), initial_level(segments, "rpm")
     _require_way(segments, speed, rpm)
-    scale = model.scale(length or USUAL_LENGTH, speed, rpm)
+    scale = model.scale(length or DEFAULT_LENGTH, speed, rpm)
     used = [o for o in (outputs or model.outputs) if any(segment.has(o) for segment in segments)]
     return Problem(
         model, tuple(segments), scale, tuple(used), values,
-        tuple(i for i, name in enumerate(model.names) if name in sought),
+        tuple(i for i, name in enumerate(model.names) if name in free_names),
         Nuisance() if nuisance is None else nuisance,
     )  # fmt: skip
 
 
 def _require_steering(segments: Sequence[Segment]) -> None:
-    moved = max(float(np.ptp(segment.signals["rudder"])) for segment in segments)
-    if moved < LEAST_RUDDER:
-        names = ", ".join(segment.name for segment in segments)
+    range_rad = max(float(np.ptp(segment.signals["rudder"])) for segment in segments)
+    if range_rad < LEAST_RUDDER:
         raise LogError(
-            f"the rudder moves by {np.degrees(moved):.1f}° in all, and from that nothing can be "
-            f"identified; give a log of a zig-zag or of a turning circle: {names}"
+            f"the rudder moves by {np.degrees(range_rad):.1f}° in all, too little to identify a "
+            f"ship; give a log of a zig-zag or of a turning circle: {_names(segments)}"
         )
 
 
@@ -125,143 +173,207 @@ def _require_turning(segments: Sequence[Segment]) -> None:
         segment.has("yaw_rate") and np.nanstd(segment.measured[:, column]) > 0
         for segment in segments
     ):
-        names = ", ".join(segment.name for segment in segments)
         raise LogError(
-            f"the yaw rate never changes, and from that nothing can be identified; is the gyro "
-            f"stuck? {names}"
+            "the yaw rate never changes, so that nothing can be identified; check the gyro, "
+            f"which may be stuck: {_names(segments)}"
         )
 
 
 def _require_way(segments: Sequence[Segment], speed: float, rpm: float) -> None:
-    if not (speed > LEAST_SPEED and rpm > LEAST_RPM):
-        names = ", ".join(segment.name for segment in segments)
+    if not (speed > MIN_SPEED and rpm > MIN_RPM):
         raise LogError(
-            f"the ship begins with {speed:.2g} m/s at {rpm:.2g} rpm, and a model is of a ship "
-            f"under way; give logs that begin on a steady run: {names}"
+            f"the logs start with {speed:.2g} m/s at {rpm:.2g} rpm, but the models describe a ship "
+            f"under way; give logs that start on a steady straight run: {_names(segments)}"
         )
+
+
+def _names(segments: Sequence[Segment]) -> str:
+    return ", ".join(dict.fromkeys(segment.name for segment in segments))
 
 
 def fit_problem(
     problem: Problem, *, start: FloatArray | None = None, waves: bool = True
 ) -> OutputError:
-    """The fit, its noise found from what it leaves; `start` is another beginning of the search."""
+    """Fit a problem and estimate its noise.
+
+    Parameters
+    ----------
+    problem
+        As of `make_problem`.
+    start
+        (m,) unknowns to start from instead of `initial_guesses`.
+    waves
+        Whether to look for a swell in the residuals and, if it explains them, to fit it too.
+
+    Returns
+    -------
+    OutputError
+        The fit.
+
+    Raises
+    ------
+    LogError
+        The simulation diverges from every start.
+    """
     residual_stds = initial_residual_stds(problem)
-    tried = []
+    minima = []
     for begin in [start] if start is not None else initial_guesses(problem, residual_stds):
-        tried.append(minimise(problem, begin, residual_stds))
-        if tried[-1].converged:
+        minima.append(minimise(problem, begin, residual_stds))
+        if minima[-1].converged:
             break
-    minimum = min(tried, key=lambda each: each.cost)
+    minimum = min(minima, key=lambda each: each.cost)
     if not np.isfinite(minimum.cost):
         raise LogError(
-            f"the model {problem.model.name} runs away on these segments from every start tried; "
-            f"look at their signs and units, or fit another model: "
-            f"{', '.join(dict.fromkeys(t.name for t in problem.segments))}"
+            f"the simulation of model {problem.model.name} diverges from every start; check the "
+            f"signs and units of the channels, or fit another model: {_names(problem.segments)}"
         )
-    calm = reweighted_fit(problem, minimum)
-    return _refined(_with_waves(calm) if waves else calm)
+    fit = reweighted_fit(problem, minimum)
+    return _with_fine_weights(_with_waves(fit) if waves else fit)
 
 
-def reweighted_fit(problem: Problem, minimum: Minimum, share: float = LEAST_SHARE) -> OutputError:
-    """The fit and its noise, found in turn from a first fit.
+def reweighted_fit(
+    problem: Problem, minimum: Minimum, share: float = MIN_WHITE_SHARE
+) -> OutputError:
+    """Estimate the noise and repeat the fit with it, `REWEIGHTINGS` times.
 
-    ResidualNoise is found from what a fit leaves, and tells the next fit what to leave: where runs
-    contradict each other an output could so be given up to please another. There it ends before.
+    The noise weights the next fit. Where runs contradict each other, an output could so get ever
+    less weight, to the benefit of another: the iteration ends before an output's rms residual
+    exceeds `MAX_RMS_GROWTH` times its initial value.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    minimum
+        A first fit.
+    share
+        As of `fit_residual_noise`.
+
+    Returns
+    -------
+    OutputError
+        The last accepted fit, with the noise estimated from it.
     """
     noises, residual_stds = estimate_noise(problem, minimum.unknowns, share)
-    off = _rms_left(problem, minimum)
-    for _ in range(ROUNDS):
-        after = minimise(problem, minimum.unknowns, residual_stds, minimum.jacobians)
-        if (_rms_left(problem, after) > GIVEN_UP * off).any():
+    initial_rms = _rms_residuals(problem, minimum)
+    for _ in range(REWEIGHTINGS):
+        reweighted = minimise(problem, minimum.unknowns, residual_stds, minimum.jacobians)
+        if (_rms_residuals(problem, reweighted) > MAX_RMS_GROWTH * initial_rms).any():
             break
-        minimum = after
+        minimum = reweighted
         noises, residual_stds = estimate_noise(problem, minimum.unknowns, share)
     return OutputError(problem, minimum, tuple(noises), tuple(residual_stds))
 
 
-def _refined(found: OutputError) -> OutputError:
-    """The fit with the quietest samples believed as far as they are quiet.
+def _with_fine_weights(fit: OutputError) -> OutputError:
+    """Repeat the fit with a lower limit of the white noise, unless that reveals slow noise.
 
-    An instrument whose noise is in proportion says most when it says least; but where something
-    stays off, it is no noise of the instrument's.
+    With noise in proportion to the output, samples near zero are the most precise. Where their
+    residuals are slow, they are not the instrument's noise, and must not get such weights.
     """
-    fine = reweighted_fit(found.problem, found.minimum, FINEST_SHARE)
-    stays = any(new.slow > old.slow for new, old in zip(fine.noises, found.noises, strict=True))
-    return found if stays else fine
+    fine = reweighted_fit(fit.problem, fit.minimum, FINE_WHITE_SHARE)
+    slower = any(new.slow > old.slow for new, old in zip(fine.noises, fit.noises, strict=True))
+    return fit if slower else fine
 
 
-def _rms_left(problem: Problem, minimum: Minimum) -> FloatArray:
+def _rms_residuals(problem: Problem, minimum: Minimum) -> FloatArray:
     """(c,) of each output over all segments."""
-    left = np.concatenate(residuals(problem, minimum.unknowns))
-    known = np.isfinite(left).sum(axis=0)
-    return np.asarray(np.sqrt(np.nansum(left**2, axis=0) / np.maximum(known, 1)))
+    residual = np.concatenate(residuals(problem, minimum.unknowns))
+    count = np.isfinite(residual).sum(axis=0)
+    return np.asarray(np.sqrt(np.nansum(residual**2, axis=0) / np.maximum(count, 1)))
 
 
-def _with_waves(calm: OutputError) -> OutputError:
-    """The fit with a wave in each segment that has one, where they explain all that stays off."""
-    problem = calm.problem
-    left = residuals(problem, calm.minimum.unknowns)
-    slow = [noise.slow for noise in calm.noises]
-    found = [
-        swell_frequency(r, spread.typical, problem.segments[i].dt_secs, slow)
-        for i, (r, spread) in enumerate(zip(left, calm.residual_stds, strict=True))
+def _with_waves(fit: OutputError) -> OutputError:
+    """Repeat the fit with a wave in each segment that has one, if they explain the slow noise."""
+    problem = fit.problem
+    slow = [noise.slow for noise in fit.noises]
+    frequencies = [
+        swell_frequency(residual, std.typical, segment.dt_secs, slow)
+        for segment, residual, std in zip(
+            problem.segments,
+            residuals(problem, fit.minimum.unknowns),
+            fit.residual_stds,
+            strict=True,
+        )
     ]
-    if not any(found):
-        return calm
-    waves = tuple(() if omega is None else (omega,) for omega in found)
+    if not any(frequencies):
+        return fit
+    waves = tuple(() if omega is None else (omega,) for omega in frequencies)
     with_waves = replace(problem, waves=waves)
     start = with_waves.start()
-    start[: len(problem.free)] = calm.minimum.unknowns[: len(problem.free)]
+    start[: len(problem.free)] = fit.minimum.unknowns[: len(problem.free)]
     for i in range(len(problem.segments)):
-        own, old = with_waves.own_slice(i), calm.minimum.unknowns[problem.own_slice(i)]
+        own, old = with_waves.own_slice(i), fit.minimum.unknowns[problem.own_slice(i)]
         start[own.start : own.start + len(old)] = old
-    wavy = reweighted_fit(with_waves, minimise(with_waves, start, calm.residual_stds))
+    wave_fit = reweighted_fit(with_waves, minimise(with_waves, start, fit.residual_stds))
     explained = all(
-        new.slow**2 * new.slow_secs <= UNEXPLAINED * old.slow**2 * old.slow_secs
-        for new, old in zip(wavy.noises, calm.noises, strict=True)
+        new.slow**2 * new.slow_secs <= MAX_SLOW_SHARE * old.slow**2 * old.slow_secs
+        for new, old in zip(wave_fit.noises, fit.noises, strict=True)
     )
-    return wavy if explained else calm
+    return wave_fit if explained else fit
 
 
 def initial_residual_stds(problem: Problem) -> list[ResidualStd]:
-    """Before anything is fitted: a tenth of what an output does is off."""
+    """Return residual standard deviations for a first fit, for each segment.
+
+    A tenth of each output's standard deviation, at least `MIN_STDS`.
+    """
     stds = []
     for column, output in enumerate(problem.outputs):
-        every = np.concatenate(
+        measured = np.concatenate(
             [problem.measured(i)[:, column] for i in range(len(problem.segments))]
         )
-        stds.append(max(float(np.nanstd(every)) / 10, MIN_STDS[output]))
-    every_std = np.array(stds)
+        stds.append(max(float(np.nanstd(measured)) / 10, MIN_STDS[output]))
+    row = np.array(stds)
     return [
-        ResidualStd(np.tile(every_std, (len(segment), 1)), np.tile(every_std, (len(segment), 1)))
+        ResidualStd(np.tile(row, (len(segment), 1)), np.tile(row, (len(segment), 1)))
         for segment in problem.segments
     ]
 
 
 def estimate_noise(
-    problem: Problem, z: FloatArray, share: float = LEAST_SHARE
+    problem: Problem, z: FloatArray, share: float = MIN_WHITE_SHARE
 ) -> tuple[list[ResidualNoise], list[ResidualStd]]:
-    """The noise of each output, and each segment's residual stds; `share` as `noise_of`."""
+    """Estimate the noise from the residuals.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    z
+        (m,) unknowns.
+    share
+        As of `fit_residual_noise`.
+
+    Returns
+    -------
+    noises
+        Of each output. The heading's has no part in proportion to the heading.
+    residual_stds
+        Of each segment.
+    """
     segments = range(len(problem.segments))
     levels = [problem.predicted(z, i) for i in segments]
-    off = [problem.measured(i) - levels[i] for i in segments]
+    residual = [problem.measured(i) - levels[i] for i in segments]
     noises = [
         fit_residual_noise(
             [
-                OutputResiduals.of(off[i][:, c], levels[i][:, c], problem.segments[i].dt_secs)
+                OutputResiduals.of(
+                    residual[i][:, c], levels[i][:, c], problem.segments[i].dt_secs
+                )
                 for i in segments
             ],
             proportional=output != "heading", least=MIN_STDS[output], share=share,
         )
         for c, output in enumerate(problem.outputs)
     ]  # fmt: skip
-    return noises, [_spread(problem, i, noises, levels[i]) for i in segments]
+    return noises, [_segment_stds(problem, i, noises, levels[i]) for i in segments]
 
 
-def _spread(
+def _segment_stds(
     problem: Problem, i: int, noises: Sequence[ResidualNoise], level: FloatArray
 ) -> ResidualStd:
-    """Of a segment whose predicted outputs are `level`, (n, c)."""
+    """Return the standard deviations of segment i, whose predicted outputs are `level`, (n, c)."""
     measured, dt = problem.measured(i), problem.segments[i].dt_secs
     pairs = [
         noise.stds(level[:, c], interval_secs(measured[:, c], dt)) for c, noise in enumerate(noises)

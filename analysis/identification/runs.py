@@ -1,4 +1,4 @@
-"""Logs as an identifier takes them: each on its own clock, its doubts said, all of one ship."""
+"""Logs as a fit takes them: resampled, split at input gaps, checked for one common ship."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -19,62 +19,108 @@ from shiplog.vessel.vessel_parser import parse_vessel
 
 from .segment import Segment, initial_level, split_into_segments
 
-NEEDED = ("yaw_rate", "speed", "rudder", "rpm")
-ALSO = ("sway", "heading")
-UNLIKE = 2.0  # times the speed for the revolutions: no ship's, from one run to another
+REQUIRED_CHANNELS = ("yaw_rate", "speed", "rudder", "rpm")
+OPTIONAL_CHANNELS = ("sway", "heading")
+MAX_SPEED_PER_RPM_RATIO = 2.0  # between two runs of one ship
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A log: the pieces of it in which the inputs are known, and where the ship was in each."""
+    """A log prepared for a fit.
+
+    Attributes
+    ----------
+    name
+        The log's name, unique among the runs of an identification.
+    segments
+        The stretches in which rudder and revolutions are known.
+    positions
+        For each segment (n, 2) m north and east; None where no position was measured.
+    vessel
+        The vessel file in the log; None without one.
+    warnings
+        What is unusual about the data; each names the log.
+    data_lost
+        Whether parts of the log could not be read.
+    """
 
     name: str
     segments: tuple[Segment, ...]
-    positions: tuple[FloatArray | None, ...]  # (n, 2) m north and east, where they were measured
-    vessel: Vessel | None  # that the log carries
+    positions: tuple[FloatArray | None, ...]
+    vessel: Vessel | None
     warnings: tuple[str, ...]
     data_lost: bool
 
 
 def run_from_log(log: Log) -> Run:
-    """A log as an identifier takes it.
+    """Resample a log, split it into segments and check its data.
 
-    Raises `LogError` where a channel is missing or where rudder and revolutions are not known
-    together long enough.
+    Parameters
+    ----------
+    log
+        A log with `REQUIRED_CHANNELS`; `OPTIONAL_CHANNELS` and positions are used if present.
+
+    Returns
+    -------
+    Run
+        The prepared log.
+
+    Raises
+    ------
+    LogError
+        A channel is missing, or rudder and revolutions are not known together long enough.
     """
-    found = compute_log_stats(log, strict=True)
-    missing = [name for name in NEEDED if name not in found]
+    stats = compute_log_stats(log, strict=True)
+    missing = [name for name in REQUIRED_CHANNELS if name not in stats]
     if missing:
-        has = ", ".join(sorted({channel.name for channel in found}))
+        present = ", ".join(sorted({channel.name for channel in stats}))
         raise LogError(
-            f"no channel {missing[0]!r} in {log.name}; it has {has or 'none'}; "
-            f"an identification needs {', '.join(NEEDED)}"
+            f"no channel {missing[0]!r} in {log.name}; it has {present or 'none'}; "
+            f"an identification needs {', '.join(REQUIRED_CHANNELS)}"
         )
-    segments = split_into_segments(resample(log, None, NEEDED, ALSO), log.name)
-    carried = log.vessel_toml
-    vessel = parse_vessel(carried, f"vessel.toml in {log.name}") if carried is not None else None
-    places = tuple(_positions(log, segment) for segment in segments) if "position" in found else ()
-    said = (*log.warnings, *_doubts(log, found))
+    signals = resample(log, None, REQUIRED_CHANNELS, OPTIONAL_CHANNELS)
+    segments = split_into_segments(signals, log.name)
+    toml = log.vessel_toml
+    vessel = parse_vessel(toml, f"vessel.toml in {log.name}") if toml is not None else None
+    has_position = "position" in stats
+    warnings = (*log.warnings, *_data_warnings(log, stats))
     return Run(
-        log.name, segments, places or (None,) * len(segments), vessel,
-        tuple(warning if log.name in warning else f"{log.name}: {warning}" for warning in said),
-        log.data_lost,
-    )  # fmt: skip
+        name=log.name,
+        segments=segments,
+        positions=tuple(_positions(log, each) if has_position else None for each in segments),
+        vessel=vessel,
+        warnings=tuple(text if log.name in text else f"{log.name}: {text}" for text in warnings),
+        data_lost=log.data_lost,
+    )
 
 
 def distinct_runs(logs: Sequence[Log], held_out: Sequence[Log]) -> tuple[list[Run], list[Run]]:
-    """Logs to fit and logs to predict as runs, each of a name and of data of its own.
+    """Prepare logs for fitting and for validation, each with a unique name.
 
-    Raises `UsageError` for data that are given twice: they would be believed twice, or prove
-    themselves.
+    Parameters
+    ----------
+    logs
+        The logs to fit.
+    held_out
+        The logs to predict.
+
+    Returns
+    -------
+    fitted, held_out
+        The runs in the order of the logs; a second log of the same name becomes ``name (2)``.
+
+    Raises
+    ------
+    UsageError
+        Two logs hold the same data: they would count twice, or validate themselves.
     """
     runs: list[Run] = []
     for log in (*logs, *held_out):
         run = run_from_log(log)
         for other in runs:
-            if _same(run, other):
+            if _same_data(run, other):
                 raise UsageError(
-                    f"the same data twice, leave one of the logs out: {other.name}, {run.name}"
+                    f"two logs hold the same data; leave one of them out: {other.name}, {run.name}"
                 )
         names = {other.name for other in runs}
         number = next(k for k in count(1) if _numbered(run.name, k) not in names)
@@ -82,7 +128,7 @@ def distinct_runs(logs: Sequence[Log], held_out: Sequence[Log]) -> tuple[list[Ru
     return runs[: len(logs)], runs[len(logs) :]
 
 
-def _same(run: Run, other: Run) -> bool:
+def _same_data(run: Run, other: Run) -> bool:
     return len(run.segments) == len(other.segments) and all(
         np.array_equal(a.measured, b.measured, equal_nan=True)
         for a, b in zip(run.segments, other.segments, strict=True)
@@ -90,7 +136,6 @@ def _same(run: Run, other: Run) -> bool:
 
 
 def _numbered(name: str, number: int) -> str:
-    """The name, of a second log of that name with a number behind it."""
     return name if number == 1 else f"{name} ({number})"
 
 
@@ -98,52 +143,68 @@ def _renamed(run: Run, name: str) -> Run:
     return replace(run, name=name, segments=tuple(replace(t, name=name) for t in run.segments))
 
 
-def _doubts(log: Log, found: LogStats) -> Iterator[str]:
-    also = tuple(name for name in ("heading", "position") if name in found)
-    yield from data_warnings(found, (*NEEDED, *also))
-    contrary = rudder_sign_warning(log)
-    if contrary:
-        yield contrary
+def _data_warnings(log: Log, stats: LogStats) -> Iterator[str]:
+    optional = tuple(name for name in ("heading", "position") if name in stats)
+    yield from data_warnings(stats, (*REQUIRED_CHANNELS, *optional))
+    rudder_sign = rudder_sign_warning(log)
+    if rudder_sign:
+        yield rudder_sign
 
 
 def _positions(log: Log, segment: Segment) -> FloatArray | None:
-    """Where the ship was at a segment's samples, between the fixes in straight lines, (n, 2)."""
+    """Interpolate the fixes of the log's first position source at a segment's samples, (n, 2)."""
     parts = [c for chunk in log.chunks() for c in chunk if c.name == "position"]
     if not parts:
         return None
     source = parts[0].source
     fixes = [part for part in parts if part.source == source]
-    at = np.concatenate([part.measured_ns for part in fixes])
+    measured_ns = np.concatenate([part.measured_ns for part in fixes])
     values = np.concatenate([part.values for part in fixes])
-    known = np.isfinite(values).all(axis=1)
-    secs = (at[known] - segment.signals.start_ns) * 1e-9
+    valid = np.isfinite(values).all(axis=1)
+    secs = (measured_ns[valid] - segment.signals.start_ns) * 1e-9
     if len(secs) < 2:
         return None
     time = segment.signals.time_secs
-    lines = [np.interp(time, secs, column, np.nan, np.nan) for column in values[known].T]
-    return np.column_stack(lines)
+    columns = [np.interp(time, secs, column, np.nan, np.nan) for column in values[valid].T]
+    return np.column_stack(columns)
 
 
 def common_vessel(runs: Sequence[Run], given: Vessel | None) -> Vessel | None:
-    """The ship that the runs are of: the one given, or the one they carry, if any.
+    """Return the vessel of an identification: the given one, or the one in the logs.
 
-    Raises `LogError` where they carry ships that are not the same.
+    Parameters
+    ----------
+    runs
+        All runs, fitted and held out.
+    given
+        The vessel file named by the user, which takes precedence.
+
+    Returns
+    -------
+    Vessel or None
+        None where none is given and no log has one.
+
+    Raises
+    ------
+    LogError
+        The logs have vessel files of different models, lengths or steering gears.
     """
     if given is not None:
         return given
-    carried = [(run.name, run.vessel) for run in runs if run.vessel is not None]
-    for name, vessel in carried[1:]:
-        if _bare(vessel) != _bare(carried[0][1]):
+    embedded = [(run.name, run.vessel) for run in runs if run.vessel is not None]
+    for name, vessel in embedded[1:]:
+        first_name, first = embedded[0]
+        if _physical(vessel) != _physical(first):
             raise LogError(
-                f"the logs are of different ships: {carried[0][0]} carries {carried[0][1].name!r}, "
-                f"{name} carries another model, {vessel.name!r}; identify each ship by herself, "
-                "or say which vessel file holds with --vessel"
+                f"the logs are of different ships: {first_name} has the vessel file of "
+                f"{first.name!r}, {name} another model, {vessel.name!r}; identify each ship "
+                "separately, or choose the vessel file with --vessel"
             )
-    return carried[0][1] if carried else None
+    return embedded[0][1] if embedded else None
 
 
-def _bare(vessel: Vessel) -> Vessel:
-    """Her model, length and gear: how she is called, sailed and filtered may differ."""
+def _physical(vessel: Vessel) -> Vessel:
+    """Return the vessel with name, approach, unit and estimator settings set to defaults."""
     return replace(
         vessel, name="", approach_rpm=1.0, angle_unit="rad",
         filter=FilterSettings(), disturbance=DisturbanceSettings(),
@@ -152,29 +213,53 @@ def _bare(vessel: Vessel) -> Vessel:
 
 
 def consistency_warnings(runs: Sequence[Run]) -> Iterator[str]:
-    """What makes runs look like those of different ships."""
+    """Warn of runs whose initial speeds per rpm differ too much for one ship.
+
+    Parameters
+    ----------
+    runs
+        All runs, fitted and held out; those without revolutions are skipped.
+
+    Yields
+    ------
+    str
+        At most one warning, where the ratio exceeds `MAX_SPEED_PER_RPM_RATIO`.
+    """
     under_way = [run for run in runs if initial_level(run.segments, "rpm") > 0]
-    paces = {
+    speed_per_rpm = {
         run.name: initial_level(run.segments, "speed") / initial_level(run.segments, "rpm")
         for run in under_way
     }
-    if len(paces) < 2:
+    if len(speed_per_rpm) < 2:
         return
-    fast, slow = max(paces, key=lambda n: paces[n]), min(paces, key=lambda n: paces[n])
-    if paces[fast] > UNLIKE * paces[slow]:
+    fast = max(speed_per_rpm, key=lambda name: speed_per_rpm[name])
+    slow = min(speed_per_rpm, key=lambda name: speed_per_rpm[name])
+    if speed_per_rpm[fast] > MAX_SPEED_PER_RPM_RATIO * speed_per_rpm[slow]:
         yield (
-            f"{fast} begins with {paces[fast]:.3g} m/s per rpm, {slow} with {paces[slow]:.3g}: "
-            "another ship, another scale, or not steady; one model is fitted to both all the same"
+            f"{fast} starts with {speed_per_rpm[fast]:.3g} m/s per rpm, {slow} with "
+            f"{speed_per_rpm[slow]:.3g}: different ships, different units, or no steady start; "
+            "check the logs, one model is fitted to both"
         )
 
 
-def require_distinct(fitted: Iterable[str], held_out: Iterable[str]) -> None:
-    """Refuse a log that is named twice: it would be believed twice, or prove itself."""
+def require_distinct_logs(fitted: Iterable[str], held_out: Iterable[str]) -> None:
+    """Check that no log is named twice.
+
+    Parameters
+    ----------
+    fitted, held_out
+        The paths of the logs to fit and to validate on.
+
+    Raises
+    ------
+    UsageError
+        A path occurs twice: its data would count twice, or validate themselves.
+    """
     fitted, held_out = list(fitted), list(held_out)
     for path in (*fitted, *held_out):
         if path in fitted and path in held_out:
             raise UsageError(
-                f"a fit is not validated on a log it has seen; leave it out of one: {path}"
+                f"a log cannot be both fitted and used for validation; remove it from one: {path}"
             )
         if max(fitted.count(path), held_out.count(path)) > 1:
-            raise UsageError(f"the same log is named twice; name it once: {path}")
+            raise UsageError(f"a log is named twice; name it once: {path}")

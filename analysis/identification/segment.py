@@ -1,4 +1,4 @@
-"""A segment as an identifier takes it: what the ship was given, and what was measured of her."""
+"""A stretch of a run with known inputs, as a fit takes it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,68 +12,98 @@ from shiplog.ships.paper import PAPER_INPUTS
 from shiplog.ships.path import input_path
 from shiplog.types import FloatArray, Signals
 
-MIN_SEGMENT_SECS = 60.0  # of a piece: a shorter one says nothing of a ship
+MIN_SEGMENT_SECS = 60.0  # a shorter segment does not determine a model
+INITIAL_SECS = 10.0  # over which an initial level is a median
 
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A run, or a piece of one, throughout which rudder and revolutions are known."""
+    """A run, or a part of one, in which rudder and revolutions are known at every sample.
+
+    Attributes
+    ----------
+    name
+        The run's name; segments of the same name are parts of one run.
+    signals
+        The n samples of all channels, with the inputs interpolated between their samples.
+    path
+        The inputs as the ship models take them: the rudder linear from sample to sample.
+    measured
+        (n, 4) outputs in the order of `MODEL_OUTPUTS`, SI; NaN where not measured.
+    """
 
     name: str
     signals: Signals
     path: InputPath
-    measured: FloatArray  # (n, 4) in the order of MODEL_OUTPUTS; NaN where not measured
+    measured: FloatArray
 
     def __len__(self) -> int:
-        """The number of samples."""
+        """Return the number of samples."""
         return len(self.measured)
 
     @property
     def dt_secs(self) -> float:
-        """From sample to sample."""
+        """The sample interval, s."""
         return self.signals.dt_secs
 
     def has(self, output: str) -> bool:
-        """Whether an output was measured at all."""
+        """Return whether an output was measured at two samples or more."""
         return bool(np.isfinite(self.measured[:, MODEL_OUTPUTS.index(output)]).sum() > 1)
 
     def part(self, start: int, stop: int) -> "Segment":
-        """Its samples from `start` to before `stop`."""
+        """Return the samples from `start` to before `stop` as a segment."""
         signals = self.signals.part(start, stop)
         return Segment(self.name, signals, input_path(signals), self.measured[start:stop])
 
 
 def split_into_segments(signals: Signals, name: str) -> tuple[Segment, ...]:
-    """The pieces in which rudder and revolutions are known, each of `MIN_SEGMENT_SECS` or more.
+    """Split a run at the gaps of rudder and revolutions.
 
-    Between an input's samples it is interpolated, over its gaps not. Raises `LogError` where no
-    piece is left.
+    Between their samples the inputs are interpolated linearly, but not across gaps
+    (`gap_threshold_secs` of their median interval).
+
+    Parameters
+    ----------
+    signals
+        The run on one clock.
+    name
+        The run's name, for the segments and for messages.
+
+    Returns
+    -------
+    segments
+        The stretches of at least `MIN_SEGMENT_SECS`, in order.
+
+    Raises
+    ------
+    LogError
+        No stretch is long enough.
     """
-    inputs = {channel: _bridged(signals[channel], signals.dt_secs) for channel in PAPER_INPUTS}
-    known = np.isfinite(inputs["rudder"]) & np.isfinite(inputs["rpm"])
+    inputs = {channel: _interpolated(signals[channel], signals.dt_secs) for channel in PAPER_INPUTS}
+    complete = np.isfinite(inputs["rudder"]) & np.isfinite(inputs["rpm"])
     whole = Signals(signals.start_ns, signals.dt_secs, {**signals.values, **inputs}, signals.first)
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], known, [0]))))
-    pieces = [
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], complete, [0]))))
+    stretches = [
         (start, stop)
         for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
         if (stop - start - 1) * signals.dt_secs >= MIN_SEGMENT_SECS
     ]
-    if not pieces:
+    if not stretches:
         raise LogError(
             f"rudder and rpm are known together for less than {MIN_SEGMENT_SECS:.0f} s at a time, "
             f"too short to identify a ship; give a longer log: {name}"
         )
-    return tuple(_trial(whole.part(*piece), name) for piece in pieces)
+    return tuple(_segment(whole.part(*stretch), name) for stretch in stretches)
 
 
-def _trial(signals: Signals, name: str) -> Segment:
+def _segment(signals: Signals, name: str) -> Segment:
     missing = np.full(len(signals), np.nan)
     columns = [signals.values.get(output, missing) for output in MODEL_OUTPUTS]
     return Segment(name, signals, input_path(signals), np.column_stack(columns))
 
 
-def _bridged(values: FloatArray, dt: float) -> FloatArray:
-    """An input with the instants between its samples filled in, its gaps left open."""
+def _interpolated(values: FloatArray, dt: float) -> FloatArray:
+    """Interpolate an input between its samples; its gaps stay NaN."""
     at = np.flatnonzero(np.isfinite(values))
     if len(at) < 2:
         return values
@@ -85,10 +115,24 @@ def _bridged(values: FloatArray, dt: float) -> FloatArray:
 
 
 def initial_level(segments: Sequence[Segment], channel: str) -> float:
-    """The largest initial speed or rpm among the segments, over their first ten seconds."""
-    firsts = [
-        np.abs(segment.signals[channel][: max(2, round(10 / segment.dt_secs))])
+    """Return the initial magnitude of a channel, the largest among the segments.
+
+    Parameters
+    ----------
+    segments
+        One or more.
+    channel
+        Such as ``speed`` or ``rpm``.
+
+    Returns
+    -------
+    float
+        The largest of the segments' medians over their first `INITIAL_SECS`, in the channel's SI
+        unit; NaN where no segment has the channel then.
+    """
+    starts = [
+        np.abs(segment.signals[channel][: max(2, round(INITIAL_SECS / segment.dt_secs))])
         for segment in segments
     ]
-    known = [np.nanmedian(first) for first in firsts if np.isfinite(first).any()]
-    return float(max(known, default=np.nan))
+    levels = [np.nanmedian(start) for start in starts if np.isfinite(start).any()]
+    return float(max(levels, default=np.nan))

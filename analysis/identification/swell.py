@@ -1,4 +1,7 @@
-"""A wave in what a fit leaves: a ship rolls and pitches in a swell, and her sensors with her."""
+"""A swell in the residuals of a fit: a narrow peak in their periodogram.
+
+In a swell the ship rolls and pitches, and the motion of its sensors appears in their measurements.
+"""
 
 from collections.abc import Sequence
 from math import pi
@@ -7,52 +10,71 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
-LEAST_CYCLES = 4.0  # in a segment: of a slower one it cannot be told what it is
-SHORTEST_SECS = 2.0  # of a period; a faster one harms no fit
-OVERSAMPLED = 4  # frequencies to each that the segment's length resolves
-MOST = 0.5  # of what stays off: where a wave is less, it is not a wave alone
-SURE = 40.0  # of a peak in a periodogram of chi-squared numbers: one in a hundred million
+MIN_CYCLES = 4.0  # in a segment: slower waves cannot be told from other slow errors
+MIN_PERIOD_SECS = 2.0  # faster waves do not disturb a fit
+OVERSAMPLING = 4  # frequencies for each one that the segment's length resolves
+MIN_SLOW_SHARE = 0.5  # of an output's slow variance that the wave has to explain
+MIN_PEAK = 40.0  # of a periodogram of white noise, whose ordinates are chi-squared: 1 in 1e8
 
 
 def swell_frequency(
-    residuals: FloatArray, usual: FloatArray, dt: float, slow: Sequence[float] = ()
+    residuals: FloatArray, typical: FloatArray, dt: float, slow: Sequence[float] = ()
 ) -> float | None:
-    """The frequency, in rad/s, of the wave that stands out most in a segment's residuals, if any.
+    """Find the frequency of the most significant wave in a segment's residuals.
 
-    Both are (n, c), the residuals with NaN; each output's are weighed by their usual std. Of an
-    output's `slow` part, a std, a wave must be able to explain the half. The
-    periodogram is Lomb's, "Least-squares frequency analysis of unequally spaced data", 1976.
+    Parameters
+    ----------
+    residuals
+        (n, c), NaN where not measured.
+    typical
+        (n, c) their standard deviations, by which they are weighted.
+    dt
+        Sample interval, s.
+    slow
+        (c,) standard deviation of each output's slow noise, of which the wave has to explain at
+        least half; by default none.
+
+    Returns
+    -------
+    float or None
+        In rad/s; None where no peak is significant.
+
+    References
+    ----------
+    N. R. Lomb, "Least-squares frequency analysis of unequally spaced data", Astrophysics and Space
+    Science 39, 1976.
     """
     n = len(residuals)
     span = n * dt
-    lowest, highest = LEAST_CYCLES / span, min(1 / SHORTEST_SECS, 0.4 / dt)
-    grid = np.arange(lowest, highest, 1 / (OVERSAMPLED * span))
+    lowest, highest = MIN_CYCLES / span, min(1 / MIN_PERIOD_SECS, 0.4 / dt)
+    grid = np.arange(lowest, highest, 1 / (OVERSAMPLING * span))
     if not len(grid):
         return None
-    best, found = 1.0, None
+    best, frequency = 1.0, None
     for c in range(residuals.shape[1]):
-        known = np.isfinite(residuals[:, c])
-        if known.sum() < 2:
+        measured = np.isfinite(residuals[:, c])
+        if measured.sum() < 2:
             continue
-        power = _periodogram(residuals[:, c], usual[:, c], grid * dt)
-        whole = slow[c] ** 2 * float(np.sum(usual[known, c] ** -2.0)) if slow else 0.0
+        power = _periodogram(residuals[:, c], typical[:, c], grid * dt)
+        slow_power = slow[c] ** 2 * float(np.sum(typical[measured, c] ** -2.0)) if slow else 0.0
         peak = int(np.argmax(power))
-        share = power[peak] / max(SURE, MOST * whole)
-        if share > best:
-            best, found = float(share), float(2 * pi * grid[peak])
-    return found
+        significance = power[peak] / max(MIN_PEAK, MIN_SLOW_SHARE * slow_power)
+        if significance > best:
+            best, frequency = float(significance), float(2 * pi * grid[peak])
+    return frequency
 
 
 def _periodogram(residual: FloatArray, std: FloatArray, cycles: FloatArray) -> FloatArray:
-    """By how much a wave of so many cycles a sample lessens the weighted sum of squares.
+    """Return by how much a wave reduces the weighted sum of squares.
 
-    By a Fourier transform, padded so that its frequencies lie close together.
+    `cycles` are the wave's frequencies in cycles per sample. A Fourier transform is padded with
+    zeros, so that its frequencies lie close together, and interpolated.
     """
-    known = np.isfinite(residual)
-    weight = np.where(known, std**-2.0, 0.0)
-    off = np.where(known, residual, 0.0)
-    off = off - np.average(off, weights=weight) * known
-    length = OVERSAMPLED * len(off)
-    spectrum = np.abs(np.fft.rfft(weight * off, length)) ** 2
+    measured = np.isfinite(residual)
+    weight = np.where(measured, std**-2.0, 0.0)
+    r = np.where(measured, residual, 0.0)
+    r = r - np.average(r, weights=weight) * measured
+    length = OVERSAMPLING * len(r)
+    spectrum = np.abs(np.fft.rfft(weight * r, length)) ** 2
     power = 2 * spectrum / np.sum(weight)
     return np.asarray(np.interp(cycles, np.fft.rfftfreq(length), power))

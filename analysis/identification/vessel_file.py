@@ -20,7 +20,7 @@ from shiplog.vessel.vessel import Vessel
 from .advice import RUDDER_PARAMETERS
 from .fixed_parameters import fixed_values
 from .identified_ship import IdentifiedShip
-from .output_error import USUAL_LENGTH, OutputError, output_error
+from .output_error import DEFAULT_LENGTH, OutputError, output_error
 from .segment import initial_level
 from .uncertainty import ECHO, UNIDENTIFIABLE, Uncertainty, uncertainty
 
@@ -136,7 +136,7 @@ def _head(ship: IdentifiedShip) -> Iterator[str]:
     if vessel is not None and vessel.length is not None:
         yield f"length = {vessel.length!r}"
     elif ship.model.dimensionless:
-        yield f"length = {USUAL_LENGTH!r}  # m, ASSUMED, as none was given: the scale of [model]"
+        yield f"length = {DEFAULT_LENGTH!r}  # m, ASSUMED, as none was given: the scale of [model]"
     yield f"approach_rpm = {round(initial_level(segments, 'rpm'), 3)!r}"
     yield f'angle_unit = "{_angle_unit(vessel)}"'
 

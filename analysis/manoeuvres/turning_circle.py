@@ -199,5 +199,5 @@ def _smoothed_circle(
         motion.speed[execute:end],
         motion.positions[execute:end],
     )
-    approach = approach_heading(motion.heading[:end], execute, dt)
+    approach = approach_heading(heading, execute, dt)
     return turning_circle(turn, rudder[execute:], dt, approach=approach)

@@ -222,7 +222,7 @@ def test_logs_of_different_ships_under_one_vessel_file_give_a_warning() -> None:
     quick = replace(speed, values=3 * speed.values)
     scaled = replace(slow, channels=tuple(quick if c is speed else c for c in slow.channels))
     flagged = identify([a_log(seed=1), replace(scaled, name="scaled.mcap")])
-    assert any("scaled.mcap begins with" in warning for warning in flagged.warnings)
+    assert any("scaled.mcap starts with" in warning for warning in flagged.warnings)
 
 
 def test_a_rudder_of_opposite_sign_gives_a_warning() -> None:
