@@ -186,7 +186,11 @@ def gap_threshold_secs(interval_secs: float) -> float:
 
 
 def without_impossible(channel: Channel) -> Channel:
-    """Return the channel with NaN in place of values beyond the limits of the catalogue."""
+    """Return the channel with NaN in place of impossible values.
+
+    The limits of each quantity are in `shiplog.units.CATALOGUE`. A channel with `fields`, or of a
+    quantity that is not in the catalogue, is returned unchanged.
+    """
     kind = CATALOGUE.get(channel.name)
     if kind is None or channel.fields:
         return channel

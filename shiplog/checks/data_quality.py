@@ -45,7 +45,13 @@ def data_warnings(stats: LogStats, names: tuple[str, ...]) -> list[str]:
 
 
 def times_in_words(count: int) -> str:
-    """Return `once`, or `3 times`."""
+    """Return a count in words.
+
+    Examples
+    --------
+    >>> times_in_words(1), times_in_words(3)
+    ('once', '3 times')
+    """
     return "once" if count == 1 else f"{count} times"
 
 

@@ -34,6 +34,13 @@ def rudder_sign_warning(log: Log) -> str | None:
     ----------
     W. K. Newey and K. D. West, A simple, positive semi-definite, heteroskedasticity and
     autocorrelation consistent covariance matrix, Econometrica 55 (1987).
+
+    Examples
+    --------
+    >>> import shiplog
+    >>> log = shiplog.read("sample_data/zigzag_20_20.mcap")
+    >>> rudder_sign_warning(log) is None
+    True
     """
     check = RudderSignCheck(compute_log_stats(log))
     for chunk in log.chunks():

@@ -43,6 +43,17 @@ class StuckCheck:
     `STUCK_RUNS` typical runs of the channel. A slow signal with few digits also repeats values, but
     then moves by one digit only. So where values usually repeat, the value must jump before or
     after the run by more than twice the median change.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> values = np.sin(np.arange(600.0))
+    >>> values[100:300] = 0.5
+    >>> check = StuckCheck()
+    >>> check.add(0.1 * np.arange(600), values[:, None])
+    >>> stuck = check.result(0.1)
+    >>> stuck.count, round(float(stuck.duration_secs), 1)
+    (1, 19.9)
     """
 
     def __init__(self) -> None:

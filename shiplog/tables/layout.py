@@ -138,6 +138,19 @@ def parse_layout(text: str, where: str) -> Layout:
     ------
     LayoutError
         The text has errors; the message lists all of them.
+
+    Examples
+    --------
+    >>> text = '''
+    ... [time]
+    ... column = 1
+    ... unit = "s"
+    ... [yaw_rate]
+    ... column = 2
+    ... unit = "deg/s"
+    ... '''
+    >>> parse_layout(text, "gyro.toml").columns["yaw_rate"].unit
+    'deg/s'
     """
     try:
         table = tomllib.loads(text)

@@ -94,7 +94,15 @@ def field_names(channel: Channel) -> tuple[str, ...]:
 
 
 def long_columns(log: TrialLog) -> tuple[TimeArray, TimeArray, FloatArray]:
-    """Return measured times, received times and values, each (n,) with a row per component."""
+    """Return the numeric columns of the long form.
+
+    Returns
+    -------
+    measured_ns, received_ns
+        (n,) times; n counts the components of all samples.
+    values
+        (n,) values.
+    """
     empty: list[Any] = [np.zeros(0, np.int64)]
     measured = [np.repeat(c.measured_ns, len(field_names(c))) for c in log]
     received = [np.repeat(c.received_ns, len(field_names(c))) for c in log]
@@ -107,7 +115,19 @@ def long_columns(log: TrialLog) -> tuple[TimeArray, TimeArray, FloatArray]:
 
 
 def row_labels(log: TrialLog) -> tuple[list[str], Codes, list[str], Codes]:
-    """Return topics and components by name, and the index of each for every row."""
+    """Return the text columns of the long form as codes.
+
+    Returns
+    -------
+    topics
+        Each topic once.
+    topic_codes
+        (n,) index of the topic of each row.
+    fields
+        Each name of a component once.
+    field_codes
+        (n,) index of the component of each row.
+    """
     topics = list(dict.fromkeys(c.topic for c in log))
     fields = list(dict.fromkeys(f for c in log for f in field_names(c)))
     codes: list[Any] = [np.zeros(0, np.int32)]

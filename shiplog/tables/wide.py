@@ -67,6 +67,14 @@ def wide_table(
         No channel can be resampled, or the recorded times span too many steps.
     UsageError
         `dt_secs` is not a positive number.
+
+    Examples
+    --------
+    >>> import shiplog
+    >>> log = shiplog.read("sample_data/zigzag_20_20.mcap")
+    >>> table = wide_table(log, dt_secs=1.0, display_units=True)
+    >>> len(table.timestamps_ns), table.units["speed"]
+    (601, 'kn')
     """
     columns = dict(_scalar_columns(log))
     scalars = TrialLog(log.name, tuple(columns.values()))
@@ -105,7 +113,19 @@ def wide_table(
 def to_wide_frame(
     log: TrialLog, dt_secs: float | None = None, *, display_units: bool = False
 ) -> "pd.DataFrame":
-    """Make a data frame of a `wide_table`: see `TrialLog.to_pandas`."""
+    """Make a data frame of a `wide_table`; `TrialLog.to_pandas` is the method for users.
+
+    Parameters
+    ----------
+    log, dt_secs, display_units
+        As those of `wide_table`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        (n, k) with the time in UTC as index. With `display_units` the names of the columns have
+        the unit, such as `speed [kn]`; `attrs["units"]` has the unit of each column.
+    """
     import pandas as pd  # noqa: PLC0415 - slow to import
 
     table = wide_table(log, dt_secs, display_units=display_units)
@@ -117,7 +137,23 @@ def to_wide_frame(
 
 
 def to_dataset(log: TrialLog, dt_secs: float | None = None) -> "xr.Dataset":
-    """Make an xarray dataset of a `wide_table`: see `TrialLog.to_xarray`."""
+    """Make an xarray dataset of a `wide_table`; `TrialLog.to_xarray` is the method for users.
+
+    Parameters
+    ----------
+    log, dt_secs
+        As those of `wide_table`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables of (n,) along the coordinate `time` in UTC, each with its unit in `attrs`.
+
+    Raises
+    ------
+    UsageError
+        The package xarray is not installed.
+    """
     try:
         import xarray as xr  # noqa: PLC0415 - optional
     except ImportError as error:

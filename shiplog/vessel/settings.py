@@ -198,19 +198,41 @@ def filter_settings(table: Mapping[str, object], errors: list[str]) -> FilterSet
 
 
 def disturbance_settings(table: Mapping[str, object], errors: list[str]) -> DisturbanceSettings:
-    """Parse a `[disturbance]` section; messages about it are appended to `errors`."""
+    """Parse a `[disturbance]` section.
+
+    Parameters
+    ----------
+    table
+        Keys and values of the section.
+    errors
+        Messages are appended for everything that is wrong.
+    """
     return _parse_section("disturbance", DisturbanceSettings, table, errors)
 
 
 def identifier_settings(table: Mapping[str, object], errors: list[str]) -> IdentifierSettings:
-    """Parse an `[identifier]` section; messages about it are appended to `errors`."""
+    """Parse an `[identifier]` section.
+
+    Parameters
+    ----------
+    table
+        Keys and values of the section.
+    errors
+        Messages are appended for everything that is wrong.
+    """
     return _parse_section("identifier", IdentifierSettings, table, errors)
 
 
 def settings_dict(
     settings: FilterSettings | DisturbanceSettings | IdentifierSettings,
 ) -> dict[str, object]:
-    """Return the section of a vessel file that gives these settings."""
+    """Return the section of a vessel file that gives these settings, without those that are None.
+
+    Examples
+    --------
+    >>> settings_dict(IdentifierSettings())
+    {'window_secs': 200.0}
+    """
     return {key: value for key, value in asdict(settings).items() if value is not None}
 
 

@@ -126,7 +126,13 @@ def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
 
 
 def unused_setting_warnings(vessel: Vessel) -> list[str]:
-    """Warn about settings of a vessel that have no effect; at most one line."""
+    """Warn about settings of a vessel that have no effect.
+
+    Returns
+    -------
+    list of str
+        One line with the names of these settings and the remedy; empty where there are none.
+    """
     names = ", ".join(unused_settings(vessel.filter, vessel.disturbance))
     if not names:
         return []

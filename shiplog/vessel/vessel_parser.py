@@ -103,6 +103,12 @@ def parse_vessel(text: str, where: str) -> Vessel:
     ------
     VesselError
         The text has errors; the message lists all of them.
+
+    Examples
+    --------
+    >>> parse_vessel("[yaw]", "ship.toml")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    shiplog.errors.VesselError: 3 errors in the vessel file: [yaw] lacks T1, T2, T3, c2, c3; ...
     """
     try:
         table = tomllib.loads(text)
