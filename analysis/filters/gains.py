@@ -1,8 +1,9 @@
-"""Gains that are designed once: the steady-state filter, the quality filter, the placed poles.
+"""Constant gains: of the steady-state filter, of the quality filter and of placed poles.
 
-Yaw and surge are channels of their own, each about the ship's usual motion: designed together they
-would be coupled, and each would hear the other's noise. The papers design in continuous time; the
-poles found there are placed exactly for the sensor's own interval.
+Yaw and surge are designed apart, each linearised about the ship's typical motion. Designed together
+they would be coupled, and the noise of each sensor would enter the estimates of the other. The
+papers design in continuous time; the gain places the poles found there exactly for the sampling
+interval of the sensor.
 """
 
 from dataclasses import dataclass
@@ -22,28 +23,45 @@ from shiplog.vessel.settings import FilterSettings
 
 from .noise_model import NoiseModel
 
-FORGETTING = 0.2  # of a wave's frequency: how fast its error decays, where poles are stated
+WAVE_DECAY = 0.2  # decay rate of the wave's error over the wave's frequency, for stated poles
 
 
 @dataclass(frozen=True, eq=False)
 class LinearAxis:
-    """x' = A x + G white noise of intensity Q, measured by C with white noise of intensity R."""
+    """A linear system of one output, x' = A x + G w, y = C x + v, for yaw or for surge.
 
-    A: FloatArray  # (k, k)
-    G: FloatArray  # (k, q)
-    C: FloatArray  # (1, k)
-    Q: FloatArray  # (q, q)
+    Attributes
+    ----------
+    A
+        (k, k), 1/s.
+    G
+        (k, q): where the process noise enters.
+    C
+        (1, k).
+    Q
+        (q, q): intensity of the white noise w.
+    R
+        Intensity of the white noise v.
+    interval_secs
+        The sampling interval of the sensor.
+    """
+
+    A: FloatArray
+    G: FloatArray
+    C: FloatArray
+    Q: FloatArray
     R: float
-    interval_secs: float  # from sample to sample
+    interval_secs: float
 
 
-def channels(
+def linear_axes(
     c: Coefficients, noise: NoiseModel, stats: SignalStats
 ) -> tuple[LinearAxis, LinearAxis]:
-    """Yaw, of w, w' and the wave's two states if there is one, and surge, of v.
+    """Linearise yaw and surge about the typical yaw rate and speed.
 
-    Linear about the usual turning and the usual speed. Sampled noise of variance σ² is of the
-    intensity σ² times the interval; the wave stands in the measurement.
+    The states of yaw are w, w' and, where a wave is modelled, the two states of its shaping filter,
+    which adds to the measurement; the state of surge is v. Samples of noise of variance σ² count as
+    white noise of intensity σ² times the sampling interval.
     """
     R = noise.measurement_std**2 * stats.interval_secs
     q = noise.process_ratio * R
@@ -51,8 +69,8 @@ def channels(
     G, C, Q = np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]]), q[:1, None]
     if noise.wave is not None:
         shaping = wave_filter(noise.wave.std**2, noise.wave.frequency, noise.wave.damping)
-        whole = augment_with_shaping(A, G, C, np.ones(1), shaping, at="output", noise=G)
-        A, G, C = whole.A, whole.G, whole.C
+        both = augment_with_shaping(A, G, C, np.ones(1), shaping, at="output", noise=G)
+        A, G, C = both.A, both.G, both.C
         Q = np.diag([q[0], 1.0])
     surge = np.array([[2 * c.g * stats.ahead]])
     one = np.ones((1, 1))
@@ -63,36 +81,61 @@ def channels(
     )
 
 
-def discrete_gain(settings: FilterSettings, channel: LinearAxis) -> tuple[FloatArray, ComplexArray]:
-    """The gain (k,) by which a sample corrects the state, and the poles (k,) from sample to sample.
+def discrete_gain(axis: LinearAxis, poles: ComplexArray) -> tuple[FloatArray, ComplexArray]:
+    """Place the continuous poles (k,), 1/s, exactly for the sampling interval.
 
-    Raises `UsageError` where there is none.
+    Returns
+    -------
+    gain
+        (k,): the gain by which a sample corrects the state.
+    poles
+        (k,): the poles from sample to sample.
+
+    Raises
+    ------
+    UsageError
+        No gain places these poles.
     """
-    poles = _poles(settings, channel)
-    gain = discrete_correction(channel.A, channel.C, poles, channel.interval_secs)
-    return gain, np.exp(poles * channel.interval_secs)
+    gain = discrete_correction(axis.A, axis.C, poles, axis.interval_secs)
+    return gain, np.exp(poles * axis.interval_secs)
 
 
-def _poles(settings: FilterSettings, channel: LinearAxis) -> ComplexArray:
-    """The continuous ones, 1/s."""
-    A, G, C, Q = channel.A, channel.G, channel.C, channel.Q
-    R = np.array([[channel.R]])
-    if settings.chosen == "quality":
-        damped = np.zeros(A.shape)
-        if len(A) > 1:
-            damped[1, 1] = settings.damping * channel.R
-        return quality_filter(A, C, G @ Q @ G.T, R, G=damped, shift=settings.shift).poles
-    poles = kalman_gain(A, G, C, Q, R).poles
-    decay = settings.yaw_decay if len(A) > 1 else settings.surge_decay
-    if settings.chosen != "per-tick" or decay is None:
-        return poles
-    wave = np.linalg.eigvals(A[2:, 2:]).astype(complex)
-    wave.real -= FORGETTING * np.abs(wave)
-    return np.concatenate((np.full(len(A[:2]), -decay + 0j), wave))
+def kalman_poles(axis: LinearAxis, settings: FilterSettings) -> ComplexArray:  # noqa: ARG001
+    """Return the poles (k,), 1/s, of the steady-state Kalman filter.
+
+    Source: Sakharov, Shergina, Chertkov, (11) and (13).
+    """
+    return kalman_gain(axis.A, axis.G, axis.C, axis.Q, np.array([[axis.R]])).poles
+
+
+def quality_poles(axis: LinearAxis, settings: FilterSettings) -> ComplexArray:
+    """Return the poles (k,), 1/s, of the quality filter of `settings.shift` and `.damping`.
+
+    `settings.damping` is the weight of the yaw acceleration over R. See `design.quality`.
+    """
+    G = np.zeros(axis.A.shape)
+    if len(axis.A) > 1:
+        G[1, 1] = settings.damping * axis.R
+    W, R = axis.G @ axis.Q @ axis.G.T, np.array([[axis.R]])
+    return quality_filter(axis.A, axis.C, W, R, G=G, shift=settings.shift).poles
+
+
+def stated_poles(axis: LinearAxis, settings: FilterSettings) -> ComplexArray:
+    """Return the poles (k,), 1/s, that the settings state, or else those of the Kalman filter.
+
+    `settings.yaw_decay` states a double pole of w and w', `settings.surge_decay` that of v. The
+    poles of a wave are its own, moved left by `WAVE_DECAY` of its frequency.
+    """
+    decay = settings.yaw_decay if len(axis.A) > 1 else settings.surge_decay
+    if decay is None:
+        return kalman_poles(axis, settings)
+    wave = np.linalg.eigvals(axis.A[2:, 2:]).astype(complex)
+    wave.real -= WAVE_DECAY * np.abs(wave)
+    return np.concatenate((np.full(len(axis.A[:2]), -decay + 0j), wave))
 
 
 @compiled
-def ticked_gain(
+def relinearised_gain(
     J: FloatArray,
     wave: FloatArray,
     c: FloatArray,
@@ -100,10 +143,24 @@ def ticked_gain(
     interval: float,
     output: int,
 ) -> FloatArray:
-    """The gain (s,) of one output that places its channel's poles for the motion of this instant.
+    """Compute the gain (s,) of one output that places the poles for the motion of this instant.
 
-    J (3, 3) of w, w' and v; `wave` (k, k) from sample to sample; c and poles (s,). Ackermann's
-    formula: a channel has one output, so that its poles leave no choice.
+    Ackermann's formula: each of yaw and surge has one output, so that the poles determine the gain.
+
+    Parameters
+    ----------
+    J
+        (3, 3): derivatives of w', w'' and v' by w, w' and v.
+    wave
+        (k, k): transition matrix of the wave from sample to sample.
+    c
+        (s,): row of the output matrix.
+    poles
+        (s,): poles from sample to sample, one for each state.
+    interval
+        Sampling interval, s.
+    output
+        0 for yaw rate, 1 for speed.
     """
     size = len(c)
     K = np.zeros(size)
@@ -111,17 +168,16 @@ def ticked_gain(
         K[2] = 1.0 - poles[2].real / np.exp(J[2, 2] * interval)
         return K
     count = size - 1
-    F, seen, wanted = np.zeros((count, count)), np.empty(count), np.empty(count, np.complex128)
+    F, row, placed = np.zeros((count, count)), np.empty(count), np.empty(count, np.complex128)
     F[:2, :2], F[2:, 2:] = _exponential(J[:2, :2] * interval), wave
     for i in range(count):
-        of_all = i if i < 2 else i + 1
-        seen[i], wanted[i] = c[of_all], poles[of_all]
+        state = i if i < 2 else i + 1  # v, the third state, is no state of yaw
+        row[i], placed[i] = c[state], poles[state]
     O, polynomial = np.empty((count, count)), np.eye(count).astype(np.complex128)
-    row = seen
     for i in range(count):
         O[i] = row
         row = row @ F
-        polynomial = polynomial @ (F - wanted[i] * np.eye(count))
+        polynomial = polynomial @ (F - placed[i] * np.eye(count))
     last = np.zeros(count)
     last[-1] = 1.0
     gain = np.linalg.solve(F, np.ascontiguousarray(polynomial.real) @ np.linalg.solve(O, last))
@@ -132,14 +188,14 @@ def ticked_gain(
 
 @compiled
 def _exponential(A: FloatArray) -> FloatArray:
-    """exp A: the series of A halved until it is small, and squared as often."""
+    """Return exp(A): the power series of A / 2^k, squared k times."""
     halvings = 0
     while np.abs(A).sum() > 2.0**halvings:
         halvings += 1
-    small = A / 2.0**halvings
+    scaled = A / 2.0**halvings
     total, term = np.eye(len(A)), np.eye(len(A))
     for k in range(1, 20):
-        term = term @ small / k
+        term = term @ scaled / k
         total += term
     for _ in range(halvings):
         total = total @ total

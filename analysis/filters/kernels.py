@@ -1,6 +1,7 @@
-"""What all filters do at an instant: believe a measurement or not, correct, go on.
+"""The steps that all filters share: gate, correction and covariance propagation.
 
-`P` is symmetric and stays so to the last bit.
+All are compiled loops over the elements of small matrices, without temporary arrays. `P` is
+symmetric, and the results are symmetric to the last bit.
 """
 
 import numpy as np
@@ -9,13 +10,13 @@ from numpy.typing import NDArray
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray
 
-MISSING, GATED, BELIEVED = range(3)  # measurements
-PATIENCE = 5  # so many in a row that are off are no spikes: it is the filter that is
+MISSING, REJECTED, ACCEPTED = range(3)  # status of a measurement
+MAX_REJECTED_IN_A_ROW = 5  # after more than this many the filter is wrong, not the sensor
 
 
 @compiled
-def project(P: FloatArray, c: FloatArray, Pc: FloatArray) -> float:
-    """P c, and c P c: the variance of an output as it is predicted."""
+def output_covariance(P: FloatArray, c: FloatArray, Pc: FloatArray) -> float:
+    """Compute P c into `Pc` (s,), and return c' P c, the variance of the predicted output c' x."""
     variance = 0.0
     for i in range(len(c)):
         Pc[i] = 0.0
@@ -26,7 +27,7 @@ def project(P: FloatArray, c: FloatArray, Pc: FloatArray) -> float:
 
 
 @compiled
-def weigh(
+def innovate(
     x: FloatArray,
     P: FloatArray,
     c: FloatArray,
@@ -34,40 +35,69 @@ def weigh(
     measured: float,
     gate: float,
     output: int,
-    off: NDArray[np.int64],
+    rejected_in_a_row: NDArray[np.int64],
     Pc: FloatArray,
 ) -> tuple[float, float, int]:
-    """The innovation of an output c x, its variance, and whether it is BELIEVED, GATED or MISSING.
+    """Compute the innovation of an output c' x, and decide whether to accept the measurement.
 
-    `Pc` is left as P c, which the gain is made of.
+    Parameters
+    ----------
+    x, P
+        The predicted state (s,) and its covariance (s, s).
+    c
+        The row (s,) of the output matrix.
+    r
+        The variance of the measurement noise.
+    measured
+        The measurement; NaN where there is none.
+    gate
+        The largest accepted innovation, in standard deviations.
+    output
+        The index of the output in `rejected_in_a_row`, which is updated; see `is_accepted`.
+    Pc
+        Set to P c (s,), from which the gain follows.
+
+    Returns
+    -------
+    innovation
+        measured - c' x.
+    variance
+        S = c' P c + r.
+    status
+        `ACCEPTED`, `REJECTED` or `MISSING`.
     """
-    variance = project(P, c, Pc) + r
+    variance = output_covariance(P, c, Pc) + r
     innovation = measured
     for i in range(len(c)):
         innovation -= c[i] * x[i]
     if not np.isfinite(innovation):
         return innovation, variance, MISSING
-    if believable(innovation, variance, gate, output, off):
-        return innovation, variance, BELIEVED
-    return innovation, variance, GATED
+    if is_accepted(innovation, variance, gate, output, rejected_in_a_row):
+        return innovation, variance, ACCEPTED
+    return innovation, variance, REJECTED
 
 
 @compiled
-def believable(
-    innovation: float, variance: float, gate: float, output: int, off: NDArray[np.int64]
+def is_accepted(
+    innovation: float,
+    variance: float,
+    gate: float,
+    output: int,
+    rejected_in_a_row: NDArray[np.int64],
 ) -> bool:
-    """Whether a measurement is within the gate, or has been off so often that it must be right.
+    """Whether a measurement is within the gate, or so many in a row were not that the filter errs.
 
-    `off` (2,) counts, for each output, how many have been off in a row. Once they are believed,
-    they are until the filter has come up to them.
+    `rejected_in_a_row` (2,) counts the measurements of each output outside the gate. After more
+    than `MAX_REJECTED_IN_A_ROW` all are accepted until one is within a standard deviation of the
+    prediction: until the filter has caught up with them.
     """
     distance = innovation * innovation / variance
-    if off[output] > PATIENCE:
+    if rejected_in_a_row[output] > MAX_REJECTED_IN_A_ROW:
         if distance <= 1:
-            off[output] = 0
+            rejected_in_a_row[output] = 0
         return True
-    off[output] = 0 if distance <= gate * gate else off[output] + 1
-    return bool(off[output] == 0 or off[output] > PATIENCE)
+    rejected_in_a_row[output] = 0 if distance <= gate * gate else rejected_in_a_row[output] + 1
+    return bool(rejected_in_a_row[output] == 0 or rejected_in_a_row[output] > MAX_REJECTED_IN_A_ROW)
 
 
 @compiled
@@ -79,7 +109,11 @@ def correct(
     innovation: float,
     variance: float,
 ) -> None:
-    """Take a measurement in by a gain K (s,), the best one or not: Joseph's form, written out."""
+    """Correct the state by a measurement, in place: x + K e and (I - K c') P (I - K c')' + K r K'.
+
+    Joseph's form of the covariance, written out with P c and S = c' P c + r. It holds for any gain
+    K (s,), optimal or not.
+    """
     for i in range(len(x)):
         x[i] += K[i] * innovation
         for j in range(i + 1):
@@ -89,7 +123,7 @@ def correct(
 
 @compiled
 def propagate(P: FloatArray, F: FloatArray, Q: FloatArray, FP: FloatArray) -> None:
-    """F P F' + Q in place; `FP` is room to work in."""
+    """Set P (s, s) to F P F' + Q, in place; `FP` (s, s) is work space."""
     n = len(P)
     for i in range(n):
         for j in range(n):

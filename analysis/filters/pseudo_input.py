@@ -1,4 +1,4 @@
-"""The Kalman filter with pseudo-inputs: Burylin's five states, his misprints mended."""
+"""The Kalman filter with pseudo-inputs: Burylin's five-state model, its misprints corrected."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -23,13 +23,13 @@ from shiplog.ships.paper import (
 from shiplog.types import FloatArray, Signals
 from shiplog.vessel.settings import FilterSettings
 
-from .base import OUTPUT_STATES, STATES, Estimates, Trace
-from .kernels import BELIEVED, GATED, correct, propagate, weigh
+from .base import NOISE_SETTINGS, OUTPUT_STATES, STATES, Estimates, FilterKind, Trace
+from .kernels import ACCEPTED, REJECTED, correct, innovate, propagate
 from .noise_model import NoiseModel
 
 
 class MotionState(NamedTuple):
-    """x of the paper's five-state model."""
+    """The state of the paper's model: w, w' and w'' in rad/s^k, v and v' in m/s^k."""
 
     w: float
     w_dot: float
@@ -39,13 +39,28 @@ class MotionState(NamedTuple):
 
 
 class PseudoInputFilter:
-    """The five-state model of the identification paper, filtering yaw rate and speed in chunks.
+    """A Kalman filter with the five-state model of the identification paper.
 
-    The mean is propagated by the exact nonlinear derivative (A x + B u with corrected
-    pseudo-inputs, `design.pseudo_input_matrices`), the covariance by A, as the paper has it. Where
-    an output is NaN there is no correction; the inputs must be known throughout. The paper's own
-    reading, in which w'' goes on evenly when the rudder starts or stops, so that nothing is left to
-    tell e by, is kept for comparison: `settings.as_printed`. Source: Burylin, eqs (4)-(6).
+    The mean is propagated by the exact nonlinear derivative (A x + B u with the corrected
+    pseudo-inputs, `design.pseudo_input_matrices`), the covariance by A, as in the paper. Where an
+    output is NaN there is no correction.
+
+    Parameters
+    ----------
+    model
+        The coefficients of the paper's model.
+    noise
+        The noise that the filter assumes; the process noise drives all states.
+    stats
+        The statistics of the signals.
+    settings
+        The settings of ``[filter]``. `as_printed` takes the paper's equations as printed, in which
+        w'' does not jump when the rudder starts or stops, so that e cannot be identified; it is
+        kept for comparison.
+
+    References
+    ----------
+    Burylin, eqs (4) to (6).
     """
 
     def __init__(
@@ -59,25 +74,25 @@ class PseudoInputFilter:
         F, Q = discretise(A, np.diag(per_state), stats.dt_secs)
         self._F, self._Q = np.ascontiguousarray(F), np.ascontiguousarray(Q)
         self._x, self._P = _start(model, stats)
-        self._off = np.zeros(len(PAPER_OUTPUTS), np.int64)
-        self._last_rate = np.zeros(1)  # of the rudder
+        self._rejected = np.zeros(len(PAPER_OUTPUTS), np.int64)
+        self._last_rate = np.zeros(1)  # of the rudder, rad/s
 
     def step(self, chunk: Signals, following: Mapping[str, float]) -> Estimates:
         """Filter the next chunk; `following` are the inputs at the instant after it."""
         return self._run(chunk, following, keep=False)[0]
 
     def trace(self, chunk: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
-        """As `step`, and how it came about."""
+        """Filter the next chunk, and return what the smoother needs as well."""
         return self._run(chunk, following, keep=True)
 
-    def told(
+    def to_estimates(
         self,
         chunk: Signals,  # noqa: ARG002 - the states are the filter's own
         following: Mapping[str, float],  # noqa: ARG002
         states: FloatArray,
         covariances: FloatArray,
     ) -> tuple[FloatArray, FloatArray, None]:
-        """States (n, 5) and their standard deviations."""
+        """Return the states (n, 5) and their standard deviations (n, 5)."""
         variances = np.diagonal(covariances, axis1=1, axis2=2)
         return states, np.sqrt(np.maximum(variances, 0.0)), None
 
@@ -88,31 +103,35 @@ class PseudoInputFilter:
         delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
         rows, innovations, gated, trace = _filter(
             self._model, self._x, self._P, self._F, self._Q, measured, self._r, self._gate,
-            self.outputs, delta, n, chunk.dt_secs, self._last_rate, self._jumps, self._off, keep,
+            self.outputs, delta, n, chunk.dt_secs, self._last_rate, self._jumps, self._rejected,
+            keep,
         )  # fmt: skip
         count = len(STATES)
-        told = Estimates(
+        estimates = Estimates(
             rows[:, :count], np.sqrt(rows[:, count:]), innovations[:, :2],
             np.sqrt(innovations[:, 2:]), gated,
         )  # fmt: skip
         x, P, K, e, S = trace
         F = np.repeat(self._F[None], len(P), axis=0)
-        return told, Trace(x, P, F, K, e, S)
+        return estimates, Trace(x, P, F, K, e, S)
 
 
 def _start(c: Coefficients, stats: SignalStats) -> tuple[FloatArray, FloatArray]:
-    """The first values measured, their rates from the model at rest; as unsure as they vary."""
+    """Return the state and its covariance at the start: the first measurements, w' = 0.
+
+    w'' and v' follow from the model; the standard deviations are those by which the signals vary.
+    """
     w, v = stats.first
     delta, n = (stats.head[name][0] for name in PAPER_INPUTS)
     w_ddot = yaw_acceleration_rate(c, w, 0.0, v, n, delta, 0.0)
     start = np.array([w, 0.0, w_ddot, v, surge_acceleration(c, w, v, n)])
     dw, dv = stats.spread + 1e-9
     rate = abs(c.a) + 1e-3
-    spread = np.array([dw, rate * dw, rate**2 * dw, dv, 1e-2 * dv])
-    return start, np.diag(spread**2)
+    stds = np.array([dw, rate * dw, rate**2 * dw, dv, 1e-2 * dv])
+    return start, np.diag(stds**2)
 
 
-_Kept = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+_TraceArrays = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 @compiled
@@ -131,16 +150,26 @@ def _filter(
     dt: float,
     last_rate: FloatArray,
     jumps: bool,
-    off: NDArray[np.int64],
+    rejected_in_a_row: NDArray[np.int64],
     keep: bool,
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], _Kept]:
-    """Rows of states and variances, (n, 10), of innovations and theirs, (n, 4), what was gated.
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], _TraceArrays]:
+    """Filter a chunk of n instants; `delta` and `n` are one longer.
 
-    And, if it is to be kept, a trace. `x`, `P`, `last_rate` and `off` go on to the next chunk;
-    `delta` and `n` are one longer.
+    `x`, `P`, `last_rate` and `rejected_in_a_row` are updated for the next chunk.
+
+    Returns
+    -------
+    rows
+        (n, 10): the states and their variances.
+    innovations
+        (n, 4): innovations of yaw rate and speed, and their variances.
+    gated
+        (n, 2): which samples were rejected.
+    trace
+        States, covariances, gains, innovations and variances of `Trace`; empty unless `keep`.
     """
     count, size = len(measured), len(x)
-    rows, told = np.empty((count, 2 * size)), np.empty((count, 4))
+    rows, innovations = np.empty((count, 2 * size)), np.empty((count, 4))
     gated = np.zeros((count, 2), np.bool_)
     kept = count if keep else 0
     xs, Ps = np.empty((kept, size)), np.empty((kept, size, size))
@@ -148,16 +177,16 @@ def _filter(
     FP, Pc = np.empty((size, size)), np.empty(size)
     for k in range(count):
         delta_dot, n_dot = (delta[k + 1] - delta[k]) / dt, (n[k + 1] - n[k]) / dt
-        if jumps:  # a rudder that starts or stops makes w'' do so
+        if jumps:  # w'' jumps when the rudder starts or stops
             x[2] += rudder_effect(c, x[3], n[k]) * c.e * (delta_dot - last_rate[0])
         last_rate[0] = delta_dot
         for output in range(2):
-            innovation, S, verdict = weigh(
-                x, P, C[output], r[output], measured[k, output], gate, output, off, Pc
+            innovation, S, status = innovate(
+                x, P, C[output], r[output], measured[k, output], gate, output, rejected_in_a_row, Pc
             )
-            told[k, output], told[k, 2 + output] = innovation, S
-            gated[k, output] = verdict == GATED
-            if verdict != BELIEVED:
+            innovations[k, output], innovations[k, 2 + output] = innovation, S
+            gated[k, output] = status == REJECTED
+            if status != ACCEPTED:
                 continue
             K = Pc / S
             correct(x, P, K, Pc, innovation, S)
@@ -169,7 +198,7 @@ def _filter(
             xs[k], Ps[k] = x, P
         _predict(c, x, delta[k], delta_dot, n[k], n_dot, dt)
         propagate(P, F, Q, FP)
-    return rows, told, gated, (xs, Ps, Ks, es, Ss)
+    return rows, innovations, gated, (xs, Ps, Ks, es, Ss)
 
 
 @compiled
@@ -182,7 +211,7 @@ def _predict(
     n_dot: float,
     dt: float,
 ) -> None:
-    """One Runge-Kutta step of x' = A x + B u, the rudder and the revolutions moving evenly."""
+    """Advance x' = A x + B u by a Runge-Kutta step, in place, with constant input rates."""
     s = MotionState(x[0], x[1], x[2], x[3], x[4])
     k1 = motion(c, s, delta, delta_dot, n, n_dot)
     half_delta, half_n = delta + delta_dot * dt / 2, n + n_dot * dt / 2
@@ -197,7 +226,7 @@ def _predict(
 def motion(
     c: Coefficients, x: MotionState, delta: float, delta_dot: float, n: float, n_dot: float
 ) -> MotionState:
-    """A x + B u, row by row, with the pseudo-inputs written out."""
+    """Return A x + B u, row by row, with the pseudo-inputs written out."""
     ks = rudder_effect(c, x.v, n)
     ks_dot = rudder_effect_rate(c, x.v, x.v_dot, n, n_dot)
     steering = c.d * delta + c.e * delta_dot
@@ -212,6 +241,7 @@ def motion(
 
 @compiled
 def _moved(x: MotionState, rate: MotionState, h: float) -> MotionState:
+    """Return x + h rate."""
     return MotionState(
         x.w + h * rate.w,
         x.w_dot + h * rate.w_dot,
@@ -219,3 +249,12 @@ def _moved(x: MotionState, rate: MotionState, h: float) -> MotionState:
         x.v + h * rate.v,
         x.v_dot + h * rate.v_dot,
     )
+
+
+PSEUDO_INPUT = FilterKind(
+    "pseudo-input",
+    PseudoInputFilter,
+    smoothable=True,
+    settings=(*NOISE_SETTINGS, "gate", "as_printed"),
+    process_noise="states",
+)

@@ -1,4 +1,8 @@
-"""The ship from one instant to the next: her states w, w' and v, and how they depend on them."""
+"""The ship's motion from one instant to the next, with its derivatives.
+
+The states are yaw rate w, rad/s, its derivative w', rad/s², and speed v, m/s; the inputs are the
+rudder angle delta, rad, and the revolutions n, rpm.
+"""
 
 import numpy as np
 
@@ -24,23 +28,25 @@ def predict(
     n_dot: float,
     dt: float,
 ) -> None:
-    """One Runge-Kutta step of the ship, and of its derivative by the state into F[:3, :3].
+    """Advance the state (s,) by a Runge-Kutta step, in place, and set F[:3, :3] to its derivative.
 
-    The rudder and the revolutions move evenly; the wave, beyond the third state, goes by F.
+    Rudder and revolutions change at constant rates `delta_dot` and `n_dot` during `dt`. The states
+    of a wave, beyond the third, advance by F[3:, 3:].
     """
     eye = np.eye(3)
     J, slopes = np.zeros((3, 3)), np.zeros((4, 3, 3))
-    rates, at = np.empty((4, 3)), np.empty(3)
+    rates, stage_x = np.empty((4, 3)), np.empty(3)
     for stage in range(4):
         share = (0.0, 0.5, 0.5, 1.0)[stage]
         h = share * dt
         for i in range(3):
-            at[i] = x[i] + (h * rates[stage - 1, i] if stage else 0.0)
-        turned, turns = delta + delta_dot * h, n + n_dot * h
-        rates[stage, 0] = at[1]
-        rates[stage, 1] = yaw_acceleration_rate(c, at[0], at[1], at[2], turns, turned, delta_dot)
-        rates[stage, 2] = surge_acceleration(c, at[0], at[2], turns)
-        linearise(c, at, turned, delta_dot, turns, J)
+            stage_x[i] = x[i] + (h * rates[stage - 1, i] if stage else 0.0)
+        stage_delta, stage_n = delta + delta_dot * h, n + n_dot * h
+        w, w_dot, v = stage_x[0], stage_x[1], stage_x[2]
+        rates[stage, 0] = w_dot
+        rates[stage, 1] = yaw_acceleration_rate(c, w, w_dot, v, stage_n, stage_delta, delta_dot)
+        rates[stage, 2] = surge_acceleration(c, w, v, stage_n)
+        linearise(c, stage_x, stage_delta, delta_dot, stage_n, J)
         for i in range(3):
             for j in range(3):
                 slopes[stage, i, j] = J[i, j]
@@ -50,28 +56,32 @@ def predict(
     for i in range(3):
         x[i] += dt / 6 * (rates[0, i] + 2 * rates[1, i] + 2 * rates[2, i] + rates[3, i])
         for j in range(3):
-            sum_of = slopes[0, i, j] + 2 * slopes[1, i, j] + 2 * slopes[2, i, j] + slopes[3, i, j]
-            F[i, j] = eye[i, j] + dt / 6 * sum_of
-    _turn_wave(x, F)
+            total = slopes[0, i, j] + 2 * slopes[1, i, j] + 2 * slopes[2, i, j] + slopes[3, i, j]
+            F[i, j] = eye[i, j] + dt / 6 * total
+    _advance_wave(x, F)
 
 
 @compiled
-def _turn_wave(x: FloatArray, F: FloatArray) -> None:
+def _advance_wave(x: FloatArray, F: FloatArray) -> None:
+    """Multiply the states of the wave by their transition matrix, in place."""
     size = len(x)
     if size > 3:
-        turned = np.zeros(size)
+        advanced = np.zeros(size)
         for i in range(3, size):
             for j in range(3, size):
-                turned[i] += F[i, j] * x[j]
+                advanced[i] += F[i, j] * x[j]
         for i in range(3, size):
-            x[i] = turned[i]
+            x[i] = advanced[i]
 
 
 @compiled
 def linearise(
     c: Coefficients, x: FloatArray, delta: float, delta_dot: float, n: float, J: FloatArray
 ) -> None:
-    """The derivatives of w', w'' and v' by w, w' and v, into J (3, 3)."""
+    """Set J (3, 3) to the derivatives of w', w'' and v' by w, w' and v.
+
+    The elements that are always zero are not written.
+    """
     w, v = x[0], x[2]
     J[0, 1] = 1.0
     J[1, 0] = yaw_stiffness(c, w)
@@ -81,7 +91,7 @@ def linearise(
 
 
 @compiled
-def tell(
+def output_row(
     c: Coefficients,
     x: FloatArray,
     P: FloatArray,
@@ -90,7 +100,10 @@ def tell(
     n: float,
     row: FloatArray,
 ) -> None:
-    """w, w', w'', v, v' and their variances, (10,); what is no state follows from the model."""
+    """Set `row` (10,) to w, w', w'', v, v' and their variances.
+
+    w'' and v' follow from the model, and their variances from its derivatives.
+    """
     w, w_dot, v = x[0], x[1], x[2]
     J = np.zeros((3, 3))
     linearise(c, x, delta, delta_dot, n, J)
@@ -105,6 +118,7 @@ def tell(
 
 @compiled
 def _variance(slope: FloatArray, P: FloatArray) -> float:
+    """Return slope' P slope of the first three states."""
     total = 0.0
     for i in range(3):
         for j in range(3):
@@ -113,7 +127,7 @@ def _variance(slope: FloatArray, P: FloatArray) -> float:
 
 
 @compiled
-def tell_all(
+def output_rows(
     c: Coefficients,
     states: FloatArray,
     covariances: FloatArray,
@@ -121,9 +135,9 @@ def tell_all(
     n: FloatArray,
     dt: float,
 ) -> FloatArray:
-    """`tell` of a chunk, (n, 10); `delta` is one longer."""
+    """Return `output_row` of each instant of a chunk, (n, 10); `delta` is one longer."""
     rows = np.empty((len(states), 10))
     for k in range(len(states)):
         rate = (delta[k + 1] - delta[k]) / dt
-        tell(c, states[k], covariances[k], delta[k], rate, n[k], rows[k])
+        output_row(c, states[k], covariances[k], delta[k], rate, n[k], rows[k])
     return rows

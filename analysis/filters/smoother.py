@@ -1,15 +1,17 @@
-"""The smoother: what the rest of the trial says of each instant.
+"""Fixed-interval smoother: the state at each instant given the measurements of the whole trial.
 
-Going back from the end, what the future measurements say of an instant is kept as an adjoint
-(λ, Λ): with the filter's x and P there, x - P λ is the smoothed state and P - P Λ P its covariance.
-It is the Rauch-Tung-Striebel smoother without an inverse of any covariance.
-Source: Bierman, "Fixed interval smoothing with discrete measurements", 1973, (modified
-Bryson-Frazier); Rauch, Tung and Striebel, "Maximum likelihood estimates of linear dynamic systems",
-1965.
+Backward from the end, the measurements after an instant are summarised by an adjoint (λ, Λ): with
+the filter's x and P at that instant, x - P λ is the smoothed state and P - P Λ P its covariance.
+This is the Rauch-Tung-Striebel smoother without the inverse of a covariance.
 
-A trial longer than memory is gone through twice, forward each time. The first time tells of each
-chunk how it takes an adjoint from its end to its start; from these follow the adjoints at the ends
-of all chunks, and with the one at its end each chunk is smoothed by itself the second time.
+A trial longer than memory is filtered twice, forward each time. The first pass computes for each
+chunk how an adjoint at its end becomes one at its start; the adjoints at the ends of all chunks
+follow from that, and with them the second pass smooths each chunk by itself.
+
+References
+----------
+Bierman, "Fixed interval smoothing with discrete measurements", 1973 (the modified Bryson-Frazier
+smoother). Rauch, Tung and Striebel, "Maximum likelihood estimates of linear dynamic systems", 1965.
 """
 
 from collections.abc import Mapping
@@ -21,83 +23,128 @@ import numpy as np
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray, Signals
 
-from .base import Estimates, Filter, Trace
+from .base import Estimates, SmoothableFilter, Trace
 from .kernels import propagate
 
-ROUNDING = 1e-9  # of a variance: no less is left of it in the difference
+MIN_VARIANCE_SHARE = 1e-9  # of a smoothed variance in the filtered: below it is rounding
 
 
 class Adjoint(NamedTuple):
-    """What all measurements after an instant say of the state then."""
+    """The information on a state in all measurements after its instant.
 
-    slope: FloatArray  # λ, (s,)
-    curvature: FloatArray  # Λ, (s, s)
+    Slope and curvature, by that state, of minus the log likelihood of these measurements.
+
+    Attributes
+    ----------
+    slope
+        λ, (s,).
+    curvature
+        Λ, (s, s).
+    """
+
+    slope: FloatArray
+    curvature: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
-    """How a chunk takes an adjoint from its end to before its start: Φ' λ + b, Φ' Λ Φ + B."""
+class _ChunkMap:
+    """The map of an adjoint from a chunk's end to before its start: Φ' λ + b, Φ' Λ Φ + B."""
 
-    across: FloatArray  # Φ, (s, s)
-    own: Adjoint  # b and B: what the chunk itself says
+    transition: FloatArray  # Φ, (s, s)
+    own: Adjoint  # b and B: from the measurements of the chunk
 
-    def back(self, end: Adjoint) -> Adjoint:
+    def at_start(self, end: Adjoint) -> Adjoint:
         return Adjoint(
-            self.across.T @ end.slope + self.own.slope,
-            self.across.T @ end.curvature @ self.across + self.own.curvature,
+            self.transition.T @ end.slope + self.own.slope,
+            self.transition.T @ end.curvature @ self.transition + self.own.curvature,
         )
 
 
 class SmoothingPass:
-    """Takes the traces of a trial's chunks in their order, the first time."""
+    """The first pass: takes the traces of all chunks in order, returns the adjoints at their ends.
+
+    Parameters
+    ----------
+    outputs
+        The output matrix C, (2, s), of the filter.
+    """
 
     def __init__(self, outputs: FloatArray) -> None:
         self._C = np.ascontiguousarray(outputs)
-        self._ways: list[_Way] = []
+        self._maps: list[_ChunkMap] = []
 
     def add(self, trace: Trace) -> None:
-        """Take the next chunk's."""
+        """Take the trace of the next chunk."""
         size = self._C.shape[1]
-        nothing = Adjoint(np.zeros(size), np.zeros((size, size)))
-        *_, start, across = _back(self._C, *_parts(trace), *nothing)
-        self._ways.append(_Way(across, Adjoint(*start)))
+        zero = Adjoint(np.zeros(size), np.zeros((size, size)))
+        *_, start, transition = _backward(self._C, *_backward_arrays(trace), *zero)
+        self._maps.append(_ChunkMap(transition, Adjoint(*start)))
 
     def result(self) -> list[Adjoint]:
-        """The adjoint at the end of each chunk, in their order."""
+        """Return the adjoint at the end of each chunk, in order."""
         size = self._C.shape[1]
-        ends = [Adjoint(np.zeros(size), np.zeros((size, size)))]  # after the last there is nothing
-        for way in reversed(self._ways[1:]):
-            ends.append(way.back(ends[-1]))
+        ends = [Adjoint(np.zeros(size), np.zeros((size, size)))]  # no measurement after the last
+        for chunk_map in reversed(self._maps[1:]):
+            ends.append(chunk_map.at_start(ends[-1]))
         return ends[::-1]
 
 
 def smooth(trace: Trace, outputs: FloatArray, end: Adjoint) -> tuple[FloatArray, FloatArray]:
-    """The smoothed states (n, s) and their covariances (n, s, s) of a chunk."""
+    """Smooth the states of a chunk.
+
+    Parameters
+    ----------
+    trace
+        The intermediate results of the filter.
+    outputs
+        The output matrix C, (2, s).
+    end
+        The adjoint at the end of the chunk.
+
+    Returns
+    -------
+    states
+        (n, s).
+    covariances
+        (n, s, s).
+    """
     C = np.ascontiguousarray(outputs)
-    slopes, curvatures, *_ = _back(C, *_parts(trace), *end)
+    slopes, curvatures, *_ = _backward(C, *_backward_arrays(trace), *end)
     return _smoothed(trace.states, trace.covariances, slopes, curvatures)
 
 
 def smoothed(
-    filtering: Filter,
+    filter_: SmoothableFilter,
     chunk: Signals,
     following: Mapping[str, float],
     estimates: Estimates,
     trace: Trace,
     end: Adjoint,
 ) -> Estimates:
-    """A chunk's estimates with its states smoothed; the innovations are the filter's own."""
-    found = smooth(trace, filtering.outputs, end)
-    states, stds, wave = filtering.told(chunk, following, *found)
+    """Return a chunk's estimates with smoothed states; the innovations stay the filter's.
+
+    Parameters
+    ----------
+    filter_
+        The filter that made the estimates and the trace.
+    chunk, following
+        The signals, and the inputs at the instant after them, as in `Filter.step`.
+    estimates, trace
+        The result of `SmoothableFilter.trace`.
+    end
+        The adjoint at the end of the chunk.
+    """
+    states, covariances = smooth(trace, filter_.outputs, end)
+    states, stds, wave = filter_.to_estimates(chunk, following, states, covariances)
     return replace(estimates, states=states, stds=stds, wave=wave)
 
 
-def _parts(trace: Trace) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _backward_arrays(trace: Trace) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     return trace.transitions, trace.gains, trace.innovations, trace.variances
 
 
 @compiled
-def _back(
+def _backward(
     C: FloatArray,
     F: FloatArray,
     K: FloatArray,
@@ -106,101 +153,110 @@ def _back(
     slope: FloatArray,
     curvature: FloatArray,
 ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray], FloatArray]:
-    """The adjoints at every instant of a chunk, (n, s) and (n, s, s), from those after its end.
+    """Compute the adjoints of a chunk backwards from the one after its end.
 
-    And the one before its first measurement, and Φ, by which the end's came there.
+    Returns
+    -------
+    slopes, curvatures
+        (n, s) and (n, s, s): after the corrections of each instant.
+    start
+        The adjoint before the first correction of the chunk.
+    transition
+        Φ, (s, s): the product of the transitions and corrections of the chunk.
     """
     count, size = len(F), C.shape[1]
     slopes, curvatures = np.empty((count, size)), np.empty((count, size, size))
-    slope, curvature, across = slope.copy(), curvature.copy(), np.eye(size)
-    room, row, nothing = np.empty((size, size)), np.empty(size), np.zeros((size, size))
+    slope, curvature, transition = slope.copy(), curvature.copy(), np.eye(size)
+    work, row, zero = np.empty((size, size)), np.empty(size), np.zeros((size, size))
     for k in range(count - 1, -1, -1):
-        _transpose_through(F[k], slope, row)
-        propagate(curvature, F[k].T, nothing, room)
-        _multiply(across, F[k], room)
+        _multiply_transposed(F[k], slope, row)
+        propagate(curvature, F[k].T, zero, work)
+        _multiply(transition, F[k], work)
         slopes[k], curvatures[k] = slope, curvature
         for output in range(1, -1, -1):
             if np.any(K[k, output] != 0.0):
-                _untake(C[output], K[k, output], e[k, output], S[k, output], slope, curvature, row)
-                _untake_across(C[output], K[k, output], across)
-    return slopes, curvatures, (slope, curvature), across
+                _before_correction(
+                    C[output], K[k, output], e[k, output], S[k, output], slope, curvature, row
+                )
+                _correction_before(C[output], K[k, output], transition)
+    return slopes, curvatures, (slope, curvature), transition
 
 
 @compiled
-def _transpose_through(F: FloatArray, slope: FloatArray, room: FloatArray) -> None:
-    """F' λ, in place."""
+def _multiply_transposed(F: FloatArray, slope: FloatArray, work: FloatArray) -> None:
+    """Set λ to F' λ, in place."""
     size = len(slope)
     for i in range(size):
-        room[i] = 0.0
+        work[i] = 0.0
         for j in range(size):
-            room[i] += F[j, i] * slope[j]
-    slope[:] = room
+            work[i] += F[j, i] * slope[j]
+    slope[:] = work
 
 
 @compiled
-def _multiply(across: FloatArray, F: FloatArray, room: FloatArray) -> None:
-    """Φ F, in place."""
+def _multiply(transition: FloatArray, F: FloatArray, work: FloatArray) -> None:
+    """Set Φ to Φ F, in place."""
     size = len(F)
     for i in range(size):
         for j in range(size):
-            room[i, j] = 0.0
+            work[i, j] = 0.0
             for m in range(size):
-                room[i, j] += across[i, m] * F[m, j]
-    across[:] = room
+                work[i, j] += transition[i, m] * F[m, j]
+    transition[:] = work
 
 
 @compiled
-def _untake(
+def _before_correction(
     c: FloatArray,
     K: FloatArray,
     e: float,
     S: float,
     slope: FloatArray,
     curvature: FloatArray,
-    room: FloatArray,
+    work: FloatArray,
 ) -> None:
-    """To before a measurement: M' λ - c e / S and M' Λ M + c c' / S with M = I - K c', in place."""
+    """Set λ, Λ to those before a correction: M' λ - c e / S, M' Λ M + c c' / S; M = I - K c'."""
     size = len(c)
-    along, twice = e / S, 1 / S
+    c_slope, c_curvature = e / S, 1 / S
     for i in range(size):
-        along += K[i] * slope[i]
-        room[i] = 0.0
+        c_slope += K[i] * slope[i]
+        work[i] = 0.0
         for j in range(size):
-            room[i] += curvature[i, j] * K[j]
-        twice += K[i] * room[i]
+            work[i] += curvature[i, j] * K[j]
+        c_curvature += K[i] * work[i]
     for i in range(size):
-        slope[i] -= c[i] * along
+        slope[i] -= c[i] * c_slope
         for j in range(i + 1):
-            curvature[i, j] += c[i] * twice * c[j] - c[i] * room[j] - room[i] * c[j]
+            curvature[i, j] += c[i] * c_curvature * c[j] - c[i] * work[j] - work[i] * c[j]
             curvature[j, i] = curvature[i, j]
 
 
 @compiled
-def _untake_across(c: FloatArray, K: FloatArray, across: FloatArray) -> None:
-    """Φ (I - K c'), in place."""
+def _correction_before(c: FloatArray, K: FloatArray, transition: FloatArray) -> None:
+    """Set Φ to Φ (I - K c'), in place."""
     for i in range(len(c)):
-        taken = 0.0
+        gain = 0.0
         for j in range(len(c)):
-            taken += across[i, j] * K[j]
+            gain += transition[i, j] * K[j]
         for j in range(len(c)):
-            across[i, j] -= taken * c[j]
+            transition[i, j] -= gain * c[j]
 
 
 @compiled
 def _smoothed(
     x: FloatArray, P: FloatArray, slopes: FloatArray, curvatures: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """x - P λ and P - P Λ P at every instant."""
+    """Compute x - P λ and P - P Λ P at every instant."""
     size = x.shape[1]
     states, covariances = np.empty_like(x), np.empty_like(P)
-    room, nothing = np.empty((size, size)), np.zeros((size, size))
+    work, zero = np.empty((size, size)), np.zeros((size, size))
     for k in range(len(x)):
         covariances[k] = curvatures[k]
-        propagate(covariances[k], P[k], nothing, room)
+        propagate(covariances[k], P[k], zero, work)
         for i in range(size):
             states[k, i] = x[k, i]
             for j in range(size):
                 states[k, i] -= P[k, i, j] * slopes[k, j]
                 covariances[k, i, j] = P[k, i, j] - covariances[k, i, j]
-            covariances[k, i, i] = max(covariances[k, i, i], ROUNDING * P[k, i, i])
+            covariances[k, i, i] = max(covariances[k, i, i], MIN_VARIANCE_SHARE * P[k, i, i])
     return states, covariances

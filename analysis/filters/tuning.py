@@ -1,4 +1,4 @@
-"""The noise of a trial: what its vessel file states, and from the log what that leaves open."""
+"""The noise of a trial: what the settings state, and otherwise estimated from the log."""
 
 from dataclasses import replace
 
@@ -9,39 +9,59 @@ from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog.ships.paper import Coefficients
 from shiplog.vessel.settings import FilterSettings
 
-from .base import Estimates
-from .factory import make_filter
+from .base import Estimates, FilterKind
+from .factory import filter_kind
 from .noise_model import NoiseModel
+from .three_state import EXTENDED
 from .wave_fit import Wave, fit_wave
 
-PAPER_RATIO = 0.01 / 400  # Burylin's Q over his R, 1/s^2: no default trusts the model more
-EVERYTHING = 1e12  # standard deviations
-SPIKE = 8.0
-HIGHEST_RATIO = 1e8  # beyond it an estimate is what was measured
+PAPER_RATIO = 0.01 / 400  # Burylin's Q over his R, 1/s²; no filter trusts its model more by default
+MAX_RATIO = 1e8  # 1/s²; above it the estimate is the measurement itself
+OPEN_GATE = 1e12  # standard deviations: nothing is rejected
+SPIKE_STDS = 8.0  # a residual beyond this many standard deviations is a spike
+MAD_TO_STD = 1.4826  # of normal noise: standard deviation over median absolute deviation
 
 
-def noise_of(stats: SignalStats, model: Coefficients, settings: FilterSettings) -> NoiseModel:
-    """The noise a vessel file states, and from the log what it leaves open.
+def noise_of(
+    stats: SignalStats,
+    model: Coefficients,
+    settings: FilterSettings,
+    kind: FilterKind | None = None,
+) -> NoiseModel:
+    """Return the noise that the settings state; what they do not state is estimated from the log.
 
-    The measurement noise shows in the third differences of a signal, where the ship's motion does
-    not; the process noise is what makes the innovations most likely: those of the extended filter,
-    where the one chosen has not the best gain. The wave, if one is asked for, is what stands out in
-    the spectrum of what a slow filter leaves.
+    The measurement noise follows from the third differences of a signal, in which the ship's motion
+    does not show. The intensity of the process noise is the one that makes the innovations most
+    likely: those of the filter itself if its process noise drives all states, otherwise those of
+    the extended Kalman filter, whose gain is optimal. The wave, where the settings ask for one, is
+    a peak in the spectrum of a slow filter's innovations.
+
+    Parameters
+    ----------
+    stats
+        The statistics of the signals. The first part of the trial, `stats.head`, is used.
+    model
+        The coefficients of the identification paper's model.
+    settings
+        The settings of ``[filter]``.
+    kind
+        The kind of filter; by default the one that `settings` names.
     """
+    kind = kind or filter_kind(settings.chosen)
     given = (settings.yaw_rate_std, settings.speed_std)
     stds = np.array([a if b is None else b for a, b in zip(stats.noise, given, strict=True)])
-    stated, least, most = _ratios(settings)
+    stated, least, most = _ratios(settings, kind)
     noise = NoiseModel(stds, np.array(least), (given[0] is None, given[1] is None))
-    of_head = signal_stats(stats.head, model)
+    head_stats = signal_stats(stats.head, model)
     if settings.wave:
-        noise = replace(noise, wave=_told_wave(of_head, model, noise, settings))
+        noise = replace(noise, wave=_distinct_wave(head_stats, model, noise, settings, kind))
     for output, ratio in enumerate(stated):
-        likely = ratio
-        if likely is None:
+        likeliest = ratio
+        if likeliest is None:
             bounds = (least[output], most[output])
-            likely = _likeliest(of_head, model, noise, settings, output, bounds)
+            likeliest = _likeliest_ratio(head_stats, model, noise, settings, kind, output, bounds)
         ratios = noise.process_ratio.copy()
-        ratios[output] = likely
+        ratios[output] = likeliest
         noise = replace(noise, process_ratio=ratios)
     return replace(noise, tuned=(stated[0] is None, stated[1] is None))
 
@@ -50,46 +70,52 @@ _Pair = tuple[float, float]
 _Stated = tuple[float | None, float | None]
 
 
-def _ratios(settings: FilterSettings) -> tuple[_Stated, _Pair, _Pair]:
-    """Of process to measurement intensity: what is stated, and the bounds of what is likely.
+def _ratios(settings: FilterSettings, kind: FilterKind) -> tuple[_Stated, _Pair, _Pair]:
+    """Return the stated ratios of process to measurement noise, and the bounds of unstated ones.
 
-    The root of the paper's ratio is about the bandwidth of his filter. In the others, where the
-    noise is that of a moment and a force alone, a bandwidth ω takes ω^4 in yaw and ω^2 in surge.
+    The square root of the paper's ratio is about the bandwidth of its filter. Where the process
+    noise drives the yaw moment and the surge force only, a bandwidth ω corresponds to a ratio of
+    ω⁴ in yaw and ω² in surge.
     """
-    same = settings.process_ratio
-    if settings.chosen == "pseudo-input":
-        return (same, same), (PAPER_RATIO, PAPER_RATIO), (HIGHEST_RATIO, HIGHEST_RATIO)
+    ratio = settings.process_ratio
+    if kind.process_noise == "states":
+        return (ratio, ratio), (PAPER_RATIO, PAPER_RATIO), (MAX_RATIO, MAX_RATIO)
     yaw, surge = (
-        same if width is None else width**2
-        for width in (settings.yaw_bandwidth, settings.surge_bandwidth)
+        ratio if bandwidth is None else bandwidth**2
+        for bandwidth in (settings.yaw_bandwidth, settings.surge_bandwidth)
     )
     stated = (None if yaw is None else yaw**2, surge)
-    return stated, (PAPER_RATIO**2, PAPER_RATIO), (HIGHEST_RATIO**2, HIGHEST_RATIO)
+    return stated, (PAPER_RATIO**2, PAPER_RATIO), (MAX_RATIO**2, MAX_RATIO)
 
 
-def _likeliest(
+def _likeliest_ratio(
     stats: SignalStats,
     model: Coefficients,
     noise: NoiseModel,
     settings: FilterSettings,
+    kind: FilterKind,
     output: int,
     bounds: _Pair,
 ) -> float:
-    """The ratio of one output that makes its innovations most likely; what is off counts as far."""
+    """Return the ratio of one output that makes its innovations most likely.
 
-    def unlikelihood(log_ratio: float) -> float:
+    Innovations outside the gate count as if they were at the gate.
+    """
+
+    def deviance(log_ratio: float) -> float:
         ratios = noise.process_ratio.copy()
         ratios[output] = 10.0**log_ratio
-        estimates = _head_filtered(stats, model, replace(noise, process_ratio=ratios), settings)
+        candidate = replace(noise, process_ratio=ratios)
+        estimates = _filter_head(stats, model, candidate, settings, kind)
         e, s = estimates.innovations[:, output], estimates.innovation_stds[:, output]
-        surprise = np.minimum((e / s) ** 2, settings.gate**2)
-        score = float(np.nansum(surprise + 2 * np.log(s)))
-        return score if np.isfinite(score) else 1e300
+        squares = np.minimum((e / s) ** 2, settings.gate**2)
+        total = float(np.nansum(squares + 2 * np.log(s)))
+        return total if np.isfinite(total) else 1e300
 
     from scipy.optimize import minimize_scalar  # noqa: PLC0415 - it takes long to import
 
     best = minimize_scalar(
-        unlikelihood,
+        deviance,
         bounds=(float(np.log10(bounds[0])), float(np.log10(bounds[1]))),
         method="bounded",
         options={"xatol": 0.02},
@@ -98,36 +124,62 @@ def _likeliest(
 
 
 def wave_in(
-    stats: SignalStats, model: Coefficients, noise: NoiseModel, settings: FilterSettings
+    stats: SignalStats,
+    model: Coefficients,
+    noise: NoiseModel,
+    settings: FilterSettings,
+    kind: FilterKind | None = None,
 ) -> Wave | None:
-    """The wave in the yaw rate, whether it stands out or not; None of too few samples."""
-    _, least, _ = _ratios(settings)
+    """Fit a wave to the yaw rate, distinct from the noise or not.
+
+    Parameters
+    ----------
+    stats, model, settings, kind
+        As in `noise_of`.
+    noise
+        The noise of the measurements; its process noise and wave are not used.
+
+    Returns
+    -------
+    Wave or None
+        None where there are too few samples for a fit.
+    """
+    kind = kind or filter_kind(settings.chosen)
+    _, least, _ = _ratios(settings, kind)
     slow = replace(noise, process_ratio=np.array(least), wave=None)
-    return _wave(signal_stats(stats.head, model), model, slow, settings)
+    return _fitted_wave(signal_stats(stats.head, model), model, slow, settings, kind)
 
 
-def _told_wave(
-    stats: SignalStats, model: Coefficients, noise: NoiseModel, settings: FilterSettings
+def _distinct_wave(
+    stats: SignalStats,
+    model: Coefficients,
+    noise: NoiseModel,
+    settings: FilterSettings,
+    kind: FilterKind,
 ) -> Wave | None:
-    """The wave that is to be told from the turning: one that is stated, or that stands out."""
-    wave = _wave(stats, model, noise, settings)
+    """Return the wave for the filter to model: one that is stated, or distinct from the noise."""
+    wave = _fitted_wave(stats, model, noise, settings, kind)
     stated = settings.wave_frequency is not None and settings.wave_std is not None
     return wave if wave is not None and (stated or wave.stands_out) else None
 
 
-def _wave(
-    stats: SignalStats, model: Coefficients, noise: NoiseModel, settings: FilterSettings
+def _fitted_wave(
+    stats: SignalStats,
+    model: Coefficients,
+    noise: NoiseModel,
+    settings: FilterSettings,
+    kind: FilterKind,
 ) -> Wave | None:
-    """The wave in what the slowest filter leaves of the yaw rate.
+    """Fit a wave to the innovations of the slowest filter in the yaw rate.
 
-    Its gate is open, for a filter that knows of no wave would not believe the crests; spikes are
-    what is far beyond all else.
+    Its gate is open, because a filter without a wave model would reject the crests. Spikes are left
+    out by their distance from the typical innovation.
     """
-    believing = replace(settings, gate=EVERYTHING)
-    left = _head_filtered(stats, model, noise, believing).innovations[:, 0]
-    usually = 1.4826 * float(np.nanmedian(np.abs(left)))
+    ungated = replace(settings, gate=OPEN_GATE)
+    innovations = _filter_head(stats, model, noise, ungated, kind).innovations[:, 0]
+    std = MAD_TO_STD * float(np.nanmedian(np.abs(innovations)))
     return fit_wave(
-        np.where(np.abs(left) <= SPIKE * usually, left, np.nan),
+        np.where(np.abs(innovations) <= SPIKE_STDS * std, innovations, np.nan),
         stats.dt_secs,
         float(stats.intervals[0]),
         frequency=settings.wave_frequency,
@@ -136,9 +188,15 @@ def _wave(
     )
 
 
-def _head_filtered(
-    stats: SignalStats, model: Coefficients, noise: NoiseModel, settings: FilterSettings
+def _filter_head(
+    stats: SignalStats,
+    model: Coefficients,
+    noise: NoiseModel,
+    settings: FilterSettings,
+    kind: FilterKind,
 ) -> Estimates:
-    kind = "pseudo-input" if settings.chosen == "pseudo-input" else "extended"
-    judging = replace(settings, kind=kind, smooth=False)
-    return make_filter(model, noise, stats, judging).step(stats.head, last_inputs(stats.head))
+    """Filter the first part of the trial with the filter that the noise is estimated by."""
+    judge = kind if kind.process_noise == "states" else EXTENDED
+    judge_settings = replace(settings, kind=judge.name, smooth=False)
+    filter_ = judge.make(model, noise, stats, judge_settings)
+    return filter_.step(stats.head, last_inputs(stats.head))

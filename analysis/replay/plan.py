@@ -9,7 +9,10 @@ from dataclasses import dataclass, replace
 from math import sqrt
 
 from analysis.disturbance.observer import blindness
+from analysis.filters.base import FilterKind
+from analysis.filters.factory import filter_kind
 from analysis.filters.noise_model import NoiseModel
+from analysis.filters.settings_check import check_filter_settings, unused_setting_warnings
 from analysis.filters.tuning import noise_of, wave_in
 from analysis.regression.first_model import fit_first_model
 from analysis.regression.sliding import Solution
@@ -21,7 +24,7 @@ from shiplog.resampling import Clock
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Log
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings
-from shiplog.vessel.vessel import unused_setting_warnings, with_settings
+from shiplog.vessel.vessel import with_settings
 from shiplog.vessel.vessel_parser import parse_vessel
 
 from .passes import FirstPass, SecondPass, first_pass, second_pass
@@ -48,6 +51,8 @@ class Plan:
         The vessel, with the coefficients and the settings that the replay uses.
     model_origin
         Where the coefficients came from: `GIVEN_MODEL`, `ATTACHED_MODEL` or `FITTED_MODEL`.
+    filter_kind
+        The kind of filter; `vessel.filter.kind` is its name.
     stats
         Statistics of the resampled signals.
     noise
@@ -64,6 +69,7 @@ class Plan:
     clock: Clock
     vessel: Vessel
     model_origin: str
+    filter_kind: FilterKind
     stats: SignalStats
     noise: NoiseModel
     disturbance_settings: DisturbanceSettings
@@ -86,6 +92,7 @@ def plan_replay(
     log: Log,
     vessel: Vessel | None = None,
     *,
+    filter: FilterKind | str | None = None,  # noqa: A002 - as on the command line
     settings: Mapping[str, object] | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> Plan:
@@ -98,8 +105,10 @@ def plan_replay(
     vessel
         The vessel; by default the one that the log carries, or else a first model is fitted to the
         log.
+    filter
+        The filter, or its name; by default the one that the settings or the vessel name.
     settings
-        Settings that take precedence over the vessel's, such as ``{"filter.kind": "extended"}``.
+        Settings that take precedence over the vessel's, such as ``{"filter.gate": 4.0}``.
     on_progress
         Called with each step and its share done.
 
@@ -116,6 +125,7 @@ def plan_replay(
         Where a setting is invalid.
     """
     vessel, origin = _stated_vessel(log, vessel, settings or {})
+    vessel, kind = _with_filter(vessel, filter)
     first = first_pass(log, on_progress)
     second = second_pass(log, first, vessel, on_progress)
     on_progress("choose the model", 0.0)
@@ -125,14 +135,15 @@ def plan_replay(
         origin = FITTED_MODEL
     else:
         model_warnings = _other_model_warnings(vessel)
-    warnings += [*model_warnings, *unused_setting_warnings(vessel)]
-    noise, noise_warnings = _noise(vessel, first, second.stats)
-    disturbance, wave_warnings = _disturbance_settings(vessel, second.stats, noise)
+    warnings += [*model_warnings, *unused_setting_warnings(kind, vessel.filter, vessel.disturbance)]
+    noise, noise_warnings = _noise(vessel, kind, first, second.stats)
+    disturbance, wave_warnings = _disturbance_settings(vessel, kind, second.stats, noise)
     return Plan(
         log_stats=first.log_stats,
         clock=first.clock,
         vessel=vessel,
         model_origin=origin,
+        filter_kind=kind,
         stats=second.stats,
         noise=noise,
         disturbance_settings=disturbance,
@@ -152,6 +163,19 @@ def _stated_vessel(
         attached = parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}")
         return with_settings(attached, settings), ATTACHED_MODEL
     return with_settings(Vessel("", None), settings), FITTED_MODEL
+
+
+def _with_filter(vessel: Vessel, chosen: FilterKind | str | None) -> tuple[Vessel, FilterKind]:
+    """Return the vessel with the filter chosen, and its kind; raise `UsageError` if it cannot be.
+
+    A `FilterKind` need not be installed.
+    """
+    name = chosen or vessel.filter.chosen
+    kind = name if isinstance(name, FilterKind) else filter_kind(name)
+    if chosen is not None:
+        vessel = replace(vessel, filter=replace(vessel.filter, kind=kind.name))
+    check_filter_settings(kind, vessel.filter)
+    return vessel, kind
 
 
 def _with_first_model(
@@ -187,10 +211,12 @@ def _other_model_warnings(vessel: Vessel) -> list[str]:
     return [text]
 
 
-def _noise(vessel: Vessel, first: FirstPass, stats: SignalStats) -> tuple[NoiseModel, list[str]]:
+def _noise(
+    vessel: Vessel, kind: FilterKind, first: FirstPass, stats: SignalStats
+) -> tuple[NoiseModel, list[str]]:
     """Return the noise that the filter assumes, and warnings about its wave."""
     settings = _averaged(vessel.filter, first.log_stats, first.clock.dt_secs)
-    noise, warnings = noise_of(stats, vessel.paper_coefficients, settings), []
+    noise, warnings = noise_of(stats, vessel.paper_coefficients, settings, kind), []
     if settings.wave and noise.wave is None:
         warnings.append(
             "no wave found in the residual of the yaw rate: none is separated from the ship's "
@@ -206,7 +232,7 @@ def _noise(vessel: Vessel, first: FirstPass, stats: SignalStats) -> tuple[NoiseM
 
 
 def _disturbance_settings(
-    vessel: Vessel, stats: SignalStats, noise: NoiseModel
+    vessel: Vessel, kind: FilterKind, stats: SignalStats, noise: NoiseModel
 ) -> tuple[DisturbanceSettings, list[str]]:
     """Return the disturbance settings with the frequency of a wave, and warnings about it."""
     settings, warnings = vessel.disturbance, []
@@ -214,7 +240,7 @@ def _disturbance_settings(
         return settings, []
     frequency = settings.wave_frequency or vessel.filter.wave_frequency
     if frequency is None:
-        wave = noise.wave or wave_in(stats, vessel.paper_coefficients, noise, vessel.filter)
+        wave = noise.wave or wave_in(stats, vessel.paper_coefficients, noise, vessel.filter, kind)
         frequency = wave.frequency if wave is not None and wave.stands_out else None
     if frequency is None:
         frequency = DEFAULT_WAVE_FREQUENCY

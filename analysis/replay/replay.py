@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.disturbance.observer import Disturbance, DisturbanceSummary, ForceObserver
-from analysis.filters.base import OUTPUT_STATES, Estimates, Filter
-from analysis.filters.factory import make_filter
+from analysis.filters.base import OUTPUT_STATES, Estimates, Filter, FilterKind
+from analysis.filters.factory import smoothable
 from analysis.filters.smoother import Adjoint, SmoothingPass, smoothed
 from analysis.regression.changes import Change, ShipChangeTest
 from analysis.regression.coefficients import CoefficientFit, CoefficientStage
@@ -133,6 +133,7 @@ def analyse(
     log: Log | str | os.PathLike[str],
     vessel: Vessel | None = None,
     *,
+    filter: FilterKind | str | None = None,  # noqa: A002 - as on the command line
     settings: Mapping[str, object] | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> Analysis:
@@ -147,8 +148,10 @@ def analyse(
     vessel
         The vessel; by default the one that the log carries, or else a first model is fitted to the
         log.
+    filter
+        The filter, or its name; by default the one that the settings or the vessel name.
     settings
-        Settings that take precedence over the vessel's, such as ``{"filter.kind": "extended"}``.
+        Settings that take precedence over the vessel's, such as ``{"filter.gate": 4.0}``.
     on_progress
         Called with each of `PROGRESS_STEPS` and its share done.
 
@@ -169,7 +172,7 @@ def analyse(
     """
     if isinstance(log, str | os.PathLike):
         log = open_log(log)
-    plan = plan_replay(log, vessel, settings=settings, on_progress=on_progress)
+    plan = plan_replay(log, vessel, filter=filter, settings=settings, on_progress=on_progress)
     replay = Replay(log, plan, on_progress=on_progress)
     whole = concatenate(list(replay.chunks()))
     return Analysis(
@@ -245,12 +248,13 @@ class Replay:
         """Return for each chunk, in order, what the measurements after it add: one more pass."""
         plan = self.plan
         hold, (filter_, _) = InputHold(plan.clock), _estimators(plan, self._log.name)
-        backward = SmoothingPass(filter_.outputs)
+        tracing = smoothable(filter_)
+        backward = SmoothingPass(tracing.outputs)
         resampled = resampled_chunks(
             self._log, plan.clock, self._on_progress, "smooth", hold.add_raw
         )
         for _, held, following in held_throughout(resampled, hold):
-            backward.add(filter_.trace(held, following)[1])
+            backward.add(tracing.trace(held, following)[1])
         return iter(backward.result())
 
 
@@ -336,8 +340,9 @@ class _Stages:
         if adjoint is None:
             estimates = self._filter.step(held, following)
         else:
-            filtered, trace = self._filter.trace(held, following)
-            estimates = smoothed(self._filter, held, following, filtered, trace, adjoint)
+            tracing = smoothable(self._filter)
+            filtered, trace = tracing.trace(held, following)
+            estimates = smoothed(tracing, held, following, filtered, trace, adjoint)
         if not np.all(np.isfinite(estimates.states)):
             raise _diverged(self._plan, self._log_name)
         return estimates
@@ -349,7 +354,7 @@ def _estimators(plan: Plan, log_name: str) -> tuple[Filter, ForceObserver]:
     settings = plan.disturbance_settings
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            filter_ = make_filter(model, noise, stats, plan.vessel.filter)
+            filter_ = plan.filter_kind.make(model, noise, stats, plan.vessel.filter)
             observer = ForceObserver(model, noise, stats, settings, settings.wave_frequency)
             return filter_, observer
     except (UsageError, np.linalg.LinAlgError) as error:

@@ -3,15 +3,15 @@
 Each key is a field of a dataclass; the field's metadata has its type and its limits.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from math import inf, isfinite
 from typing import Any, TypeVar
 
+from shiplog.extensions import extension_names
 from shiplog.units import did_you_mean
 
-FILTERS = ("pseudo-input", "steady-state", "quality", "per-tick", "extended")
-SMOOTHED = ("pseudo-input", "extended")  # optimal gain, which the smoother's equations assume
+FILTER_GROUP = "shiplog.filters"  # the entry points whose names `[filter] kind` accepts
 DISTURBANCES = ("constant", "ramp", "wave")
 SPECTRA = ("butterworth", "binomial")
 
@@ -31,8 +31,15 @@ def _number(
     return field(default=default, metadata={"kind": float, **limits})
 
 
+def _filter_names() -> tuple[str, ...]:
+    return extension_names(FILTER_GROUP)
+
+
 def _choice(
-    of: Sequence[str], default: str | tuple[str, ...] | None, *, several: bool = False
+    of: Sequence[str] | Callable[[], Sequence[str]],
+    default: str | tuple[str, ...] | None,
+    *,
+    several: bool = False,
 ) -> Any:  # noqa: ANN401
     return field(default=default, metadata={"kind": list if several else str, "of": of})
 
@@ -75,7 +82,7 @@ class FilterSettings:
         Frequency in rad/s, damping ratio, and standard deviation in rad/s of the wave model.
     """
 
-    kind: str | None = _choice(FILTERS, None)
+    kind: str | None = _choice(_filter_names, None)
     smooth: bool = _flag()
     gate: float = _number(6.0, positive=True, most=1e9)
     yaw_rate_std: float | None = _number(positive=True, most=10.0)
@@ -136,42 +143,8 @@ class IdentifierSettings:
     window_secs: float = _number(200.0, least=MIN_WINDOW_SECS, most=1e9)
 
 
-ONLY_OF = {  # filters that use a setting; all filters use the others
-    "as_printed": ("pseudo-input",),
-    "yaw_bandwidth": FILTERS[1:],
-    "surge_bandwidth": FILTERS[1:],
-    "shift": ("quality",),
-    "damping": ("quality",),
-    "yaw_decay": ("per-tick",),
-    "surge_decay": ("per-tick",),
-}
-
-
-def unused_settings(filtering: FilterSettings, observing: DisturbanceSettings) -> list[str]:
-    """Return the names of settings that differ from their defaults and have no effect.
-
-    Examples
-    --------
-    >>> unused_settings(FilterSettings(kind="extended", shift=0.2), DisturbanceSettings())
-    ['filter.shift']
-    """
-    defaults, names = settings_dict(FilterSettings()), []
-    changed = [key for key, value in settings_dict(filtering).items() if defaults.get(key) != value]
-    names += [key for key in changed if filtering.chosen not in ONLY_OF.get(key, FILTERS)]
-    observes_wave = "wave" in observing.models
-    if not filtering.wave:
-        for key in ("wave_frequency", "wave_damping", "wave_std"):
-            # the observer takes the filter's wave frequency for its own wave model
-            if key in changed and not (key == "wave_frequency" and observes_wave):
-                names.append(key)
-    unused = [f"filter.{name}" for name in names]
-    if observing.wave_frequency is not None and not observes_wave:
-        unused.append("disturbance.wave_frequency")
-    return unused
-
-
 def filter_settings(table: Mapping[str, object], errors: list[str]) -> FilterSettings:
-    """Parse a `[filter]` section.
+    """Parse a `[filter]` section; whether its filter can comply is checked by the replay.
 
     Parameters
     ----------
@@ -186,15 +159,7 @@ def filter_settings(table: Mapping[str, object], errors: list[str]) -> FilterSet
     >>> filter_settings({"kind": "extended", "gate": 0}, errors).kind, errors
     ('extended', ['filter.gate must be positive, got 0'])
     """
-    settings = _parse_section("filter", FilterSettings, table, errors)
-    if settings.wave and settings.kind == "pseudo-input":
-        errors.append("filter.kind = 'pseudo-input' cannot model a wave; use 'extended'")
-    if settings.smooth and settings.chosen not in SMOOTHED:
-        errors.append(
-            f"filter.smooth needs a filter with optimal gain, which {settings.chosen!r} is not;"
-            f" use {' or '.join(map(repr, SMOOTHED))}"
-        )
-    return settings
+    return _parse_section("filter", FilterSettings, table, errors)
 
 
 def disturbance_settings(table: Mapping[str, object], errors: list[str]) -> DisturbanceSettings:
@@ -271,12 +236,13 @@ def _value_error(label: str, value: object, expected: Mapping[str, Any]) -> str 
         return number_error(
             label, value, expected["least"], expected["most"], positive=expected["positive"]
         )
-    choices = ", ".join(expected["of"])
+    allowed = expected["of"]() if callable(expected["of"]) else expected["of"]
+    choices = ", ".join(allowed)
     if kind is str:
-        ok = value in expected["of"]
+        ok = value in allowed
         return None if ok else f"{label} must be one of {choices}, got {value!r}"
     ok = isinstance(value, list | tuple) and bool(value)
-    ok = ok and all(each in expected["of"] for each in value)  # type: ignore[attr-defined]
+    ok = ok and all(each in allowed for each in value)  # type: ignore[attr-defined]
     return None if ok else f"{label} must be a list of some of {choices}, got {value!r}"
 
 

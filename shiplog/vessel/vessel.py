@@ -16,7 +16,6 @@ from .settings import (
     filter_settings,
     identifier_settings,
     settings_dict,
-    unused_settings,
 )
 
 if TYPE_CHECKING:  # it brings numba; only verbs that compute need it
@@ -123,21 +122,3 @@ def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
     if errors:
         raise UsageError(f"wrong settings: {'; '.join(errors)}")
     return replace(vessel, filter=filtering, disturbance=observing, identifier=identifying)
-
-
-def unused_setting_warnings(vessel: Vessel) -> list[str]:
-    """Warn about settings of a vessel that have no effect.
-
-    Returns
-    -------
-    list of str
-        One line with the names of these settings and the remedy; empty where there are none.
-    """
-    names = ", ".join(unused_settings(vessel.filter, vessel.disturbance))
-    if not names:
-        return []
-    warning = (
-        f"settings without effect: {names}; filter.kind is {vessel.filter.chosen!r}: "
-        "remove them or choose another filter or disturbance model"
-    )
-    return [warning]

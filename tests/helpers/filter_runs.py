@@ -9,15 +9,34 @@ from gaussian import LinearRun, held
 from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag
 
-from analysis.filters.base import Estimates, Filter, Trace
+from analysis.filters.base import Estimates, SmoothableFilter, Trace
+from analysis.filters.gains import (
+    LinearAxis,
+    discrete_gain,
+    kalman_poles,
+    quality_poles,
+    stated_poles,
+)
 from analysis.filters.noise_model import NoiseModel
 from analysis.filters.smoother import SmoothingPass, smooth
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats
 from shiplog import Signals
 from shiplog.ships.paper import PAPER_INPUTS, Coefficients
+from shiplog.vessel.settings import FilterSettings
 
 Following = Mapping[str, float]
+
+FILTERS = ("pseudo-input", "steady-state", "quality", "per-tick", "extended")
+SMOOTHABLE = ("pseudo-input", "extended")
+
+
+POLES = {"steady-state": kalman_poles, "quality": quality_poles, "per-tick": stated_poles}
+
+
+def designed_gain(settings: FilterSettings, axis: LinearAxis) -> tuple[np.ndarray, np.ndarray]:
+    """The gain (k,) of a filter with a designed gain, and its poles from sample to sample."""
+    return discrete_gain(axis, POLES[settings.kind](axis, settings))
 
 
 def signals_of(measured: np.ndarray, delta: np.ndarray, n: np.ndarray, dt: float) -> Signals:
@@ -169,7 +188,7 @@ def in_chunks(signals: Signals, cuts: list[int]) -> Iterator[tuple[Signals, Foll
 
 
 def smoothed_run(
-    filtering: Filter, signals: Signals
+    filtering: SmoothableFilter, signals: Signals
 ) -> tuple[Estimates, Trace, tuple[np.ndarray, np.ndarray]]:
     """What the filter made of a whole run, how, and the smoothed states and covariances."""
     estimates, trace = filtering.trace(signals, last_inputs(signals))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from filter_runs import (
+    SMOOTHABLE,
     disturbed,
     five_states,
     measured_as,
@@ -26,7 +27,7 @@ from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import Vessel
 from shiplog.ships.paper import Coefficients
-from shiplog.vessel.settings import SMOOTHED, FilterSettings
+from shiplog.vessel.settings import FilterSettings
 
 SEEDS = 60
 AT = (0, 20, 65, 120, 199)
@@ -114,7 +115,7 @@ def judged(
         expected = true if own == 5 else told_of(c, true[:, :3], *inputs.T, stats.dt_secs)
         ways = (trace.states, trace.covariances), smoothed
         for kept, (x, P) in zip(found, ways, strict=True):
-            told, _, _ = filtering.told(signals, last_inputs(signals), x, P)
+            told, _, _ = filtering.to_estimates(signals, last_inputs(signals), x, P)
             kept.append((x[:, :own] - true[:, :own], P[:, :own, :own], told - expected))
     filtered, smoothed = (Ensemble(*map(np.array, zip(*runs, strict=True))) for runs in found)
     return filtered, smoothed
@@ -133,7 +134,7 @@ CASES = {
 }
 
 
-WITH_SMOOTHER = [case for case, (_, kind, _) in CASES.items() if kind in SMOOTHED]
+WITH_SMOOTHER = [case for case, (_, kind, _) in CASES.items() if kind in SMOOTHABLE]
 
 
 @pytest.fixture(scope="module")

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from filter_runs import in_chunks, signals_of, steered, together
+from filter_runs import FILTERS, in_chunks, signals_of, steered, together
 from trial_logs import InChunks, as_log
 
 from analysis.filters.base import Estimates, Filter
 from analysis.filters.factory import filter_states, make_filter
-from analysis.filters.kernels import PATIENCE
+from analysis.filters.kernels import MAX_REJECTED_IN_A_ROW
 from analysis.filters.noise_model import NoiseModel
 from analysis.filters.wave_fit import Wave
 from analysis.signals.hold import InputHold, held_throughout, last_inputs
@@ -21,7 +21,7 @@ from shiplog import Channel, Signals, TrialLog, Vessel, resample
 from shiplog.checks.log_stats import compute_log_stats
 from shiplog.resampling import choose_clock, resample_chunks
 from shiplog.ships.paper import steady_speed
-from shiplog.vessel.settings import FILTERS, FilterSettings
+from shiplog.vessel.settings import FilterSettings
 
 NAMES = ("yaw_rate", "speed", "rudder", "rpm")
 STDS = np.array([1e-4, 0.1])
@@ -115,9 +115,9 @@ def test_a_step_that_lasts_is_believed_after_five_samples(
 ) -> None:
     stepped = off_by(straight_run(vessel, 1), name, slice(500, None), 20 * STDS[output])
     found = filtered(vessel, stepped, kind)
-    assert PATIENCE == 5
+    assert MAX_REJECTED_IN_A_ROW == 5
     at = np.flatnonzero(found.gated[:530, output])
-    assert at.tolist() == [500 + k for k in range(PATIENCE)]
+    assert at.tolist() == [500 + k for k in range(MAX_REJECTED_IN_A_ROW)]
     assert not found.gated[:, 1 - output].any()
     state = (0, 3)[output]
     assert found.states[-1, state] - found.states[499, state] > 10 * STDS[output]
@@ -130,7 +130,7 @@ def test_a_step_that_is_believed_is_not_doubted_again_on_the_way_to_it(
 ) -> None:
     """Else what noise takes towards the estimate is taken in, and what it takes away is not."""
     stepped = off_by(straight_run(vessel, 1), name, slice(500, None), 20 * STDS[output])
-    assert filtered(vessel, stepped, kind).gated.sum() == PATIENCE
+    assert filtered(vessel, stepped, kind).gated.sum() == MAX_REJECTED_IN_A_ROW
 
 
 @of_each_kind
@@ -175,7 +175,7 @@ def test_a_trace_is_kept_without_changing_what_is_said(
     filtering = made(vessel, stats, kind, wave)
     found, trace = filtering.trace(signals, last_inputs(signals))
     same(found, made(vessel, stats, kind, wave).step(signals, last_inputs(signals)))
-    told = filtering.told(signals, last_inputs(signals), trace.states, trace.covariances)
+    told = filtering.to_estimates(signals, last_inputs(signals), trace.states, trace.covariances)
     for name, values in zip(("states", "stds", "wave"), told, strict=True):
         expected = getattr(found, name)
         assert values is expected is None or np.array_equal(values, expected), name

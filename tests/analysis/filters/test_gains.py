@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from filter_runs import signals_of
+from filter_runs import designed_gain, signals_of
 from gaussian import held
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 
-from analysis.filters.gains import LinearAxis, channels, discrete_gain, ticked_gain
+from analysis.filters.gains import LinearAxis, linear_axes, relinearised_gain
 from analysis.filters.noise_model import NoiseModel
 from analysis.filters.wave_fit import Wave
 from analysis.signals.signal_stats import SignalStats, signal_stats
@@ -33,7 +33,7 @@ def both(
 ) -> tuple[LinearAxis, LinearAxis]:
     """The channels for a yaw of that bandwidth, in rad/s; surge is slower."""
     ratios = np.array([width**4, (0.4 * width) ** 2])
-    return channels(c, NoiseModel(np.array([1e-4, 0.1]), ratios, wave=wave), usual_at(c, dt))
+    return linear_axes(c, NoiseModel(np.array([1e-4, 0.1]), ratios, wave=wave), usual_at(c, dt))
 
 
 def from_sample_to_sample(of: LinearAxis) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -71,7 +71,7 @@ def same_poles(found: np.ndarray, wanted: np.ndarray) -> bool:
 def test_a_channel_is_the_ship_about_her_usual_motion(vessel: Vessel) -> None:
     c = vessel.coefficients
     noise = NoiseModel(np.array([1e-4, 0.2]), np.array([3e-6, 2e-4]))
-    yaw, surge = channels(c, noise, usual_at(c, 0.5, (2, 6)))
+    yaw, surge = linear_axes(c, noise, usual_at(c, 0.5, (2, 6)))
     stiffness = c.b1 + 2 * c.b2 * TURNING + 3 * c.b3 * TURNING**2
     close = np.testing.assert_allclose
     close(yaw.A, [[0, 1], [stiffness, c.a]])
@@ -105,7 +105,7 @@ def test_the_poles_of_i_minus_k_c_f_are_those_told(
 ) -> None:
     settings = FilterSettings(kind=kind, damping=0.1, yaw_decay=0.08, surge_decay=0.03)
     for channel in both(vessel.coefficients, dt, 0.1, wave):
-        gain, poles = discrete_gain(settings, channel)
+        gain, poles = designed_gain(settings, channel)
         assert same_poles(closed(channel, gain), poles)
 
 
@@ -116,7 +116,7 @@ def test_a_fast_sensors_steady_state_gain_is_the_best_there_is(
 ) -> None:
     """The design is continuous: what is lost by it grows with the square of pole times interval."""
     for channel in both(vessel.coefficients, dt, width):
-        gain, poles = discrete_gain(STEADY, channel)
+        gain, poles = designed_gain(STEADY, channel)
         fast = np.abs(np.log(poles)).max()
         assert fast < 0.06
         np.testing.assert_allclose(gain, best_gain(channel), rtol=0.06 * fast**2 + 1e-7)
@@ -128,7 +128,7 @@ def test_among_waves_a_steady_state_filter_is_within_a_hundredth_of_the_best(
     vessel: Vessel, dt: float, width: float
 ) -> None:
     channel, _ = both(vessel.coefficients, dt, width, WAVE)
-    gain, _ = discrete_gain(STEADY, channel)
+    gain, _ = designed_gain(STEADY, channel)
     assert np.all(stds(channel, gain)[:2] < 1.01 * stds(channel, best_gain(channel))[:2])
 
 
@@ -141,7 +141,7 @@ def test_every_pole_of_a_quality_filter_is_left_of_half_its_shift(
 ) -> None:
     settings = FilterSettings(kind="quality", shift=shift, damping=damping)
     for channel in both(vessel.coefficients, dt, 0.02, wave):
-        gain, _ = discrete_gain(settings, channel)
+        gain, _ = designed_gain(settings, channel)
         assert (np.log(closed(channel, gain)) / dt).real.max() < -shift / 2
 
 
@@ -151,8 +151,8 @@ def test_without_shift_and_damping_a_quality_filter_is_the_steady_state_one(
 ) -> None:
     settings = FilterSettings(kind="quality", shift=0.0, damping=0.0)
     for channel in both(vessel.coefficients, 0.5, 0.1, wave):
-        gain, _ = discrete_gain(settings, channel)
-        np.testing.assert_allclose(gain, discrete_gain(STEADY, channel)[0], rtol=1e-7)
+        gain, _ = designed_gain(settings, channel)
+        np.testing.assert_allclose(gain, designed_gain(STEADY, channel)[0], rtol=1e-7)
 
 
 def test_damping_takes_the_yaw_acceleration_for_noisier_in_a_quality_filter(vessel: Vessel) -> None:
@@ -162,15 +162,15 @@ def test_damping_takes_the_yaw_acceleration_for_noisier_in_a_quality_filter(vess
     G = np.diag([0.0, 0.4 * yaw.R])
     extra = np.linalg.cholesky(yaw.A @ G @ yaw.A.T + yaw.G @ yaw.Q @ yaw.G.T + 1e-30 * np.eye(2))
     noisier = replace(yaw, G=extra, Q=np.eye(2))
-    gain, _ = discrete_gain(settings, yaw)
-    np.testing.assert_allclose(gain, discrete_gain(STEADY, noisier)[0], rtol=1e-6)
+    gain, _ = designed_gain(settings, yaw)
+    np.testing.assert_allclose(gain, designed_gain(STEADY, noisier)[0], rtol=1e-6)
 
 
 def test_the_decays_stated_for_a_per_tick_observer_are_its_poles(vessel: Vessel) -> None:
     yaw, surge = both(vessel.coefficients, 0.5, 0.1)
     settings = FilterSettings(kind="per-tick", yaw_decay=0.07, surge_decay=0.02)
     for channel, decay, count in ((yaw, 0.07, 2), (surge, 0.02, 1)):
-        gain, _ = discrete_gain(settings, channel)
+        gain, _ = designed_gain(settings, channel)
         assert same_poles(closed(channel, gain), np.full(count, np.exp(-decay * 0.5)))
 
 
@@ -179,8 +179,8 @@ def test_without_decays_a_per_tick_observer_has_the_steady_state_filters_poles(
     vessel: Vessel, wave: Wave | None
 ) -> None:
     for channel in both(vessel.coefficients, 0.5, 0.1, wave):
-        gain, poles = discrete_gain(FilterSettings(kind="per-tick"), channel)
-        expected, steady = discrete_gain(STEADY, channel)
+        gain, poles = designed_gain(FilterSettings(kind="per-tick"), channel)
+        expected, steady = designed_gain(STEADY, channel)
         assert np.array_equal(gain, expected)
         assert np.array_equal(poles, steady)
 
@@ -190,7 +190,7 @@ def test_a_wave_that_is_the_ships_own_motion_is_refused(vessel: Vessel) -> None:
     alike = vessel.coefficients._replace(a=-0.12, b1=-0.36, b2=0.0, b3=0.0)
     yaw, _ = both(alike, 0.5, 0.1, WAVE)
     with pytest.raises(UsageError, match="cannot be seen"):
-        discrete_gain(STEADY, yaw)
+        designed_gain(STEADY, yaw)
 
 
 @compiled
@@ -203,7 +203,7 @@ def place(  # numba cannot hand an array back to Python from what a cached calle
     interval: float,
     output: int,
 ) -> None:
-    K[:] = ticked_gain(J, wave, c, poles, interval, output)
+    K[:] = relinearised_gain(J, wave, c, poles, interval, output)
 
 
 def placed(
@@ -231,7 +231,7 @@ def test_a_per_tick_gain_places_the_same_poles_whatever_the_motion(
 ) -> None:
     rng = np.random.default_rng(seed)
     yaw, _ = both(vessel.coefficients, dt, 10 ** rng.uniform(-2, -0.5), wave)
-    _, poles = discrete_gain(STEADY, yaw)
+    _, poles = designed_gain(STEADY, yaw)
     c, among, between = of_all(yaw, poles)
     J = np.zeros((3, 3))
     J[0, 1] = 1.0
@@ -264,11 +264,11 @@ def test_at_the_usual_motion_a_per_tick_gain_is_the_one_designed(
 ) -> None:
     yaw, surge = both(vessel.coefficients, 0.5, 0.1, wave)
     J = block_diag(yaw.A[:2, :2], surge.A)
-    gain, poles = discrete_gain(settings, yaw)
+    gain, poles = designed_gain(settings, yaw)
     c, among, between = of_all(yaw, poles)
     at = [0, 1, *range(3, len(c))]
     np.testing.assert_allclose(placed(J, between, c, among, 0.5, 0)[at], gain, rtol=1e-8)
-    gain, poles = discrete_gain(settings, surge)
+    gain, poles = designed_gain(settings, surge)
     among[2] = poles[0]
     K = placed(J, between, np.eye(len(c))[2], among, 0.5, 1)
     assert K[2] == pytest.approx(gain[0], rel=1e-12, abs=0)

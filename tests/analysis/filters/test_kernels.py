@@ -3,7 +3,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.filters.kernels import PATIENCE, believable, correct, project, propagate
+from analysis.filters.kernels import MAX_REJECTED_IN_A_ROW as LIMIT
+from analysis.filters.kernels import (
+    correct,
+    is_accepted,
+    output_covariance,
+    propagate,
+)
 
 seeds = given(seed=st.integers(0, 2**32 - 1))
 often = settings(derandomize=True, deadline=None, max_examples=50)
@@ -21,7 +27,7 @@ def taken(
 ) -> tuple[np.ndarray, np.ndarray]:
     """State and covariance after one measurement, taken in by the best gain."""
     x, P, Pc = x.copy(), P.copy(), np.empty(len(x))
-    S = project(P, c, Pc) + r
+    S = output_covariance(P, c, Pc) + r
     correct(x, P, Pc / S, Pc, y - c @ x, S)
     return x, P
 
@@ -37,7 +43,7 @@ def test_an_outputs_variance_is_c_p_c(seed: int) -> None:
     rng = np.random.default_rng(seed)
     _, P, C = drawn(rng, 4)
     Pc = np.empty(4)
-    assert project(P, C[0], Pc) == pytest.approx(C[0] @ P @ C[0], rel=1e-9, abs=0)
+    assert output_covariance(P, C[0], Pc) == pytest.approx(C[0] @ P @ C[0], rel=1e-9, abs=0)
     np.testing.assert_allclose(Pc, P @ C[0], rtol=1e-9, atol=1e-12 * np.abs(P).max())
 
 
@@ -51,7 +57,7 @@ def test_any_gain_is_taken_in_by_josephs_form_and_the_covariance_stays_symmetric
     expected = kept @ P @ kept.T + r * np.outer(K, K)
     moved = x + K * innovation
     Pc = np.empty(5)
-    S = project(P, C[0], Pc) + r
+    S = output_covariance(P, C[0], Pc) + r
     correct(x, P, K, Pc, innovation, S)
     assert x == pytest.approx(moved, rel=1e-14)
     assert np.abs(P - expected).max() < 1e-12 * np.abs(expected).max()
@@ -92,36 +98,37 @@ def test_a_covariance_goes_on_as_f_p_f_and_q_and_stays_symmetric(seed: int) -> N
     assert np.array_equal(P, P.T)
 
 
-def believed(innovations: list[float], output: int = 0) -> list[bool]:
-    off = np.zeros(2, np.int64)
-    return [believable(e, 4.0, 6.0, output, off) for e in innovations]
+def accepted(innovations: list[float], output: int = 0) -> list[bool]:
+    """Whether each of a row of innovations is accepted, with a variance of 4 and a gate of 6."""
+    rejected_in_a_row = np.zeros(2, np.int64)
+    return [is_accepted(e, 4.0, 6.0, output, rejected_in_a_row) for e in innovations]
 
 
-def test_what_is_within_the_gate_is_believed_up_to_its_edge() -> None:
-    assert believed([0.0, 11.9, -12.0, 12.0, 12.1, -12.1]) == [True] * 4 + [False] * 2
+def test_an_innovation_is_accepted_up_to_the_edge_of_the_gate() -> None:
+    assert accepted([0.0, 11.9, -12.0, 12.0, 12.1, -12.1]) == [True] * 4 + [False] * 2
 
 
-def test_what_is_off_once_more_than_the_patience_is_believed_for_as_long_as_it_lasts() -> None:
-    assert believed([20.0] * (PATIENCE + 3)) == [False] * PATIENCE + [True] * 3
+def test_after_the_limit_of_rejections_in_a_row_all_are_accepted() -> None:
+    assert accepted([20.0] * (LIMIT + 3)) == [False] * LIMIT + [True] * 3
 
 
-def test_one_sample_within_the_gate_makes_the_filter_patient_again() -> None:
-    once = [20.0] * PATIENCE
-    assert believed([*once, 1.0, *once]) == [False] * PATIENCE + [True] + [False] * PATIENCE
-    assert believed([*once, 20.0, 1.0, 20.0])[-3:] == [True, True, False]
+def test_one_sample_within_the_gate_starts_the_count_again() -> None:
+    once = [20.0] * LIMIT
+    assert accepted([*once, 1.0, *once]) == [False] * LIMIT + [True] + [False] * LIMIT
+    assert accepted([*once, 20.0, 1.0, 20.0])[-3:] == [True, True, False]
 
 
-def test_what_is_believed_is_so_until_the_filter_has_come_up_to_it() -> None:
-    """Within the gate is not enough: noise alone takes it there and out again."""
-    once = [20.0] * (PATIENCE + 1)
-    assert believed([*once, 11.9, 13.0, -2.1, 13.0])[PATIENCE:] == [True] * 5
-    assert believed([*once, 13.0, 1.9, 13.0])[-3:] == [True, True, False]
+def test_all_are_accepted_until_the_filter_has_caught_up() -> None:
+    """To be within the gate is not enough: noise alone takes a sample there and out again."""
+    once = [20.0] * (LIMIT + 1)
+    assert accepted([*once, 11.9, 13.0, -2.1, 13.0])[LIMIT:] == [True] * 5
+    assert accepted([*once, 13.0, 1.9, 13.0])[-3:] == [True, True, False]
 
 
-def test_each_output_has_its_own_patience() -> None:
-    off = np.zeros(2, np.int64)
-    for _ in range(PATIENCE):
-        assert not believable(20.0, 4.0, 6.0, 0, off)
-        assert believable(1.0, 4.0, 6.0, 1, off)
-    assert not believable(20.0, 4.0, 6.0, 1, off)
-    assert believable(20.0, 4.0, 6.0, 0, off)
+def test_each_output_has_its_own_count() -> None:
+    rejected_in_a_row = np.zeros(2, np.int64)
+    for _ in range(LIMIT):
+        assert not is_accepted(20.0, 4.0, 6.0, 0, rejected_in_a_row)
+        assert is_accepted(1.0, 4.0, 6.0, 1, rejected_in_a_row)
+    assert not is_accepted(20.0, 4.0, 6.0, 1, rejected_in_a_row)
+    assert is_accepted(20.0, 4.0, 6.0, 0, rejected_in_a_row)

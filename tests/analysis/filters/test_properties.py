@@ -6,6 +6,8 @@ from functools import cached_property
 import numpy as np
 import pytest
 from filter_runs import (
+    FILTERS,
+    SMOOTHABLE,
     five_states,
     sailed,
     signals_of,
@@ -25,7 +27,7 @@ from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import Signals, load_vessel
 from shiplog.ships.paper import Coefficients
-from shiplog.vessel.settings import FILTERS, SMOOTHED, FilterSettings
+from shiplog.vessel.settings import FilterSettings
 
 OFTEN = settings(derandomize=True, max_examples=25, deadline=None)
 COUNT = 12
@@ -89,7 +91,7 @@ def runs(draw: st.DrawFn, *, linear: bool = True) -> Run:
     )
 
 
-@pytest.mark.parametrize("kind", SMOOTHED)
+@pytest.mark.parametrize("kind", SMOOTHABLE)
 @OFTEN
 @given(run=runs())
 def test_a_filter_is_the_joint_gaussian_given_what_was_measured_until_then(
@@ -100,7 +102,7 @@ def test_a_filter_is_the_joint_gaussian_given_what_was_measured_until_then(
     assert max(apart((trace.states, trace.covariances), expected)) < 1e-9
 
 
-@pytest.mark.parametrize("kind", SMOOTHED)
+@pytest.mark.parametrize("kind", SMOOTHABLE)
 @OFTEN
 @given(run=runs())
 def test_a_smoother_is_the_joint_gaussian_given_all_that_was_measured(kind: str, run: Run) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from filter_runs import (
     PATTERNS,
+    SMOOTHABLE,
     five_states,
     in_chunks,
     measured_as,
@@ -27,7 +28,7 @@ from analysis.signals.signal_stats import signal_stats
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import Signals, TrialLog, Vessel, resample
-from shiplog.vessel.settings import SMOOTHED, FilterSettings
+from shiplog.vessel.settings import FilterSettings
 
 WAVE = Wave(frequency=0.6, damping=0.1, std=4e-4, evidence=1.0)
 STDS = np.array([1e-4, 0.1])
@@ -98,7 +99,7 @@ def by_rauch_tung_striebel(trace: Trace, Q: np.ndarray) -> tuple[np.ndarray, np.
     return states, covariances
 
 
-@pytest.mark.parametrize("kind", SMOOTHED)
+@pytest.mark.parametrize("kind", SMOOTHABLE)
 def test_rauch_tung_and_striebel_agree_on_a_nonlinear_run(
     vessel: Vessel, signals: Signals, kind: str
 ) -> None:
@@ -143,7 +144,7 @@ def test_a_trial_smoothed_in_chunks_is_as_smoothed_whole(
     assert max(apart(smoothed_in_chunks(twice, signals, cuts), whole)) < 1e-9
 
 
-@pytest.mark.parametrize("kind", SMOOTHED)
+@pytest.mark.parametrize("kind", SMOOTHABLE)
 def test_chunks_of_one_instant_each_are_smoothed_as_a_whole(
     vessel: Vessel, signals: Signals, kind: str
 ) -> None:
@@ -200,7 +201,7 @@ def test_smoothed_covariances_are_symmetric_and_positive_semidefinite(
     assert np.linalg.eigvalsh(P / (unit[:, :, None] * unit[:, None, :])).min() > -1e-9
 
 
-@pytest.mark.parametrize("kind", SMOOTHED)
+@pytest.mark.parametrize("kind", SMOOTHABLE)
 def test_the_settings_smooth_what_is_told_and_leave_the_innovations_alone(
     vessel: Vessel, signals: Signals, kind: str
 ) -> None:
@@ -211,7 +212,7 @@ def test_the_settings_smooth_what_is_told_and_leave_the_innovations_alone(
         assert np.array_equal(getattr(found, name), getattr(plain, name), equal_nan=True), name
     filtering = made(vessel, signals, kind)
     _, _, (x, P) = smoothed_run(filtering, signals)
-    states, stds, _ = filtering.told(signals, last_inputs(signals), x, P)
+    states, stds, _ = filtering.to_estimates(signals, last_inputs(signals), x, P)
     assert np.array_equal(found.states, states)
     assert np.array_equal(found.stds, stds)
     assert not np.array_equal(found.states, plain.states)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from filter_runs import (
     PATTERNS,
+    designed_gain,
     measured_as,
     pushes,
     rates,
@@ -18,9 +19,9 @@ from gaussian import apart
 from scipy.integrate import solve_ivp
 
 from analysis.filters.factory import filter_states, make_filter
-from analysis.filters.gains import channels, discrete_gain
+from analysis.filters.gains import linear_axes
 from analysis.filters.noise_model import NoiseModel
-from analysis.filters.ship_step import predict, tell
+from analysis.filters.ship_step import output_row, predict
 from analysis.filters.tuning import noise_of
 from analysis.filters.wave_fit import Wave
 from analysis.replay.residuals import assess_innovations
@@ -213,7 +214,7 @@ def test_what_is_no_state_is_as_unsure_as_the_states_it_follows_from(
     x, delta, delta_dot, n, _ = drawn(rng)
     root = 1e-3 * UNITS[:, None] * rng.standard_normal((3, 3))
     row = np.empty(10)
-    tell(c, x, root @ root.T, delta, delta_dot, n, row)
+    output_row(c, x, root @ root.T, delta, delta_dot, n, row)
     helm = np.array([delta, delta + delta_dot * dt]), np.full(2, n)
     close = np.testing.assert_allclose
     close(row[:5], told_of(c, np.array([x, x]), *helm, dt)[0], rtol=1e-12)
@@ -246,13 +247,13 @@ def test_any_other_gain_is_kept_in_a_straight_ship_once_the_best_one_has_fallen_
     stats = signal_stats(signals, c)
     settings = FilterSettings(kind=kind, gate=1e6)
     K = np.zeros((2, 3))
-    of_yaw, of_surge = channels(c, NOISE, stats)
-    K[0, :2], K[1, 2:] = (discrete_gain(settings, one)[0] for one in (of_yaw, of_surge))
+    of_yaw, of_surge = linear_axes(c, NOISE, stats)
+    K[0, :2], K[1, 2:] = (designed_gain(settings, one)[0] for one in (of_yaw, of_surge))
     filtering = make_filter(c, NOISE, stats, settings)
     estimates, trace = filtering.trace(signals, last_inputs(signals))
     run = three_states(c, NOISE, stats, delta, n)
     off, P, settled, taken = np.zeros(3), run.P, [False, False], [0, 0]
-    poles = [np.abs(discrete_gain(settings, one)[1]).max() for one in (of_yaw, of_surge)]
+    poles = [np.abs(designed_gain(settings, one)[1]).max() for one in (of_yaw, of_surge)]
     for k in range(count):
         for output in np.flatnonzero(np.isfinite(measured[k])):
             C = run.C[output]
@@ -282,13 +283,13 @@ def test_the_gains_taken_are_those_designed_for_the_sensors_own_interval(
     measured[np.arange(count) % 4 > 0, 0], measured[1::2, 1] = np.nan, np.nan
     signals, noise = signals_of(measured, delta, n, dt), replace(NOISE, wave=wave)
     stats, settings = signal_stats(signals, c), FilterSettings(kind=kind, gate=1e6)
-    yaw, surge = channels(c, noise, stats)
+    yaw, surge = linear_axes(c, noise, stats)
     assert (yaw.interval_secs, surge.interval_secs) == pytest.approx((4 * dt, 2 * dt))
     filtering = make_filter(c, noise, stats, settings)
     _, trace = filtering.trace(signals, last_inputs(signals))
     designed = np.delete(trace.gains[::4, 0], 2, axis=1), trace.gains[::2, 1, 2:3]
     for found, channel in zip(designed, (yaw, surge), strict=True):
-        gain, _ = discrete_gain(settings, channel)
+        gain, _ = designed_gain(settings, channel)
         once_settled = found[len(found) // 2 :]
         np.testing.assert_allclose(once_settled, np.tile(gain, (len(once_settled), 1)), rtol=1e-7)
 

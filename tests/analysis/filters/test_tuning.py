@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from filter_runs import (
+    FILTERS,
     disturbed,
     five_states,
     signals_of,
@@ -19,7 +20,7 @@ from analysis.signals.signal_stats import SignalStats, signal_stats
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Signals, TrialLog, Vessel, resample
 from shiplog.ships.paper import Coefficients
-from shiplog.vessel.settings import FILTERS, FilterSettings
+from shiplog.vessel.settings import FilterSettings
 
 NAMES = ("yaw_rate", "speed", "rudder", "rpm")
 STDS = np.array([1e-4, 0.1])

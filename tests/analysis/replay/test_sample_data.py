@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from filter_runs import FILTERS, SMOOTHABLE
 from places import KVLCC2, SAMPLE_DATA
 
 from analysis.check.compare import compare, logs_in
@@ -13,7 +14,7 @@ from shiplog import load_vessel, read
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
 from shiplog.vessel.presets import PRESETS
-from shiplog.vessel.settings import DISTURBANCES, FILTERS, SMOOTHED
+from shiplog.vessel.settings import DISTURBANCES
 
 LOGS = logs_in(SAMPLE_DATA)
 
@@ -39,7 +40,7 @@ def test_every_sample_is_filtered_nearer_to_its_truth(log: Path) -> None:
         assert np.std(measured) / np.std(estimated) > better
 
 
-KINDS = [(kind, False) for kind in FILTERS] + [(kind, True) for kind in SMOOTHED]
+KINDS = [(kind, False) for kind in FILTERS] + [(kind, True) for kind in SMOOTHABLE]
 SETS = [list(s) for n in (1, 2, 3) for s in combinations(DISTURBANCES, n)]
 
 

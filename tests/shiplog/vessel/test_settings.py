@@ -4,6 +4,7 @@ from argparse import ArgumentParser
 from dataclasses import fields
 
 import pytest
+from filter_runs import FILTERS
 
 from analysis.cli import REPLAY, replay_settings
 from analysis.regression.sliding import WINDOW_SECS
@@ -13,9 +14,7 @@ from shiplog.errors import UsageError, VesselError
 from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import (
     DISTURBANCES,
-    FILTERS,
     MIN_WINDOW_SECS,
-    SMOOTHED,
     DisturbanceSettings,
     FilterSettings,
     IdentifierSettings,
@@ -23,9 +22,8 @@ from shiplog.vessel.settings import (
     filter_settings,
     identifier_settings,
     settings_dict,
-    unused_settings,
 )
-from shiplog.vessel.vessel import unused_setting_warnings, with_settings
+from shiplog.vessel.vessel import with_settings
 from shiplog.vessel.vessel_parser import parse_vessel
 
 PARSERS = {
@@ -90,23 +88,14 @@ def test_settings_survive_the_way_to_a_section_and_back(
     assert not errors
 
 
-def test_a_wave_needs_a_filter_that_can_model_it() -> None:
+def test_the_default_filter_can_model_a_wave_where_one_is_set() -> None:
     assert FilterSettings(wave=True).chosen == "extended"
-    message = errors_of("filter", {"kind": "pseudo-input", "wave": True})
-    assert message == "filter.kind = 'pseudo-input' cannot model a wave; use 'extended'"
-
-
-@pytest.mark.parametrize("kind", [kind for kind in FILTERS if kind not in SMOOTHED])
-def test_a_filter_without_optimal_gain_cannot_be_smoothed(kind: str) -> None:
-    message = errors_of("filter", {"kind": kind, "smooth": True})
-    assert message.endswith("use 'pseudo-input' or 'extended'")
-    assert kind in message
 
 
 @pytest.mark.parametrize(
     ("section", "key", "value", "message"),
     [
-        ("filter", "kind", "kalman", "filter.kind must be one of pseudo-input, steady-state"),
+        ("filter", "kind", "kalman", "filter.kind must be one of extended, per-tick"),
         ("filter", "smooth", 1, "filter.smooth must be true or false, got 1"),
         ("filter", "gate", 0, "filter.gate must be positive, got 0"),
         ("filter", "gate", "6", "filter.gate must be a number, got '6'"),
@@ -147,28 +136,6 @@ def test_auto_restores_the_default_of_a_setting(vessel: Vessel) -> None:
     assert with_settings(vessel, {"filter.process_ratio": "auto"}).filter.process_ratio is None
     with_gate = with_settings(vessel, {"filter.gate": 3.0})
     assert with_settings(with_gate, {"filter.gate": "auto"}).filter.gate == 6.0
-
-
-@pytest.mark.parametrize(
-    ("settings", "names"),
-    [
-        ({"filter.shift": 0.2}, ["filter.shift"]),
-        ({"filter.kind": "quality", "filter.shift": 0.2}, []),
-        ({"filter.kind": "extended", "filter.as_printed": True}, ["filter.as_printed"]),
-        ({"filter.yaw_bandwidth": 0.1}, ["filter.yaw_bandwidth"]),
-        ({"filter.wave_std": 1e-3}, ["filter.wave_std"]),
-        ({"filter.wave": True, "filter.wave_std": 1e-3}, []),
-        ({"disturbance.wave_frequency": 0.6}, ["disturbance.wave_frequency"]),
-        ({"disturbance.models": ["wave"], "disturbance.wave_frequency": 0.6}, []),
-    ],
-)
-def test_a_setting_without_effect_gives_a_warning(
-    vessel: Vessel, settings: dict[str, object], names: list[str]
-) -> None:
-    changed = with_settings(vessel, settings)
-    assert unused_settings(changed.filter, changed.disturbance) == names
-    assert all(name in unused_setting_warnings(changed)[0] for name in names)
-    assert bool(unused_setting_warnings(changed)) == bool(names)
 
 
 def test_wrong_settings_are_reported_all_at_once(vessel: Vessel) -> None:
