@@ -1,11 +1,24 @@
-"""How far the parameters of a fit may be off, by what the data themselves show.
+"""Standard errors of a fit's parameters, and which of them the data do not determine.
 
-Four answers, for four reasons to be off. The Cramér-Rao bound is of white noise of the size
-found. What stays off for a while makes it too small; White's sandwich with Newey and West's (1987)
-sums allows for that. What differs from run to run, as the ship's trim and her rudder's zero do,
-shows when each run is left out in turn (the jackknife; Tukey, 1958). And where there are too few
-runs for that, it shows how much more they differ than they should if the model were true: all
-errors are enlarged by so much (Birge, 1932; `agreement`).
+Four estimates, for four sources of error:
+
+- the Cramér-Rao bound: white noise of the size found, covariance ``(I + P)^-1`` with the
+  information I of the data and the precision P of the prior;
+- the sandwich covariance ``H^-1 M H^-1`` for residuals correlated in time: H is the Hessian of the
+  cost, M the covariance of the summed scores with the weights of Newey and West;
+- the jackknife, for what differs from run to run, as trim and rudder zero do: the fit without each
+  run in turn;
+- with too few runs for that, the enlargement of all errors by the Birge ratio of the runs'
+  disagreement (`agreement`).
+
+References
+----------
+H. Cramér, "Mathematical Methods of Statistics", 1946, section 32.3. H. White, "Maximum likelihood
+estimation of misspecified models", Econometrica 50, 1982. W. K. Newey and K. D. West, "A simple,
+positive semi-definite, heteroskedasticity and autocorrelation consistent covariance matrix",
+Econometrica 55, 1987. J. W. Tukey, "Bias and confidence in not quite large samples", Annals of
+Mathematical Statistics 29, 1958. R. T. Birge, "The calculation of errors by the method of least
+squares", Physical Review 40, 1932.
 """
 
 from collections.abc import Sequence
@@ -22,99 +35,152 @@ from .least_squares import information_matrix, marginal_information, minimise, w
 from .output_error import OutputError
 from .problem import Problem, residuals
 
-LEAST_RUNS = 4  # for a jackknife
-LEAST_WINDOW_SECS = 5.0  # over which neighbours are taken together, at the least
-UNIDENTIFIABLE = 0.25  # relative std of a parameter that these data cannot tell,
-NEGLIGIBLE = 0.05  # unless the std is so small a part of what it is of ships in general,
-ECHO = 0.5  # and how much of it may be what was believed before
-NOTHING = 1e-200  # of information: its inverse is still a number
-SINGULAR = 1e-13  # of the scaled information: less of it is none
+MIN_JACKKNIFE_RUNS = 4
+MIN_WINDOW_SECS = 5.0  # of the sums of neighbouring scores
+MAX_RELATIVE_STD = 0.25  # of an identifiable parameter, relative to its value
+MAX_STD_SHARE = 0.05  # or else relative to its magnitude for ships in general
+MAX_PRIOR_SHARE = 0.5  # of an identifiable parameter's value
+MIN_INFORMATION = 1e-200  # whose inverse is still a number
+MIN_EIGENVALUE = 1e-13  # of the scaled information: smaller ones are rounding errors
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Of the p parameters sought. `std` is the one to be believed; the others say why."""
+    """Uncertainty of the p free parameters of a fit.
+
+    Attributes
+    ----------
+    names, values
+        (p,) the parameters and their estimates.
+    std
+        (p,) standard errors to use: the largest of the others. The 95 % interval is 1.96 of them
+        to either side.
+    bound
+        (p,) Cramér-Rao bound.
+    coloured
+        (p,) by the sandwich covariance, for residuals correlated in time.
+    between_runs
+        (p,) by the jackknife; NaN with fewer than `MIN_JACKKNIFE_RUNS` runs.
+    agreement
+        Of the runs with each other.
+    enlargement
+        Factor in `std` for runs that disagree; 1 for none.
+    prior_share
+        (p,) how much of each value is due to its prior, 0 to 1.
+    covariance
+        (p, p) with the standard errors `std`.
+    condition
+        Condition number of the root of the scaled information about the parameters.
+    sizes
+        (p,) the parameters' magnitudes for ships in general.
+    """
 
     names: tuple[str, ...]
-    values: FloatArray  # (p,)
-    std: FloatArray  # (p,) half the 95 % interval over 1.96
-    bound: FloatArray  # (p,) Cramér and Rao's
-    coloured: FloatArray  # (p,) for noise that stays
-    between_runs: FloatArray  # (p,) by the jackknife; NaN with too few runs
-    agreement: Agreement  # of the runs with each other
-    enlargement: float  # by how much, for runs that do not agree
-    prior_share: FloatArray  # (p,) of each value: how much of it was believed before any data
-    covariance: FloatArray  # (p, p) that `std` is of
-    condition: float  # of the scaled information on the parameters
-    sizes: FloatArray  # (p,) what the values are of ships in general
+    values: FloatArray
+    std: FloatArray
+    bound: FloatArray
+    coloured: FloatArray
+    between_runs: FloatArray
+    agreement: Agreement
+    enlargement: float
+    prior_share: FloatArray
+    covariance: FloatArray
+    condition: float
+    sizes: FloatArray
 
     @property
     def interval(self) -> FloatArray:
-        """(p, 2) in which 95 of 100 times the truth is."""
+        """(p, 2) 95 % intervals."""
         return np.column_stack((self.values - 1.96 * self.std, self.values + 1.96 * self.std))
 
     @property
     def correlation(self) -> FloatArray:
-        """(p, p) between them."""
+        """(p, p) correlation of the estimates."""
         scale = np.sqrt(np.diag(self.covariance))
         return np.asarray(self.covariance / np.outer(scale, scale))
 
     @property
     def unidentifiable(self) -> tuple[str, ...]:
-        """The parameters that are not identifiable from these data.
+        """The parameters that these data do not determine.
 
-        One that is small beside what it is of other ships is told by that measure.
+        Their standard error exceeds both `MAX_RELATIVE_STD` of the value and `MAX_STD_SHARE` of
+        the magnitude for ships in general, or more than `MAX_PRIOR_SHARE` of the value is prior.
         """
-        sure = self.std <= np.maximum(UNIDENTIFIABLE * np.abs(self.values), NEGLIGIBLE * self.sizes)
-        told = sure & (self.prior_share <= ECHO)
-        return tuple(name for name, is_told in zip(self.names, told, strict=True) if not is_told)
+        limit = np.maximum(MAX_RELATIVE_STD * np.abs(self.values), MAX_STD_SHARE * self.sizes)
+        identifiable = (self.std <= limit) & (self.prior_share <= MAX_PRIOR_SHARE)
+        return tuple(name for name, ok in zip(self.names, identifiable, strict=True) if not ok)
 
 
 def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
-    """How far off a fit's parameters may be.
+    """Estimate the uncertainty of a fit's parameters.
 
-    With `between_runs` each run, or of a single one each half, is fitted by itself, and where there
-    are enough the fit is repeated without each in turn.
+    Parameters
+    ----------
+    fit
+        The fit.
+    between_runs
+        Whether to fit each run alone (of a single run, each half) and, with at least
+        `MIN_JACKKNIFE_RUNS` runs, all runs but each one in turn. Without it `std` covers the noise
+        only.
+
+    Returns
+    -------
+    Uncertainty
+        Standard errors, intervals, and what is unidentifiable.
     """
     problem, z = fit.problem, fit.minimum.unknowns
     p = len(problem.free)
-    left = residuals(problem, z)
-    curvature = information_matrix(problem, left, fit.residual_stds, fit.minimum.jacobians, power=3)
-    inverse = _inverse(problem, curvature)
-    share = np.diag(inverse)[:p] * problem.prior[1][:p]
-    bound = _stds(_inverse(problem, _white_information(fit, left)))[:p]
-    covariance = _sandwich(fit, left, inverse)[:p, :p]
+    residual = residuals(problem, z)
+    curvature = information_matrix(
+        problem, residual, fit.residual_stds, fit.minimum.jacobians, power=3
+    )
+    inverse = _covariance(problem, curvature)
+    prior_share = np.diag(inverse)[:p] * problem.prior[1][:p]
+    bound = _stds(_covariance(problem, _white_information(fit, residual)))[:p]
+    covariance = _sandwich(fit, residual, inverse)[:p, :p]
     coloured = _stds(covariance)
     jackknife, agreement = np.full(p, np.nan), Agreement((), (), ())
     if between_runs:
         agreement = assess_agreement(fit)
-        if len(problem.runs) >= LEAST_RUNS:
-            jackknife = _jackknife(_left_out(fit))
-    enlarged = 1.0 if np.isfinite(jackknife).any() else agreement.enlargement
-    std = np.fmax(np.maximum(coloured, bound) * enlarged, jackknife)
-    grown = std / np.where(coloured > 0, coloured, 1.0)
-    whole = fit.minimum.information + np.diag(problem.prior[1])
+        if len(problem.runs) >= MIN_JACKKNIFE_RUNS:
+            jackknife = _jackknife_std(_leave_one_out(fit))
+    enlargement = 1.0 if np.isfinite(jackknife).any() else agreement.enlargement
+    std = np.fmax(np.maximum(coloured, bound) * enlargement, jackknife)
+    factor = std / np.where(coloured > 0, coloured, 1.0)
+    precision = fit.minimum.information + np.diag(problem.prior[1])
     return Uncertainty(
-        problem.free_names, z[:p].copy(), std, bound, coloured, jackknife, agreement, enlarged,
-        share, covariance * np.outer(grown, grown), _condition(whole, p),
-        np.array([problem.model.parameters[i].size for i in problem.free]),
-    )  # fmt: skip
+        names=problem.free_names,
+        values=z[:p].copy(),
+        std=std,
+        bound=bound,
+        coloured=coloured,
+        between_runs=jackknife,
+        agreement=agreement,
+        enlargement=enlargement,
+        prior_share=prior_share,
+        covariance=covariance * np.outer(factor, factor),
+        condition=_condition(precision, p),
+        sizes=np.array([problem.model.parameters[i].size for i in problem.free]),
+    )
 
 
-def _inverse(problem: Problem, information: FloatArray) -> FloatArray:
-    """The covariance of all unknowns; what nothing tells has a variance beyond all bounds."""
-    whole = information + np.diag(problem.prior[1])
-    scale = np.sqrt(np.maximum(np.diag(whole), NOTHING))
-    values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
-    scaled = (vectors / np.maximum(values, SINGULAR)) @ vectors.T
+def _covariance(problem: Problem, information: FloatArray) -> FloatArray:
+    """Invert information plus prior, (m, m); what nothing determines gets a huge variance."""
+    precision = information + np.diag(problem.prior[1])
+    scale = np.sqrt(np.maximum(np.diag(precision), MIN_INFORMATION))
+    values, vectors = np.linalg.eigh(precision / np.outer(scale, scale))
+    scaled = (vectors / np.maximum(values, MIN_EIGENVALUE)) @ vectors.T
     return np.asarray(scaled / np.outer(scale, scale))
 
 
-def _condition(whole: FloatArray, p: int) -> float:
-    """Of the root of the parameters' scaled information, the nuisances eliminated."""
-    left = marginal_information(whole, p)
-    size = np.sqrt(np.maximum(np.diag(left), 1e-300))
-    values = np.linalg.eigvalsh(left / np.outer(size, size))
+def _condition(precision: FloatArray, p: int) -> float:
+    """Return the condition number of the root of the parameters' scaled information.
+
+    The other unknowns are eliminated.
+    """
+    marginal = marginal_information(precision, p)
+    size = np.sqrt(np.maximum(np.diag(marginal), 1e-300))
+    values = np.linalg.eigvalsh(marginal / np.outer(size, size))
     return float(np.sqrt(values[-1] / max(values[0], 1e-16)))
 
 
@@ -122,48 +188,55 @@ def _stds(covariance: FloatArray) -> FloatArray:
     return np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
-def _white_information(fit: OutputError, left: Sequence[FloatArray]) -> FloatArray:
-    """Fisher's information if each sample were off by itself."""
-    white = [replace(spread, effective=spread.typical) for spread in fit.residual_stds]
-    return information_matrix(fit.problem, left, white, fit.minimum.jacobians, power=0)
+def _white_information(fit: OutputError, residual: Sequence[FloatArray]) -> FloatArray:
+    """Return Fisher's information if all residuals were independent, (m, m)."""
+    white = [replace(std, effective=std.typical) for std in fit.residual_stds]
+    return information_matrix(fit.problem, residual, white, fit.minimum.jacobians, power=0)
 
 
-def _sandwich(fit: OutputError, left: Sequence[FloatArray], inverse: FloatArray) -> FloatArray:
-    """White's covariance, neighbouring scores summed over windows as Newey and West have it."""
+def _sandwich(fit: OutputError, residual: Sequence[FloatArray], inverse: FloatArray) -> FloatArray:
+    """Return the sandwich covariance, (m, m).
+
+    The covariance of the scores is summed over all windows of the residuals' correlation time,
+    which gives the triangular weights of Newey and West; few windows are corrected for.
+    """
     problem, middle = fit.problem, np.diag(fit.problem.prior[1])
-    longest = max(noise.slow_secs for noise in fit.noises)
-    for i, spread in enumerate(fit.residual_stds):
-        off, weight = weighted_residuals(left[i], spread)
-        scores = np.einsum("ncq,nc->nq", fit.minimum.jacobians[i], weight * off)
-        together = max(longest, LEAST_WINDOW_SECS) / problem.segments[i].dt_secs
-        window = int(min(max(together, 1), len(scores) / 2))
+    correlation_secs = max(*(noise.slow_secs for noise in fit.noises), MIN_WINDOW_SECS)
+    for i, std in enumerate(fit.residual_stds):
+        r, weight = weighted_residuals(residual[i], std)
+        scores = np.einsum("ncq,nc->nq", fit.minimum.jacobians[i], weight * r)
+        samples = correlation_secs / problem.segments[i].dt_secs
+        window = int(min(max(samples, 1), len(scores) / 2))
         sums = np.cumsum(scores, axis=0)
         ends = np.vstack((sums, np.tile(sums[-1], (window, 1))))
         starts = np.vstack((np.zeros((window, sums.shape[1])), sums))
-        runs = ends - starts
+        windows = ends - starts
         at = problem.unknown_indices(i)
         middle[np.ix_(at, at)] += (
-            float(few_rows(window / len(scores))) ** 2 * (runs.T @ runs) / window
+            float(few_rows(window / len(scores))) ** 2 * (windows.T @ windows) / window
         )
     return np.asarray(inverse @ middle @ inverse)
 
 
-def _left_out(fit: OutputError) -> FloatArray:
-    """The parameters without each run in turn, (r, p), of the fits that came to an end."""
-    problem, found = fit.problem, []
+def _leave_one_out(fit: OutputError) -> FloatArray:
+    """Return the parameters fitted without each run in turn, (r, p), where the fits converge."""
+    problem, estimates = fit.problem, []
     for run in problem.runs:
         kept = [i for i in range(len(problem.segments)) if i not in run]
         rest, start = problem.select_segments(kept, fit.minimum.unknowns)
         minimum = minimise(rest, start, [fit.residual_stds[i] for i in kept])
         if minimum.converged:
-            found.append(minimum.unknowns[: len(problem.free)])
-    return np.array(found).reshape(-1, len(problem.free))
+            estimates.append(minimum.unknowns[: len(problem.free)])
+    return np.array(estimates).reshape(-1, len(problem.free))
 
 
-def _jackknife(others: FloatArray) -> FloatArray:
-    """The std of what was found without each run in turn, its few runs allowed for."""
-    count = len(others)
-    if count < LEAST_RUNS:
-        return np.full(others.shape[1], np.nan)
-    spread = np.sum((others - others.mean(axis=0)) ** 2, axis=0) * (count - 1) / count
-    return np.asarray(np.sqrt(spread) * stdtrit(count - 1, 0.975) / 1.96)
+def _jackknife_std(estimates: FloatArray) -> FloatArray:
+    """Return the jackknife's standard error, (p,), of leave-one-out estimates, (r, p).
+
+    Student's t with r - 1 degrees of freedom widens it, so that 1.96 of it is a 95 % interval.
+    """
+    count = len(estimates)
+    if count < MIN_JACKKNIFE_RUNS:
+        return np.full(estimates.shape[1], np.nan)
+    variance = np.sum((estimates - estimates.mean(axis=0)) ** 2, axis=0) * (count - 1) / count
+    return np.asarray(np.sqrt(variance) * stdtrit(count - 1, 0.975) / 1.96)

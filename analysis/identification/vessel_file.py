@@ -22,7 +22,7 @@ from .fixed_parameters import fixed_values
 from .identified_ship import IdentifiedShip
 from .output_error import DEFAULT_LENGTH, OutputError, output_error
 from .segment import initial_level
-from .uncertainty import ECHO, UNIDENTIFIABLE, Uncertainty, uncertainty
+from .uncertainty import MAX_PRIOR_SHARE, MAX_RELATIVE_STD, Uncertainty, uncertainty
 
 SECTIONS = {"yaw": YAW_COEFFICIENTS, "surge": ("f", "g", "h")}
 ANGLE_POWERS = {"b2": 1, "b3": 2, "f": 2}  # power of the angle in the unit's denominator
@@ -91,8 +91,8 @@ def _undetermined_parts(model: Model, estimates: Uncertainty) -> Iterator[str]:
     Judged by the standard deviations of the noise alone: those of a model that does not fit the
     ship are wider, but the model may still be close enough to be used.
     """
-    by_data = estimates.coloured <= UNIDENTIFIABLE * np.abs(estimates.values)
-    by_data &= estimates.prior_share <= ECHO
+    by_data = estimates.coloured <= MAX_RELATIVE_STD * np.abs(estimates.values)
+    by_data &= estimates.prior_share <= MAX_PRIOR_SHARE
     for part in ("yaw", "surge"):
         is_surge = part == "surge"
         own = np.array([(name in SURGE_PARAMETERS) == is_surge for name in estimates.names], bool)
@@ -197,7 +197,7 @@ def _comments(
     `divisors` are what the values are divided by; `tied` where the fit is of the tied form.
     """
     half = dict(zip(estimates.names, 1.96 * estimates.std, strict=True))
-    prior = dict(zip(estimates.names, estimates.prior_share > ECHO, strict=True))
+    prior = dict(zip(estimates.names, estimates.prior_share > MAX_PRIOR_SHARE, strict=True))
 
     def comment(name: str) -> str:
         if name in estimates.unidentifiable:

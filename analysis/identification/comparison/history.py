@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.identification.segment import Segment
-from analysis.identification.uncertainty import ECHO, Uncertainty
+from analysis.identification.uncertainty import MAX_PRIOR_SHARE, Uncertainty
 from shiplog.types import FloatArray
 
 PRIOR_OFFSET = 0.3  # distance of each prior from the fitted value, as a share of that value
@@ -70,7 +70,7 @@ class ParameterHistory:
         chance.
         """
         later = np.fmax.accumulate(self.prior_share[::-1])[::-1]
-        return np.asarray(later > ECHO)
+        return np.asarray(later > MAX_PRIOR_SHARE)
 
     @property
     def median_prior_share(self) -> FloatArray:

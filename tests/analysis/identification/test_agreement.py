@@ -56,7 +56,7 @@ def test_runs_of_one_ship_agree_within_their_noise() -> None:
 def test_the_halves_of_a_run_agree_too(manoeuvre: str) -> None:
     for seed in (0, 1):
         found = assess_agreement(output_error([a_trial(manoeuvre, seed)], ship_model("burylin")))
-        assert found.names == ("its first half", "its second half")
+        assert found.names == ("first half", "second half")
         assert found.contradiction == 1.0
 
 
