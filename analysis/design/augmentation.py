@@ -1,4 +1,4 @@
-"""Disturbances as systems, and a plant and its environment as one.
+"""Exosystems of disturbances, and a plant augmented by them.
 
 A disturbance is what an exosystem puts out, a linear system of known modes and unknown state:
 a constant, a ramp, a wave. Source: "Algorithm of ship course control system watcher for assessing

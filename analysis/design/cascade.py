@@ -1,4 +1,4 @@
-"""A filter behind a filter: what it repairs, and what it costs."""
+"""Cascades of filters, each taking the estimate of the one before as its measurement."""
 
 from dataclasses import dataclass
 
@@ -29,9 +29,9 @@ class Cascade:
     def verdict(self) -> str:
         """Whether it was worth it, in one line."""
         first, least, last = (self.relative[k].max() for k in (0, self.best - 1, -1))
-        said = f"stage {self.best} of {len(self.relative)} is the best, {least:.3g} times the"
-        said += f" optimal error; the first alone has {first:.3g}"
-        return said if last == least else f"{said}, and more stages hurt: the last has {last:.3g}"
+        text = f"stage {self.best} of {len(self.relative)} is the best, {least:.3g} times the"
+        text += f" optimal error; the first alone has {first:.3g}"
+        return text if last == least else f"{text}, and more stages hurt: the last has {last:.3g}"
 
 
 def cascade(

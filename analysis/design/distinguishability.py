@@ -1,4 +1,4 @@
-"""What the sensors of a plant cannot tell apart, and what would cure it."""
+"""Disturbances that the sensors of a plant cannot distinguish, and sensors that would."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,19 +9,19 @@ from scipy.linalg import block_diag
 from shiplog.types import FloatArray
 
 from .augmentation import Influence, Plant, System, augmented
-from .placement import HiddenMode, hautus, named
+from .placement import UnobservableMode, format_mode, unobservable_modes
 
-SAME_MODE = 1e-6  # relative: what counts as one mode before and after a sensor is added
+MODE_RTOL = 1e-6  # relative: what counts as one mode before and after a sensor is added
 
 
 @dataclass(frozen=True)
-class Clash:
+class Ambiguity:
     """A mode that the sensors do not show, what takes part in it and what would show it."""
 
     mode: complex  # 1/s; of a complex pair the one above
     disturbances: tuple[str, ...]
     states: tuple[str, ...]  # of the plant
-    cures: tuple[str, ...]  # measurements, any one of which would do
+    remedies: tuple[str, ...]  # measurements, any one of which would do
 
     def __str__(self) -> str:
         who = " and ".join(repr(name) for name in self.disturbances)
@@ -29,42 +29,44 @@ class Clash:
             who += " and the state " + " and ".join(repr(name) for name in self.states)
         elif not self.disturbances:
             who = "the state " + " and ".join(repr(name) for name in self.states)
-        verb = "cannot be told apart" if " and " in who else "cannot be seen"
-        remedy = f"measure {', or '.join(self.cures)}" if self.cures else "leave some of them out"
-        return f"at the mode {named(self.mode)} {who} {verb}; {remedy}"
+        verb = "cannot be distinguished" if " and " in who else "cannot be seen"
+        remedy = (
+            f"measure {', or '.join(self.remedies)}" if self.remedies else "leave some of them out"
+        )
+        return f"at the mode {format_mode(self.mode)} {who} {verb}; {remedy}"
 
 
-def clashes(plant: Plant, influences: Sequence[Influence]) -> tuple[Clash, ...]:
-    """What the plant's sensors cannot tell apart; empty where `disturbance_observer` has a gain.
+def ambiguities(plant: Plant, influences: Sequence[Influence]) -> tuple[Ambiguity, ...]:
+    """What the plant's sensors cannot distinguish; empty where `disturbance_observer` has a gain.
 
     Hautus's test of plant and exosystems together. Raises `UsageError` for what does not fit.
     """
-    return clashing(augmented(plant, influences))
+    return system_ambiguities(augmented(plant, influences))
 
 
-def clashing(system: System) -> tuple[Clash, ...]:
-    """As `clashes`, of plant and exosystems that are one system already."""
-    return tuple(_clash(system, mode) for mode in hautus(system.A, system.C))
+def system_ambiguities(system: System) -> tuple[Ambiguity, ...]:
+    """Return `ambiguities` of plant and exosystems that are one system already."""
+    return tuple(_ambiguity(system, mode) for mode in unobservable_modes(system.A, system.C))
 
 
-def _clash(system: System, mode: HiddenMode) -> Clash:
+def _ambiguity(system: System, mode: UnobservableMode) -> Ambiguity:
     """Who is in a hidden mode, and what shows it: a state, a state's integral, a disturbance."""
     owners = sorted({system.owners[i] for i in mode.states} - {-1})
     plant = [i for i in mode.states if system.owners[i] == -1]
-    cures = []
+    remedies = []
     for i in plant:
         if _shows(system, np.eye(1, len(system.A), i), mode.value):
-            cures.append(f"{system.states[i]!r} by a sensor of its own")
+            remedies.append(f"{system.states[i]!r} by a sensor of its own")
         if _is_rate(system, i) and _shows_integral(system, i, mode.value):
-            cures.append(f"the integral of {system.states[i]!r}")
-    if not cures:
+            remedies.append(f"the integral of {system.states[i]!r}")
+    if not remedies:
         itself = [k for k in owners if _shows(system, system.D[[k]], mode.value)]
-        cures = [f"{system.names[k]!r} itself" for k in itself]
-    return Clash(
+        remedies = [f"{system.names[k]!r} itself" for k in itself]
+    return Ambiguity(
         mode.value,
         tuple(system.names[k] for k in owners),
         tuple(system.states[i] for i in plant),
-        tuple(cures),
+        tuple(remedies),
     )
 
 
@@ -80,7 +82,9 @@ def _shows_integral(system: System, i: int, mode: complex) -> bool:
 
 
 def _hides(A: FloatArray, C: FloatArray, mode: complex) -> bool:
-    return any(np.isclose(mode, left.value, rtol=SAME_MODE, atol=1e-9) for left in hautus(A, C))
+    return any(
+        np.isclose(mode, left.value, rtol=MODE_RTOL, atol=1e-9) for left in unobservable_modes(A, C)
+    )
 
 
 def _is_rate(system: System, i: int) -> bool:

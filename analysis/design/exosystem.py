@@ -1,4 +1,4 @@
-"""The disturbance observer's design: plant and environment as one system, and a gain for it.
+"""Design of the disturbance observer: a gain for plant and exosystems as one system.
 
 Source: "Algorithm of ship course control system watcher for assessing disturbances and noise
 measurements", eqs (3) and (4). Its "binomial" filtering is Butterworth's.
@@ -15,20 +15,20 @@ from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
 from .augmentation import Exosystem, Influence, Plant, System, augmented
-from .distinguishability import Clash, clashes, clashing
-from .luenberger import SPECTRA
+from .distinguishability import Ambiguity, ambiguities, system_ambiguities
+from .luenberger import POLE_PATTERNS
 from .matrices import finite
 from .observability import ComplexArray
-from .placement import place_multilevel, self_conjugate
+from .placement import checked_poles, place_multilevel
 from .riccati import kalman_gain
 
 __all__ = [
-    "Clash",
+    "Ambiguity",
     "DisturbanceObserver",
     "Exosystem",
     "Influence",
     "Plant",
-    "clashes",
+    "ambiguities",
     "disturbance_observer",
 ]
 
@@ -66,13 +66,13 @@ def disturbance_observer(
     change of plant and exosystems, and `sensor_noise` (m,), squares of units times second.
 
     Raises `UsageError` for matrices and names that do not fit, and for disturbances that the
-    sensors cannot tell apart, naming them, their mode and a measurement that would: constant
+    sensors cannot distinguish, naming them, their mode and a measurement that would: constant
     moment and constant gyro bias, say. Source: the disturbance observer's paper, (3) and (4).
     """
     system = augmented(plant, influences)
-    hidden = clashing(system)
+    hidden = system_ambiguities(system)
     if hidden:
-        raise UsageError("; ".join(str(clash) for clash in hidden))
+        raise UsageError("; ".join(str(ambiguity) for ambiguity in hidden))
     N, m = len(system.A), len(system.C)
     channels = _channels(system)
     wanted = _wanted(spectrum, frequency, [len(states) for states, _ in channels])
@@ -126,10 +126,10 @@ def _wanted(
             )
         parts = np.split(poles, np.cumsum(sizes)[:-1])
         return [
-            self_conjugate(f"spectrum of channel {k}", part, len(part), stable=True)
+            checked_poles(f"spectrum of channel {k}", part, len(part), stable=True)
             for k, part in enumerate(parts, 1)
         ]
-    if spectrum not in (*SPECTRA, "kalman"):
+    if spectrum not in (*POLE_PATTERNS, "kalman"):
         raise UsageError(
             f"spectrum is {spectrum!r}; expected butterworth, binomial, kalman or poles"
         )
@@ -144,7 +144,9 @@ def _wanted(
             f" {len(sizes)} channels"
         )
     each = np.broadcast_to(each, len(sizes))
-    return [SPECTRA[spectrum](n, omega) for n, omega in zip(sizes, each.tolist(), strict=True)]
+    return [
+        POLE_PATTERNS[spectrum](n, omega) for n, omega in zip(sizes, each.tolist(), strict=True)
+    ]
 
 
 def _intensities(name: str, values: ArrayLike | None, count: int) -> FloatArray:

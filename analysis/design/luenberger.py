@@ -28,7 +28,7 @@ def binomial_poles(order: int, frequency: float) -> ComplexArray:
     return np.full(order, -frequency + 0j)
 
 
-SPECTRA = {"butterworth": butterworth_poles, "binomial": binomial_poles}  # poles by their name
+POLE_PATTERNS = {"butterworth": butterworth_poles, "binomial": binomial_poles}
 
 
 @dataclass(frozen=True, eq=False)

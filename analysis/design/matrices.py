@@ -1,4 +1,4 @@
-"""What a design takes: matrices that fit each other, or one line that says which does not."""
+"""Checks of matrix arguments: shape, finiteness, symmetry and definiteness."""
 
 from typing import Literal
 

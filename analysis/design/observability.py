@@ -1,4 +1,4 @@
-"""What of a system its measurements show."""
+"""Observability: the modes of a linear system that its outputs do not show."""
 
 from typing import Any
 
@@ -10,24 +10,24 @@ from shiplog.types import FloatArray
 
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-RANK = 1e-12  # below it a direction counts as not seen, every measurement's unit being one
-AXIS = 1e-8  # of the norm of A: as near to the imaginary axis as a double eigenvalue is known
+RANK_TOLERANCE = 1e-12  # a direction below it is unobservable; each output has unit length
+AXIS_TOLERANCE = 1e-8  # of the norm of A: the accuracy of a double eigenvalue
 
 
-def unseen_modes(A: FloatArray, C: FloatArray) -> ComplexArray:
-    """The eigenvalues of A (n, n) that C (m, n) does not show, (k,); none if observable.
+def unobservable_eigenvalues(A: FloatArray, C: FloatArray) -> ComplexArray:
+    """Return the unobservable eigenvalues (k,) of A (n, n) with the output matrix C (m, n).
 
-    What C shows is taken away, what A feeds into that next, and so on, by orthogonal rotations
-    (the staircase form); the eigenvalues of what is left over are the modes. Unlike Hautus's test
-    it needs no eigenvalue of A, which where it is multiple is known to half the digits only.
-    The modes that an input B does not reach are `unseen_modes(A.T, B.T)`.
+    The staircase form: orthogonal rotations split off the states that C shows, then those that
+    drive these, and so on; the eigenvalues of the remaining states are unobservable. Unlike
+    Hautus's test this needs no eigenvalue of A, which is known to half the digits only where it is
+    multiple. The uncontrollable eigenvalues of an input matrix B are `unseen_modes(A.T, B.T)`.
     """
     A, (units, _) = matrix_balance(A, permute=False, separate=True)
     C = C * units
     lengths = np.linalg.norm(C, axis=1, keepdims=True)
     C = C / np.where(lengths > 0, lengths, 1.0)
     size = float(np.linalg.norm(A))
-    threshold = RANK
+    threshold = RANK_TOLERANCE
     while len(A):
         _, shown, rotation = np.linalg.svd(C)
         rank = int(np.sum(shown > threshold))
@@ -36,10 +36,10 @@ def unseen_modes(A: FloatArray, C: FloatArray) -> ComplexArray:
         # what is still hidden: how it moves itself, and how it moves what was just seen
         seen, hidden = rotation[:rank], rotation[rank:]
         A, C = hidden @ A @ hidden.T, seen @ A @ hidden.T
-        threshold = RANK * size
+        threshold = RANK_TOLERANCE * size
     return np.linalg.eigvals(A).astype(complex)
 
 
-def spelled(mode: complex) -> str:
-    """An eigenvalue for a message: 0.2164316, or -0.05+0.6j."""
+def format_eigenvalue(mode: complex) -> str:
+    """Format an eigenvalue for a message: 0.2164316, or -0.05+0.6j."""
     return f"{mode:.7g}" if mode.imag else f"{mode.real:.7g}"

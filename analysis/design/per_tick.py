@@ -1,4 +1,4 @@
-"""An observer of a nonlinear model, its gain found anew at the start of every tick.
+"""Per-tick observer of a nonlinear model: poles placed anew at the start of every tick.
 
 Source: Zubov, Mikrin, Oleinik, Ryabchenko, "Algorithms for the synthesis of linear observers for
 nonlinear dynamic systems", (1.1) to (1.13). Its corrections ΔA* and ΔG* of the linearised model
@@ -18,14 +18,16 @@ from shiplog.types import FloatArray
 
 from .matrices import finite, matrix, number, square
 from .observability import ComplexArray
-from .placement import place_multilevel, self_conjugate
+from .placement import checked_poles, place_multilevel
 
 Indices = NDArray[np.intp]
 Motion = Callable[[FloatArray, FloatArray], FloatArray]  # of the state (n,) and the inputs (r,)
 
-STIFF = 1e6  # a Jacobian that much faster than the poles asked for is at a singular point
-HUGE = 1e10  # an entry of a Jacobian that without a gain speaks of a singular point
-SINGULAR = "the model is singular there (Euler angles are where cos θ = 0): take other coordinates"
+MAX_RATE_RATIO = 1e6  # a Jacobian that much faster than the poles asked for is at a singular point
+MAX_JACOBIAN_ENTRY = 1e10  # an entry of a Jacobian that without a gain speaks of a singular point
+SINGULAR_HINT = (
+    "the model is singular there (Euler angles are where cos θ = 0): take other coordinates"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +61,8 @@ class TickObserver:
             seen, hidden = self._parts()
             return place_multilevel(A[np.ix_(hidden, hidden)], A[np.ix_(seen, hidden)], self.poles)
         except UsageError as error:
-            why = f"; {SINGULAR}" if np.abs(A).max() > HUGE else ""
-            raise UsageError(f"no gain at x̂ = {_said(x)}: {error}{why}") from None
+            why = f"; {SINGULAR_HINT}" if np.abs(A).max() > MAX_JACOBIAN_ENTRY else ""
+            raise UsageError(f"no gain at x̂ = {_format_vector(x)}: {error}{why}") from None
 
     def step(
         self, x: FloatArray, y: ArrayLike, u: ArrayLike = (), *, tick_secs: float
@@ -89,7 +91,9 @@ class TickObserver:
                 state = _runge_kutta(motion.rate, state, y[k : k + 3], u[k : k + 3], h)
             end = motion.estimate(state, y[-1])
         if not np.isfinite(end).all():
-            raise UsageError(f"the estimate is lost in the tick from x̂ = {_said(x)}; {SINGULAR}")
+            raise UsageError(
+                f"the estimate is lost in the tick from x̂ = {_format_vector(x)}; {SINGULAR_HINT}"
+            )
         return end
 
     def _linearised(self, x: FloatArray, u: FloatArray) -> FloatArray:
@@ -101,12 +105,15 @@ class TickObserver:
         except ZeroDivisionError:
             found = np.full((n, n), np.nan)
         if not np.isfinite(found).all():
-            raise UsageError(f"the Jacobian is not finite at x̂ = {_said(x)}; {SINGULAR}")
+            raise UsageError(
+                f"the Jacobian is not finite at x̂ = {_format_vector(x)}; {SINGULAR_HINT}"
+            )
         A = square("jacobian", found, n)
         fastest = np.abs(np.linalg.eigvals(np.abs(A))).max()
-        if fastest > STIFF * np.abs(self.poles).max():
+        if fastest > MAX_RATE_RATIO * np.abs(self.poles).max():
             raise UsageError(
-                f"the Jacobian has rates of {fastest:.1g} 1/s at x̂ = {_said(x)}; {SINGULAR}"
+                f"the Jacobian has rates of {fastest:.1g} 1/s at x̂ = {_format_vector(x)};"
+                f" {SINGULAR_HINT}"
             )
         return A
 
@@ -167,7 +174,7 @@ def tick_observer(
         single = np.all((C == 0) | (C == 1)) and np.all(C.sum(axis=1) == 1) and m < n
         if not single or C.sum(axis=0).max() > 1:
             raise UsageError(f"C, {C.shape}, mixes states; expected rows of the identity, fewer")
-    wanted = self_conjugate("poles", poles, n - m if order == "reduced" else n, stable=True)
+    wanted = checked_poles("poles", poles, n - m if order == "reduced" else n, stable=True)
     return TickObserver(rate, jacobian, C, wanted, order == "reduced")
 
 
@@ -192,7 +199,7 @@ def block_gains(A: ArrayLike, Phi0: ArrayLike, Phi1: ArrayLike) -> BlockGains:
     A, Phi1 = square("A", A, 2 * m), square("Phi1", Phi1, m)
     A11, A12, A21, A22 = A[:m, :m], A[:m, m:], A[m:, :m], A[m:, m:]
     if np.linalg.cond(A12) > 1 / np.finfo(float).eps:
-        raise UsageError(f"A12, {A12.shape}, of A {A.shape} is singular; {SINGULAR}")
+        raise UsageError(f"A12, {A12.shape}, of A {A.shape} is singular; {SINGULAR_HINT}")
     inverse = np.linalg.inv(A12)
     N = A22 @ inverse - inverse @ Phi1.T
     return BlockGains(N, A11 + A12 @ N - Phi0.T, A21 + A22 @ N - N @ Phi0.T)
@@ -221,5 +228,5 @@ def _vector(name: str, values: ArrayLike, count: int | None = None) -> FloatArra
     return found
 
 
-def _said(x: FloatArray) -> str:
+def _format_vector(x: FloatArray) -> str:
     return f"[{', '.join(f'{value:.4g}' for value in x)}]"

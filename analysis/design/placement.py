@@ -1,4 +1,4 @@
-"""Poles placed exactly, level by level, and whether every one of them can be moved.
+"""Pole placement for observers of several outputs, and Hautus's test of observability.
 
 Source: Zubov, Mikrin, Oleinik, Ryabchenko, "Algorithms for the synthesis of linear observers for
 nonlinear dynamic systems", eqs (2.2) to (2.12). As printed (2.10) places A + L C, (2.7) starts from
@@ -19,17 +19,17 @@ from shiplog.types import FloatArray
 from .matrices import matrix, square
 from .observability import ComplexArray
 
-UNSEEN = 1e-10  # a direction less visible than this is not seen, all of A and C being at most one
-TAKES_PART = 1e-6  # a state that moves less in a mode does not take part in it
-CONJUGATE = 1e-9  # relative: how near a pole's conjugate must be
-CLUSTER = 1e-3  # eigenvalues as near as this may be one, of a defective block
-ROUNDING = 1e-14  # a singular value that is zero is computed as less than this
-SAME = 1e-8  # modes as near as this are one
-REACHED = 1e-4  # relative: how far rounding may leave the characteristic polynomial
+OBSERVABILITY_TOLERANCE = 1e-10  # smallest singular value of an observable direction
+MIN_PARTICIPATION = 1e-6  # a state with a smaller component is not part of a mode
+CONJUGATE_TOLERANCE = 1e-9  # relative distance of a pole from its partner's conjugate
+CLUSTER_RADIUS = 1e-3  # eigenvalues this near may be one defective one
+ROUNDING = 1e-14  # computed size of a singular value that is zero
+MODE_TOLERANCE = 1e-8  # modes this near are the same
+MAX_POLYNOMIAL_ERROR = 1e-4  # relative, due to rounding
 
 
 @dataclass(frozen=True)
-class HiddenMode:
+class UnobservableMode:
     """An eigenvalue that the measurements do not show; of a complex pair the one above."""
 
     value: complex  # rad/s
@@ -52,17 +52,17 @@ def place_multilevel(A: ArrayLike, C: ArrayLike, poles: ArrayLike) -> FloatArray
     """
     A = square("A", A)
     C = matrix("C", C, columns=len(A))
-    wanted = self_conjugate("poles", poles, len(A))
-    hidden = hautus(A, C)
+    wanted = checked_poles("poles", poles, len(A))
+    hidden = unobservable_modes(A, C)
     if hidden:
         raise UsageError(
-            f"A {A.shape} and C {C.shape}: the mode at {named(hidden[0].value)} cannot be seen in"
-            " the measurements; measure another state"
+            f"A {A.shape} and C {C.shape}: the mode at {format_mode(hidden[0].value)} cannot be"
+            " seen in the measurements; measure another state"
         )
     pair = _natural_units(A, C, float(np.abs(wanted).max()))
     L = _placed(pair.A, pair.C, wanted / pair.rate)
     missed = polynomial_error(pair.A - L @ pair.C, wanted / pair.rate)
-    if missed > REACHED:
+    if missed > MAX_POLYNOMIAL_ERROR:
         raise UsageError(
             f"poles {wanted.shape}: rounding leaves the characteristic polynomial off by"
             f" {missed:.1g}; A {A.shape} and C {C.shape} hardly show a mode, or are too uneven:"
@@ -71,7 +71,7 @@ def place_multilevel(A: ArrayLike, C: ArrayLike, poles: ArrayLike) -> FloatArray
     return pair.rate * pair.units[:, None] * L
 
 
-def hautus(A: ArrayLike, C: ArrayLike) -> tuple[HiddenMode, ...]:
+def unobservable_modes(A: ArrayLike, C: ArrayLike) -> tuple[UnobservableMode, ...]:
     """The modes of x' = A x that y = C x does not show; none where the pair is observable.
 
     A (n, n), C (m, n). A mode λ is hidden where [A - λ I; C] has a direction of singular value
@@ -81,13 +81,15 @@ def hautus(A: ArrayLike, C: ArrayLike) -> tuple[HiddenMode, ...]:
     A = square("A", A)
     C = matrix("C", C, columns=len(A))
     pair = _natural_units(A, C)
-    found: list[HiddenMode] = []
+    found: list[UnobservableMode] = []
     for mode, shown, directions in _least_visible(pair.A, pair.C):
-        new = all(abs(mode * pair.rate - known.value) > SAME * pair.rate for known in found)
-        if shown[-1] < UNSEEN and mode.imag >= 0 and new:
-            moved = np.linalg.norm(directions[shown < UNSEEN], axis=0)
-            states = tuple(np.flatnonzero(moved > TAKES_PART).tolist())
-            found.append(HiddenMode(mode * pair.rate, states))
+        new = all(
+            abs(mode * pair.rate - known.value) > MODE_TOLERANCE * pair.rate for known in found
+        )
+        if shown[-1] < OBSERVABILITY_TOLERANCE and mode.imag >= 0 and new:
+            moved = np.linalg.norm(directions[shown < OBSERVABILITY_TOLERANCE], axis=0)
+            states = tuple(np.flatnonzero(moved > MIN_PARTICIPATION).tolist())
+            found.append(UnobservableMode(mode * pair.rate, states))
     return tuple(found)
 
 
@@ -102,12 +104,15 @@ def _least_visible(
     eigenvalues = np.linalg.eigvals(A).astype(complex)
     for eigenvalue in eigenvalues:
         away = np.abs(eigenvalues - eigenvalue)
-        nearest = eigenvalues[np.argsort(away, kind="stable")][: np.sum(away < CLUSTER)]
+        nearest = eigenvalues[np.argsort(away, kind="stable")][: np.sum(away < CLUSTER_RADIUS)]
         tried: list[tuple[complex, FloatArray, ComplexArray]] = []
         for count in range(1, len(nearest) + 1):
             mean = complex(nearest[:count].mean())
             mode = complex(
-                *(part if abs(part) > UNSEEN else 0.0 for part in (mean.real, mean.imag))
+                *(
+                    part if abs(part) > OBSERVABILITY_TOLERANCE else 0.0
+                    for part in (mean.real, mean.imag)
+                )
             )
             _, shown, directions = np.linalg.svd(np.vstack((A - mode * np.eye(len(A)), C)))
             tried.append((mode, shown, directions))
@@ -115,14 +120,14 @@ def _least_visible(
         yield min(reversed(tried), key=lambda one: max(float(one[1][-1]), ROUNDING))
 
 
-def named(mode: complex) -> str:
+def format_mode(mode: complex) -> str:
     """A mode as a message says it: a decay rate, or a pair of conjugates, in 1/s."""
     value = complex(mode)
     real = f"{value.real + 0.0:.4g}"
     return real if value.imag == 0 else f"{real} ± {abs(value.imag):.4g}j"
 
 
-def self_conjugate(name: str, poles: ArrayLike, n: int, *, stable: bool = False) -> ComplexArray:
+def checked_poles(name: str, poles: ArrayLike, n: int, *, stable: bool = False) -> ComplexArray:
     """`poles` as n finite numbers (n,) that a real matrix can have, conjugates to the bit.
 
     Raises `UsageError` for another number of them, NaN, one without its conjugate, and where they
@@ -136,11 +141,11 @@ def self_conjugate(name: str, poles: ArrayLike, n: int, *, stable: bool = False)
         raise UsageError(f"{name} are of shape {found.shape}; expected ({n},), one for each state")
     if not np.isfinite(found).all():
         raise UsageError(f"{name}, {found.shape}, have NaN or infinities; expected finite numbers")
-    found.imag[np.abs(found.imag) <= CONJUGATE * np.abs(found)] = 0
+    found.imag[np.abs(found.imag) <= CONJUGATE_TOLERANCE * np.abs(found)] = 0
     lower = list(found[found.imag < 0])
     for pole in found[found.imag > 0]:
         partner = min(lower, key=lambda other: abs(other - pole.conj()), default=np.inf)
-        if abs(partner - pole.conj()) > CONJUGATE * abs(pole):
+        if abs(partner - pole.conj()) > CONJUGATE_TOLERANCE * abs(pole):
             raise UsageError(_alone(name, found, pole))
         lower.remove(partner)
     if lower:
@@ -205,14 +210,14 @@ def _levels(A: FloatArray, B: FloatArray) -> list[_Level]:
     levels = []
     while True:
         left, values, right = np.linalg.svd(B)
-        rank = int(np.sum(values > UNSEEN))
+        rank = int(np.sum(values > OBSERVABILITY_TOLERANCE))
         U, N = left[:, :rank], left[:, rank:].T
         levels.append(_Level(A, U, right[:rank].T / values[:rank], N))
         if rank == len(A):
             return levels
         if rank == 0:
             raise UsageError(
-                f"the mode at {named(np.linalg.eigvals(A)[0])} can hardly be seen in the"
+                f"the mode at {format_mode(np.linalg.eigvals(A)[0])} can hardly be seen in the"
                 " measurements; measure another state"
             )
         A, B = N @ A @ N.T, N @ A @ U

@@ -1,4 +1,4 @@
-"""The ship's model as a linear system of pseudo-inputs: its matrices."""
+"""Matrices of the ship's five-state model with pseudo-inputs."""
 
 from math import exp
 

@@ -1,4 +1,4 @@
-"""Regulators and filters of prescribed speed and damping: Antonov's quality designs.
+"""Quality regulator and quality filter: LQ designs of prescribed decay and damping (Antonov).
 
 A shift c makes every mode decay faster than exp(-c t / 2); a weight G on the rates damps it. With
 one c both are the ordinary design for A + (c / 2) I. Two shifts, of fast and of slow motions, bound
@@ -15,8 +15,8 @@ from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
 from .matrices import count, finite, matrix, square, symmetric
-from .observability import ComplexArray, spelled
-from .riccati import Gain, Words, optimal_gain, poles_of
+from .observability import ComplexArray, format_eigenvalue
+from .riccati import Gain, MatrixNames, optimal_gain, sorted_eigenvalues
 
 Shift = float | tuple[float, float]
 Projectors = tuple[ArrayLike, ArrayLike]
@@ -60,7 +60,7 @@ def quality_regulator(
     R = symmetric("R", R, B.shape[1], definite="positive")
     G = np.zeros((n, n)) if G is None else symmetric("G", G, n)
     shifted, bound = _shifted(A, shift, projectors)
-    words = Words(
+    words = MatrixNames(
         _name(bound, "A"), "B", "P", "cannot be moved by B; add an input", "P does not weigh it"
     )
     dual = optimal_gain(shifted.T, B.T, P + A.T @ G @ A, R + B.T @ G @ B, A.T @ G @ B, words=words)
@@ -102,7 +102,7 @@ def quality_filter(
         R1 + A @ G @ A.T,
         R2 + S @ G @ S.T,
         A @ G @ S.T,
-        words=Words(A=_name(bound, "A"), C="S", noise="R1"),
+        words=MatrixNames(A=_name(bound, "A"), C="S", noise="R1"),
     )
     poles = _bounded(A - found.gain @ S, bound)
     return Gain(found.gain, found.covariance, poles, found.residual)
@@ -180,10 +180,10 @@ def _name(bound: float, matrix_name: str) -> str:
 
 def _bounded(closed: FloatArray, bound: float) -> ComplexArray:
     """The poles of the closed loop (n, n), the slowest last; refused unless left of the bound."""
-    poles = poles_of(closed)
+    poles = sorted_eigenvalues(closed)
     if poles[-1].real >= bound:
         raise UsageError(
-            f"shift asks for poles left of {bound:g}, and one is at {spelled(poles[-1])}; take one"
-            " shift for fast and slow motions"
+            f"shift asks for poles left of {bound:g}, and one is at"
+            f" {format_eigenvalue(poles[-1])}; take one shift for fast and slow motions"
         )
     return poles

@@ -1,4 +1,4 @@
-"""The steady-state Kalman filter: one gain for ever, of one algebraic Riccati equation."""
+"""The steady-state Kalman filter, from the algebraic Riccati equation."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -11,34 +11,76 @@ from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
 from .matrices import matrix, square, symmetric
-from .observability import AXIS, ComplexArray, spelled, unseen_modes
+from .observability import AXIS_TOLERANCE, ComplexArray, format_eigenvalue, unobservable_eigenvalues
 
-PRECISE = 1e-9  # a scaled residual beyond it is no solution
+MAX_RICCATI_RESIDUAL = 1e-9  # a scaled residual beyond it is no solution
 
 
 @dataclass(frozen=True, eq=False)
 class Gain:
-    """The gain of x̂' = A x̂ + B u + L (y - C x̂) and what the Riccati equation says of it."""
+    """The gain of the observer x̂' = A x̂ + B u + L (y - C x̂).
 
-    gain: FloatArray  # L, (n, m)
-    covariance: FloatArray  # P, (n, n): the error's, unless a quality design changed the question
-    poles: ComplexArray  # of A - L C, (n,), the slowest last
-    residual: float  # of the Riccati equation, as a part of its terms
+    Attributes
+    ----------
+    gain
+        L, (n, m).
+    covariance
+        P, (n, n): the solution of the Riccati equation. It is the covariance of the error, except
+        in a quality design, which solves a changed equation.
+    poles
+        (n,): the eigenvalues of A - L C, 1/s, the slowest last.
+    residual
+        The residual of the Riccati equation over the sum of its terms.
+    """
+
+    gain: FloatArray
+    covariance: FloatArray
+    poles: ComplexArray
+    residual: float
 
 
 def kalman_gain(
     A: ArrayLike, G: ArrayLike, C: ArrayLike, Q: ArrayLike, R: ArrayLike, N: ArrayLike | None = None
 ) -> Gain:
-    """The steady-state Kalman filter of x' = A x + G w, y = C x + v.
+    """Design the steady-state Kalman filter of x' = A x + G w, y = C x + v.
 
-    A (n, n), G (n, q), C (m, n); w and v are white of intensities Q (q, q) and R (m, m), in the
-    square of their unit times second, and E[w v'] = N (q, m). Samples `dt` seconds apart whose
-    noise has the variance r are of the intensity R = r dt. The covariance is singular where a
-    stable state is not driven by w: an actuator's row of the gain is zero.
+    The covariance is singular where a stable state is not driven by w: for example, the row of the
+    gain of an actuator's state is zero.
 
-    Raises `UsageError` for matrices that do not fit, Q or [Q N; N' R] not semidefinite, R not
-    definite, a mode that does not decay and is not seen in y, and one on the imaginary axis that
-    w does not drive. Source: Sakharov, Shergina, Chertkov, (11) and (13).
+    Parameters
+    ----------
+    A
+        (n, n), 1/s.
+    G
+        (n, q): where the process noise enters.
+    C
+        (m, n).
+    Q
+        (q, q): intensity of the white noise w, in its unit squared times second.
+    R
+        (m, m): intensity of the white noise v. Samples `dt` seconds apart with noise of variance r
+        have the intensity R = r dt.
+    N
+        (q, m): cross intensity E[w v']; zero by default.
+
+    Raises
+    ------
+    UsageError
+        The matrices do not fit; Q or [Q N; N' R] is not semidefinite; R is not definite; a mode
+        that does not decay is not observable in y; or a mode on the imaginary axis is not driven
+        by w. The message names the mode.
+
+    References
+    ----------
+    Sakharov, Shergina, Chertkov, (11) and (13).
+
+    Examples
+    --------
+    A double integrator with noise of unit intensity on its rate and on its measurement:
+
+    >>> A, G, C = [[0, 1], [0, 0]], [[0], [1]], [[1, 0]]
+    >>> kalman_gain(A, G, C, Q=1.0, R=1.0).gain.round(3).tolist()
+    [[1.414], [1.0]]
     """
     A = square("A", A)
     n = len(A)
@@ -52,8 +94,8 @@ def kalman_gain(
     return optimal_gain(A, C, G @ Q @ G.T, R, G @ N)
 
 
-class Words(NamedTuple):
-    """What the matrices of `optimal_gain` are to the one who asks, for the messages."""
+class MatrixNames(NamedTuple):
+    """The names of the matrices of `optimal_gain` in the caller's terms, for error messages."""
 
     A: str = "A"
     C: str = "C"
@@ -62,7 +104,7 @@ class Words(NamedTuple):
     undriven: str = "no noise drives it; give it some"
 
 
-FILTER = Words()
+FILTER_NAMES = MatrixNames()
 
 
 def optimal_gain(
@@ -71,7 +113,7 @@ def optimal_gain(
     W: FloatArray,
     R: FloatArray,
     S: FloatArray,
-    words: Words = FILTER,
+    words: MatrixNames = FILTER_NAMES,
 ) -> Gain:
     """The Kalman filter of state noise W (n, n), measurement noise R (m, m), cross term S (n, m).
 
@@ -81,18 +123,18 @@ def optimal_gain(
     """
     weight = np.linalg.solve(R, S.T).T  # S R⁻¹
     drift, drive, sharp = A - weight @ C, W - weight @ S.T, C.T @ np.linalg.solve(R, C)
-    _refuse_hopeless(A, C, drift, drive, words)
+    _require_solvable(A, C, drift, drive, words)
     matrices = f"{words.A} {A.shape} and {words.C}"
     try:
         P = _solved(A, C, W, R, S)
     except (LinAlgError, ValueError) as error:
         raise UsageError(f"{matrices}: no stabilising gain found ({error})") from None
-    _refuse_unstable(drift - P @ sharp, matrices)
+    _require_stable(drift - P @ sharp, matrices)
     P = newton_step(drift, drive, sharp, P)
     L = np.linalg.solve(R, (P @ C.T + S).T).T
-    poles = _refuse_unstable(A - L @ C, matrices)
+    poles = _require_stable(A - L @ C, matrices)
     residual = scaled_residual(drift, drive, sharp, P)
-    if residual > PRECISE:
+    if residual > MAX_RICCATI_RESIDUAL:
         raise UsageError(
             f"{matrices}: the residual of the Riccati equation is {residual:.1g};"
             " bring the units nearer to each other"
@@ -109,7 +151,7 @@ def _solved(
     the measurements are taken in units of their noise, and P in the p that makes the equation's
     first and last coefficients alike.
     """
-    if not W.any() and poles_of(A)[-1].real < 0:
+    if not W.any() and sorted_eigenvalues(A)[-1].real < 0:
         return np.zeros_like(A)  # nothing drives what decays; the library's rounding is no answer
     F = np.linalg.cholesky(R)
     C, S = np.linalg.solve(F, C), np.linalg.solve(F, S.T).T
@@ -118,31 +160,31 @@ def _solved(
     return p * solve_continuous_are(A.T, C.T, W / p, np.eye(len(R)), s=S)
 
 
-def _refuse_hopeless(
-    A: FloatArray, C: FloatArray, drift: FloatArray, drive: FloatArray, words: Words
+def _require_solvable(
+    A: FloatArray, C: FloatArray, drift: FloatArray, drive: FloatArray, words: MatrixNames
 ) -> None:
     """Raise `UsageError` for a mode that no gain makes decay, or that the best one would not."""
-    for mode in unseen_modes(A, C):
-        if mode.real >= -AXIS * np.linalg.norm(A):
+    for mode in unobservable_eigenvalues(A, C):
+        if mode.real >= -AXIS_TOLERANCE * np.linalg.norm(A):
             raise UsageError(
-                f"{words.A} {A.shape} and {words.C}: the mode at {spelled(mode)} does not decay and"
-                f" {words.unseen}"
+                f"{words.A} {A.shape} and {words.C}: the mode at {format_eigenvalue(mode)} does"
+                f" not decay and {words.unseen}"
             )
-    for mode in unseen_modes(drift.T, drive):
-        if abs(mode.real) <= AXIS * np.linalg.norm(drift):
+    for mode in unobservable_eigenvalues(drift.T, drive):
+        if abs(mode.real) <= AXIS_TOLERANCE * np.linalg.norm(drift):
             raise UsageError(
-                f"{words.A} {A.shape} and {words.noise}: the mode at {spelled(mode)} neither grows"
-                f" nor decays and {words.undriven}"
+                f"{words.A} {A.shape} and {words.noise}: the mode at {format_eigenvalue(mode)}"
+                f" neither grows nor decays and {words.undriven}"
             )
 
 
-def _refuse_unstable(closed: FloatArray, matrices: str) -> ComplexArray:
-    """The poles of a closed loop (n, n), the slowest last."""
-    poles = poles_of(closed)
+def _require_stable(closed: FloatArray, matrices: str) -> ComplexArray:
+    """Return the poles of a closed loop (n, n), slowest last; raise `UsageError` if unstable."""
+    poles = sorted_eigenvalues(closed)
     if poles[-1].real >= 0:
         raise UsageError(
-            f"{matrices}: the gain found leaves a pole at {spelled(poles[-1])}: too weak a hold on"
-            " a mode for the arithmetic, or units too far apart"
+            f"{matrices}: the gain found leaves a pole at {format_eigenvalue(poles[-1])}: too weak"
+            " a hold on a mode for the arithmetic, or units too far apart"
         )
     return poles
 
@@ -155,23 +197,23 @@ def newton_step(
     The library's P is good to the units of its matrices, which a ship's are far apart in; from
     there one step squares what is missing (Kleinman, 1968).
     """
-    left = drift @ P + P @ drift.T + drive - P @ sharp @ P
-    better = P + solve_continuous_lyapunov(drift - P @ sharp, -left)
+    residual = drift @ P + P @ drift.T + drive - P @ sharp @ P
+    better = P + solve_continuous_lyapunov(drift - P @ sharp, -residual)
     return (better + better.T) / 2
 
 
 def scaled_residual(
     drift: FloatArray, drive: FloatArray, sharp: FloatArray, P: FloatArray
 ) -> float:
-    """What is left of drift P + P drift' + drive - P sharp P, all (n, n), against its terms."""
-    left = drift @ P + P @ drift.T + drive - P @ sharp @ P
+    """Compute drift P + P drift' + drive - P sharp P, all (n, n), relative to its terms."""
+    residual = drift @ P + P @ drift.T + drive - P @ sharp @ P
     drifts, drives, sharps, size = (float(np.linalg.norm(M)) for M in (drift, drive, sharp, P))
     terms = drives + 2 * drifts * size + sharps * size**2
-    return float(np.linalg.norm(left)) / terms if terms else 0.0
+    return float(np.linalg.norm(residual)) / terms if terms else 0.0
 
 
-def poles_of(closed: FloatArray) -> ComplexArray:
-    """The eigenvalues of a closed loop (n, n), (n,), the slowest last."""
+def sorted_eigenvalues(closed: FloatArray) -> ComplexArray:
+    """Return the eigenvalues (n,) of a closed loop (n, n), the slowest last."""
     poles = np.linalg.eigvals(closed).astype(complex)
     return poles[np.lexsort((poles.imag, poles.real))]
 
@@ -191,9 +233,9 @@ def error_covariance(
     L = matrix("L", L, n, len(C))
     W, R = symmetric("W", W, n), symmetric("R", R, len(C))
     F = A - L @ C
-    worst = poles_of(F)[-1]
+    worst = sorted_eigenvalues(F)[-1]
     if worst.real >= 0:
         raise UsageError(
-            f"L {L.shape}: A - L C has a pole at {spelled(worst)}; expected a stable L"
+            f"L {L.shape}: A - L C has a pole at {format_eigenvalue(worst)}; expected a stable L"
         )
     return solve_continuous_lyapunov(F, -(W + L @ R @ L.T))

@@ -1,4 +1,4 @@
-"""Coloured disturbances: white noise through a filter whose state joins the plant's."""
+"""Shaping filters of coloured noise, and a plant augmented by them."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -13,7 +13,7 @@ from shiplog.types import FloatArray
 from .matrices import finite, matrix, number, square
 from .observability import ComplexArray
 
-TOUCHES = 1e-6  # relative: as near as two computed roots are where the spectrum touches zero
+DOUBLE_ROOT_TOLERANCE = 1e-6  # relative distance of the two computed parts of a double root
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class TransferFunction:
 
 
 @dataclass(frozen=True, eq=False)
-class Augmented:
+class ShapedSystem:
     """x' = A x + B u + G n, y = C x, the shaping filter's k states being the last of x."""
 
     A: FloatArray  # (n + k, n + k)
@@ -80,9 +80,11 @@ def _left_roots(name: str, coefficients: FloatArray) -> ComplexArray:
     """The roots s = jω, none in the right half plane, of a polynomial in ω²; half of all."""
     squares = np.roots(coefficients).astype(complex)
     # roots within rounding of ω² > 0 are a double one each two: the polynomial touches zero there
-    touching = (squares.real > 0) & (np.abs(squares.imag) <= TOUCHES * np.abs(squares))
+    touching = (squares.real > 0) & (
+        np.abs(squares.imag) <= DOUBLE_ROOT_TOLERANCE * np.abs(squares)
+    )
     at = np.sort(squares[touching].real)
-    if len(at) % 2 or np.any(at[1::2] - at[::2] > TOUCHES * at[1::2]):
+    if len(at) % 2 or np.any(at[1::2] - at[::2] > DOUBLE_ROOT_TOLERANCE * at[1::2]):
         raise UsageError(f"{name} changes sign near ω = {np.sqrt(at[0]):.4g}; expected none")
     axis = 1j * np.sqrt((at[1::2] + at[::2]) / 2)
     left = -np.sqrt(-squares[~touching])
@@ -125,7 +127,7 @@ def augment_with_shaping(
     *,
     at: Literal["state", "output"] = "state",
     noise: ArrayLike | None = None,
-) -> Augmented:
+) -> ShapedSystem:
     """The plant x' = A x + B u, y = C x with a coloured disturbance w = H(s) n, n being white.
 
     A (n, n), B (n, inputs), C (m, n). At the state w enters as G w, G (n,) or (n, 1); at the
@@ -149,7 +151,7 @@ def augment_with_shaping(
         raise UsageError("the shaping filter passes white noise to the output; give that to R")
     k = len(Aw)
     into_state, into_output = (G, np.zeros((len(C), 1))) if at == "state" else (np.zeros((n, 1)), G)
-    return Augmented(
+    return ShapedSystem(
         np.block([[A, into_state @ Cw], [np.zeros((k, n)), Aw]]),
         np.vstack((B, np.zeros((k, B.shape[1])))),
         np.hstack((C, into_output @ Cw)),

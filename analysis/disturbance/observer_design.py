@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from analysis.design.augmentation import Exosystem, Influence, Plant, System, augmented
-from analysis.design.luenberger import SPECTRA, discrete_observer
+from analysis.design.luenberger import POLE_PATTERNS, discrete_observer
 from analysis.design.observability import ComplexArray
 from shiplog.types import FloatArray
 
@@ -118,7 +118,7 @@ def _with_force(plant: FloatArray, model: ForceModel) -> System:
 def _poles(order: int, model: ForceModel) -> ComplexArray:
     """Of a plant of that order and its force, 1/s."""
     slow = 0 if model.degree is None else model.degree + 1
-    poles = SPECTRA[model.spectrum](order + slow, model.frequency)
+    poles = POLE_PATTERNS[model.spectrum](order + slow, model.frequency)
     if model.wave is None:
         return poles
     pole = complex(-max(WAVE_DECAY * model.wave, model.frequency), model.wave)

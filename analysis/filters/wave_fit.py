@@ -1,4 +1,4 @@
-"""A wave's shaping filter, fitted to the spectrum of what a slow filter leaves of a signal.
+"""Fit of a wave's shaping filter to the spectrum of a slow filter's innovations.
 
 The residual is taken for a sum of white noise, a red part of one pole (what the model does not know
 of the ship) and a wave, kw s / (s² + 2 ζ ω0 s + ω0²) of white noise (`design.shaping.wave_filter`).

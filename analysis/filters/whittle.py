@@ -1,4 +1,4 @@
-"""The spectrum of a residual, and how likely a sum of white noise, a red part and a wave makes it.
+"""Periodogram of a residual, and Whittle's likelihood of white noise, red noise and a wave.
 
 Whittle's likelihood, of the mean that the periodogram has whatever is missing: the transform of the
 autocovariance times the taper's own. Sources: as in `wave_fit`.

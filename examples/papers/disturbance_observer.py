@@ -19,7 +19,7 @@ from analysis.design.exosystem import (
     Exosystem,
     Influence,
     Plant,
-    clashes,
+    ambiguities,
     disturbance_observer,
 )
 from analysis.design.observability import ComplexArray
@@ -226,7 +226,7 @@ def claims(butterworth: DisturbanceObserver) -> Iterator[Row]:
         f" {settled(e[:, 1], MOMENT):.1f} s, at {louder[1]:.1f} times the noise in M: nothing but"
         " noise bounds the speed, and it is not in the design",
     )
-    clash = clashes(INTEGRATOR, [error("gyro")])[0]
+    clash = ambiguities(INTEGRATOR, [error("gyro")])[0]
     yield Row(
         "Fig. 2: noise of the measurement, v(t) of (1)",
         "estimated",
@@ -271,7 +271,7 @@ def told_apart() -> Iterator[tuple[str, ...]]:
         ("yaw, ψ: moment, compass error", HEADING, [moment(CONSTANT), error("compass")]),
     )
     for name, ship, disturbances in cases:
-        found = clashes(ship, disturbances)
+        found = ambiguities(ship, disturbances)
         yield name, "no" if found else "yes", "; ".join(map(str, found))
 
 

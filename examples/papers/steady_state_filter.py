@@ -16,7 +16,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from analysis.design.discrete import discretise
 from analysis.design.riccati import Gain, kalman_gain
 from analysis.design.shaping import (
-    Augmented,
+    ShapedSystem,
     TransferFunction,
     augment_with_shaping,
     shaped_variance,
@@ -63,7 +63,7 @@ class Reading:
     C11: float = 15.87
     G0: tuple[float, float] = (0.00203, -0.00164)
 
-    def design(self) -> tuple[Augmented, Gain]:
+    def design(self) -> tuple[ShapedSystem, Gain]:
         """The plant with its shaping filter, and the Kalman filter, in our order of states."""
         A = np.array([[-1.02, 0.91, -0.0022], [self.A21, -1.08, -0.1756], [0, 0, -ACTUATOR]])
         C = np.array([[self.C11, 1.4811, 0], [0, 1, 0]])
@@ -268,7 +268,7 @@ def worst(printed: tuple[tuple[str, ...], ...], computed: FloatArray) -> float:
     return float(off[off < 1].max())
 
 
-def accuracy(plant: Augmented, found: Gain) -> None:
+def accuracy(plant: ShapedSystem, found: Gain) -> None:
     """What the covariance promises, and what a simulation of filter and plant finds."""
     n, P = len(plant.A), found.covariance
     truth, estimate = simulated(plant, found)
@@ -325,7 +325,7 @@ def accuracy(plant: Augmented, found: Gain) -> None:
     plt.close(drawn)
 
 
-def simulated(plant: Augmented, found: Gain) -> tuple[FloatArray, FloatArray]:
+def simulated(plant: ShapedSystem, found: Gain) -> tuple[FloatArray, FloatArray]:
     """The state and its estimate, (STEPS, n) each, from the filter's settled errors on; u = 0."""
     n, L = len(plant.A), found.gain
     together = np.block([[plant.A, np.zeros((n, n))], [L @ plant.C, plant.A - L @ plant.C]])

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from analysis.design.exosystem import Exosystem, Influence, Plant, clashes, disturbance_observer
+from analysis.design.exosystem import Exosystem, Influence, Plant, ambiguities, disturbance_observer
 from analysis.design.luenberger import butterworth_poles
 from analysis.design.placement import polynomial_error
 from shiplog import UsageError
@@ -38,9 +38,9 @@ def bias(sensor: str = "gyro", exosystem: Exosystem = CONSTANT) -> Influence:
 FORCE = Influence("force", CONSTANT, on_state={"v": 1.0})
 
 
-# methods, section 4; where it says no, what clashes, at which mode, and what would cure it
+# methods, section 4; where it says no: what is ambiguous, at which mode, and the remedies
 TABLE = [
-    # plant, disturbances, clash (none: observable), mode, cures
+    # plant, disturbances, ambiguous (none: observable), mode, remedies
     (INTEGRATOR, [moment(CONSTANT)], None, None, None),
     (INTEGRATOR, [moment(RAMP)], None, None, None),
     (INTEGRATOR, [bias()], ["gyro error"], 0, ["w", "∫w"]),
@@ -65,24 +65,24 @@ SAID = {"w": "'w' by a sensor of its own", "∫w": "the integral of 'w'"}
 SAID["psi"] = "'psi' by a sensor of its own"
 
 
-@pytest.mark.parametrize(("ship", "disturbances", "clashing", "mode", "cures"), TABLE)
+@pytest.mark.parametrize(("ship", "disturbances", "ambiguous", "mode", "remedies"), TABLE)
 def test_what_can_be_observed_and_what_would_cure_the_rest(
-    ship: Plant, disturbances: list, clashing: list | None, mode: complex, cures: list
+    ship: Plant, disturbances: list, ambiguous: list | None, mode: complex, remedies: list
 ) -> None:
-    if clashing is None:
+    if ambiguous is None:
         observer = disturbance_observer(ship, disturbances, frequency=0.1)
         F = observer.A - observer.L @ observer.C
         assert polynomial_error(F, observer.poles) < 1e-9
-        assert clashes(ship, disturbances) == ()
+        assert ambiguities(ship, disturbances) == ()
         return
-    (clash,) = clashes(ship, disturbances)
-    assert clash.mode == pytest.approx(mode, abs=1e-12)
-    assert list(clash.disturbances) == clashing
-    assert list(clash.cures) == [SAID[cure] for cure in cures]
+    (ambiguity,) = ambiguities(ship, disturbances)
+    assert ambiguity.mode == pytest.approx(mode, abs=1e-12)
+    assert list(ambiguity.disturbances) == ambiguous
+    assert list(ambiguity.remedies) == [SAID[cure] for cure in remedies]
     with pytest.raises(UsageError) as raised:
         disturbance_observer(ship, disturbances, frequency=0.1)
     said = str(raised.value)
-    for word in (*map(repr, clashing), *clash.cures, "0 ± 0.6j" if mode else "mode 0 "):
+    for word in (*map(repr, ambiguous), *ambiguity.remedies, "0 ± 0.6j" if mode else "mode 0 "):
         assert word in said
     assert "\n" not in said
 
@@ -90,13 +90,15 @@ def test_what_can_be_observed_and_what_would_cure_the_rest(
 def test_the_cures_cure() -> None:
     both = [moment(CONSTANT), bias()]
     second_gyro = plant([[-1 / 20]], [[1], [1]], "w", "gyro second")
-    assert clashes(NOMOTO, both) != ()
-    assert clashes(second_gyro, both) == clashes(HEADING_AND_RATE, both) == ()
+    assert ambiguities(NOMOTO, both) != ()
+    assert ambiguities(second_gyro, both) == ambiguities(HEADING_AND_RATE, both) == ()
 
 
 def test_a_disturbance_that_none_of_the_states_shows_is_named_too() -> None:
     twice = [moment(CONSTANT), moment(CONSTANT, "again")]
-    with pytest.raises(UsageError, match="'moment' and 'again' cannot be told apart; measure 'mom"):
+    with pytest.raises(
+        UsageError, match="'moment' and 'again' cannot be distinguished; measure 'mom"
+    ):
         disturbance_observer(NOMOTO, twice, frequency=0.1)
     blind = plant([[-0.1, 0], [0, -0.2]], [[1, 0]], "w v", "gyro")
     with pytest.raises(UsageError, match=r"at the mode -0.2 the state 'v' cannot be seen; meas"):
@@ -316,7 +318,7 @@ def test_of_an_inertia_of_1e12_a_rank_test_in_its_units_fails_and_ours_does_not(
         powers = [np.linalg.matrix_power(observer.A, k) for k in range(3)]
         shown = np.vstack([observer.C @ power for power in powers])
         assert np.linalg.matrix_rank(shown, tolerance) < 3
-        assert clashes(ship, influences) == ()
+        assert ambiguities(ship, influences) == ()
 
 
 def test_a_complex_rate_turns_in_two_by_two_blocks() -> None:

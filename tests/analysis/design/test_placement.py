@@ -7,7 +7,12 @@ from scipy.linalg import block_diag
 from scipy.signal import place_poles
 
 from analysis.design.luenberger import butterworth_poles
-from analysis.design.placement import _levels, hautus, place_multilevel, polynomial_error
+from analysis.design.placement import (
+    _levels,
+    place_multilevel,
+    polynomial_error,
+    unobservable_modes,
+)
 from analysis.design.riccati import error_covariance
 from shiplog import UsageError
 
@@ -126,7 +131,7 @@ def test_an_inertia_of_1e12_hides_nothing() -> None:
     I = 1e12
     roll = np.array([[0, 1 / I, 0], [0, 0, 1], [0, 0, 0]])
     C = np.array([[1.0, 0, 0]])
-    assert hautus(roll, C) == ()
+    assert unobservable_modes(roll, C) == ()
     L = place_multilevel(roll, C, butterworth_poles(3, 0.05))
     assert L[:, 0] == pytest.approx([0.1, 0.005 * I, 1.25e-4 * I], rel=1e-12)
 
@@ -151,15 +156,15 @@ def test_hidden_modes_are_named_defective_or_not(hidden: object, modes: list, se
     A = np.block([[seen, np.zeros((3, k))], [rng.standard_normal((k, 3)), own]])
     C = np.hstack((rng.standard_normal((2, 3)), np.zeros((2, k))))
     T = rng.standard_normal((3 + k, 3 + k))
-    found = hautus(T @ A @ np.linalg.inv(T), C @ np.linalg.inv(T))
+    found = unobservable_modes(T @ A @ np.linalg.inv(T), C @ np.linalg.inv(T))
     values = sorted((mode.value for mode in found), key=lambda value: value.real)
     assert values == pytest.approx(modes, abs=1e-7)
-    assert hautus(seen, C[:, :3]) == ()
+    assert unobservable_modes(seen, C[:, :3]) == ()
 
 
 def test_only_the_states_that_move_in_a_hidden_mode_are_named() -> None:
     A = block_diag([[-0.05, 1], [0, 0]], [[-1e-3]], [[-0.2]])
-    (mode,) = hautus(A, [[1, 0, 0, 0], [0, 0, 0, 1]])
+    (mode,) = unobservable_modes(A, [[1, 0, 0, 0], [0, 0, 0, 1]])
     assert (mode.value, mode.states) == (-1e-3, (2,))
 
 

@@ -7,7 +7,7 @@ from scipy.signal import cont2discrete
 
 from analysis.design.discrete import discretise
 from analysis.design.luenberger import butterworth_poles, discrete_observer
-from analysis.design.placement import hautus
+from analysis.design.placement import unobservable_modes
 from analysis.design.pseudo_input_system import pseudo_input_matrices, pseudo_inputs
 from analysis.design.riccati import kalman_gain
 from shiplog import UsageError, Vessel
@@ -150,7 +150,7 @@ def test_the_five_states_are_shown_but_for_w_ddot_which_decays_and_v_dot_which_d
     C = np.eye(5)[[0, 3]]
     seen = np.vstack([C @ np.linalg.matrix_power(A, k) for k in range(5)])
     assert np.linalg.matrix_rank(seen, tol=1e-12) == 3
-    hidden = {mode.states: mode.value for mode in hautus(A, C)}
+    hidden = {mode.states: mode.value for mode in unobservable_modes(A, C)}
     assert hidden == pytest.approx({(2,): TABLE1.a, (4,): 0.0}, abs=1e-12)
     with pytest.raises(UsageError, match=r"A \(5, 5\) and C: the mode at 0 does not decay and can"):
         kalman_gain(A, np.eye(5), C, 0.01 * np.eye(5), 400 * np.eye(2))

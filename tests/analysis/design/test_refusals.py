@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from analysis.design.cascade import cascade
-from analysis.design.exosystem import Plant, clashes, disturbance_observer
+from analysis.design.exosystem import Plant, ambiguities, disturbance_observer
 from analysis.design.per_tick import block_gains
-from analysis.design.placement import hautus, place_multilevel
+from analysis.design.placement import place_multilevel, unobservable_modes
 from analysis.design.quality import (
     cycle_regulator,
     fast_and_slow,
@@ -31,7 +31,7 @@ SHAPING = TransferFunction(np.array([1.0]), np.array([1.0, 1]))
 
 def observed(A: Any, B: Any, C: Any) -> object:  # noqa: ANN401
     plant = Plant(A, B, C, ("w", "w'"), ("gyro",))
-    clashes(plant, ())
+    ambiguities(plant, ())
     return disturbance_observer(plant, (), frequency=0.1)
 
 
@@ -50,7 +50,7 @@ FITTING: dict[Callable[..., object], dict[str, Any]] = {
         "A": A, "B": COLUMN, "C": ROW, "G": COLUMN, "shaping": SHAPING, "noise": I,
     },
     place_multilevel: {"A": A, "C": ROW, "poles": np.array([-1.0, -2])},
-    hautus: {"A": A, "C": ROW},
+    unobservable_modes: {"A": A, "C": ROW},
     fast_and_slow: {"A": A, "border": 0.5},
     block_gains: {"A": A, "Phi0": [[-1.0]], "Phi1": [[-1.0]]},
     observed: {"A": A, "B": COLUMN, "C": ROW},

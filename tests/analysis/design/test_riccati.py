@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 from scipy.linalg import expm, solve_continuous_are
 
-from analysis.design.observability import unseen_modes
+from analysis.design.observability import unobservable_eigenvalues
 from analysis.design.riccati import error_covariance, kalman_gain
 from shiplog import UsageError
 from shiplog.types import FloatArray
@@ -159,8 +159,8 @@ def test_the_error_of_a_gain_that_does_not_hold_is_refused() -> None:
 def test_units_far_apart_hide_nothing() -> None:
     for inertia in (1e-12, 1.0, 1e12):
         A = np.array([[0, 1 / inertia, 0], [0, 0, 1], [0, 0, 0]])
-        assert len(unseen_modes(A, np.array([[1.0, 0, 0]]))) == 0
-        assert unseen_modes(A, np.array([[0, 1.0, 0]])) == pytest.approx([0])
+        assert len(unobservable_eigenvalues(A, np.array([[1.0, 0, 0]]))) == 0
+        assert unobservable_eigenvalues(A, np.array([[0, 1.0, 0]])) == pytest.approx([0])
 
 
 @FEW
@@ -174,7 +174,7 @@ def test_hidden_modes_are_found_in_any_coordinates(seed: int) -> None:
     A[shown:, shown:] = np.diag(hidden)
     C = np.hstack((rng.standard_normal((2, shown)), np.zeros((2, n - shown))))
     T = np.linalg.qr(rng.standard_normal((n, n)))[0]
-    modes = unseen_modes(T @ A @ T.T, C @ T.T)
+    modes = unobservable_eigenvalues(T @ A @ T.T, C @ T.T)
     assert np.sort(modes.real) == pytest.approx(np.sort(hidden), abs=1e-8)
     with pytest.raises(UsageError, match=r"the mode at 0\.3"):
         kalman_gain(T @ A @ T.T, np.eye(n), C @ T.T, np.eye(n), np.eye(2))

@@ -4,7 +4,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.linalg import block_diag, expm
 
-from analysis.design.luenberger import SPECTRA
+from analysis.design.luenberger import POLE_PATTERNS
 from analysis.design.placement import polynomial_error
 from analysis.disturbance.observer_design import ForceDesign, ForceModel, Sampling, force_observer
 from shiplog import UsageError
@@ -59,7 +59,7 @@ def test_plant_and_slow_part_have_the_spectrum_asked_for_and_the_wave_its_own_fr
     plant: np.ndarray, model: ForceModel, interval: float
 ) -> None:
     slow = 0 if model.degree is None else model.degree + 1
-    poles = list(SPECTRA[model.spectrum](len(plant) + slow, 0.05))
+    poles = list(POLE_PATTERNS[model.spectrum](len(plant) + slow, 0.05))
     if model.wave is not None:
         poles += [-0.12 + 0.6j, -0.12 - 0.6j]
     wanted = np.exp(np.array(poles) * interval)
@@ -106,8 +106,8 @@ def test_the_gains_of_a_surge_force() -> None:
 
 def test_the_gains_of_yaw_with_a_ramp_and_a_wave(monkeypatch: pytest.MonkeyPatch) -> None:
     # methods has the wave's pair on a circle of its own: there its numbers come out
-    pair = SPECTRA["butterworth"](2, 0.4)
-    poles = np.array([*SPECTRA["butterworth"](3, 0.1), *pair])
+    pair = POLE_PATTERNS["butterworth"](2, 0.4)
+    poles = np.array([*POLE_PATTERNS["butterworth"](3, 0.1), *pair])
     monkeypatch.setattr("analysis.disturbance.observer_design._poles", lambda *_: poles)
     found = force_observer(NOMOTO, ForceModel(1, 0.6, "butterworth", 0.1), sampling(FINE))
     wanted = [0.71568542, 0.01046024, 0.00044444, -0.07732315, -0.38629581]

@@ -186,7 +186,7 @@ def test_without_decays_a_per_tick_observer_has_the_steady_state_filters_poles(
 
 
 def test_a_wave_that_is_the_ships_own_motion_is_refused(vessel: Vessel) -> None:
-    """What swings alike cannot be told apart."""
+    """What swings alike cannot be distinguished."""
     alike = vessel.coefficients._replace(a=-0.12, b1=-0.36, b2=0.0, b3=0.0)
     yaw, _ = both(alike, 0.5, 0.1, WAVE)
     with pytest.raises(UsageError, match="cannot be seen"):
