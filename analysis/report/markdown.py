@@ -5,8 +5,17 @@ from collections.abc import Iterable
 from shiplog.text_table import TextTable
 
 
-def markdown_page(title: str, sections: Iterable[TextTable], warnings: Iterable[str]) -> str:
-    """Format tables, their remarks and warnings as a page in Markdown.
+def markdown_page(title: str, tables: Iterable[TextTable], warnings: Iterable[str]) -> str:
+    """Format warnings and tables with their remarks as a page in Markdown, warnings first.
+
+    Parameters
+    ----------
+    title
+        The heading of the page.
+    tables
+        The tables, each with a heading of its own; their remarks are listed below them.
+    warnings
+        Sentences; without any there is no heading for them.
 
     Examples
     --------
@@ -14,25 +23,30 @@ def markdown_page(title: str, sections: Iterable[TextTable], warnings: Iterable[
     >>> print(markdown_page("zigzag", [table], ["no compass"]))
     # zigzag
     <BLANKLINE>
+    ## Warnings
+    <BLANKLINE>
+    - no compass
+    <BLANKLINE>
     ## Track
     <BLANKLINE>
     | north | east |
     | --- | --- |
     | 1 | 2 |
     <BLANKLINE>
-    ## Warnings
-    <BLANKLINE>
-    - no compass
-    <BLANKLINE>
     """
-    blocks = [f"# {title}"]
-    for section in sections:
-        columns = (column.replace("\n", " ") for column in section.columns)
-        blocks += [f"## {section.title}", _markdown_table(columns, section.rows)]
-        blocks += [f"*{remark}*" for remark in section.remarks]
-    listed = "\n".join(f"- {warning}" for warning in warnings)
-    blocks += ["## Warnings", listed] if listed else []
+    blocks, listed = [f"# {title}"], _markdown_list(warnings)
+    if listed:
+        blocks += ["## Warnings", listed]
+    for table in tables:
+        columns = (column.replace("\n", " ") for column in table.columns)
+        blocks += [f"## {table.title}", _markdown_table(columns, table.rows)]
+        if table.remarks:
+            blocks.append(_markdown_list(table.remarks))
     return "\n\n".join(blocks) + "\n"
+
+
+def _markdown_list(items: Iterable[str]) -> str:
+    return "\n".join(f"- {item}" for item in items)
 
 
 def _markdown_table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

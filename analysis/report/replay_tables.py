@@ -61,14 +61,14 @@ def _residual_table(findings: Findings) -> TextTable:
         cells = (
             f"{_words(residuals.name)} [{unit}]",
             f"{rms:.3g}",
-            f"{residuals.mean_nis:.4g}",
-            f"{low:.3g} to {high:.3g}",
+            f"{residuals.mean_nis:.3f}",
+            f"{low:.2f}–{high:.2f}",
             f"{residuals.whiteness_p:.2g}",
             f"{residuals.gated}",
         )
         rows.append(cells)
     columns = (
-        "innovation of", "rms", "mean NIS", "expected\n(99 %)", "whiteness\np-value", "rejected",
+        "innovation of", "rms", "mean\nNIS", "expected\n(99 %)", "whiteness\np-value", "rejected",
     )  # fmt: skip
     remarks = (*_filter_remarks(findings), *map(_residual_remark, findings.residuals))
     return TextTable("Filter residuals", columns, tuple(rows), remarks)

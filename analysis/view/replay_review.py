@@ -165,7 +165,8 @@ def _blueprint(
     top: list[rrb.View | rrb.Container] = [rrb.TextDocumentView(origin="summary", name="summary")]
     if chart is not None:
         top.insert(0, chart_view("track", chart))
-    side: list[rrb.View | rrb.Container] = [rrb.Horizontal(*top)]
+    shares = [3, 4][2 - len(top) :]
+    side: list[rrb.View | rrb.Container] = [rrb.Horizontal(*top, column_shares=shares)]
     if coefficients:
         side.append(rrb.Grid(*map(plot_view, coefficients), grid_columns=3, name="coefficients"))
     right = rrb.Vertical(*side, row_shares=[2, 3][: len(side)])

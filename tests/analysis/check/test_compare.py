@@ -26,14 +26,14 @@ def reference(zigzag_analysis: Analysis) -> TrialLog:
     return make_reference(zigzag_analysis)
 
 
-def test_a_replay_that_did_not_change_is_green(zigzag_log: TrialLog, reference: TrialLog) -> None:
+def test_an_unchanged_replay_passes_the_check(zigzag_log: TrialLog, reference: TrialLog) -> None:
     found = compare(zigzag_log, reference)
     assert found.ok, str(found)
     assert len(found.differences) > 40
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_every_fault_turns_it_red_and_the_right_channel_is_named_first(
+def test_every_fault_fails_the_check_and_its_channel_comes_first(
     zigzag_log: TrialLog, reference: TrialLog, fault: str
 ) -> None:
     change, topic = FAULTS[fault]
@@ -44,7 +44,7 @@ def test_every_fault_turns_it_red_and_the_right_channel_is_named_first(
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_channels_that_a_fault_does_not_touch_stay_green(
+def test_channels_without_the_fault_still_agree(
     zigzag_log: TrialLog, reference: TrialLog, fault: str
 ) -> None:
     change, topic = FAULTS[fault]
@@ -57,7 +57,7 @@ def test_channels_that_a_fault_does_not_touch_stay_green(
 @pytest.mark.parametrize(
     "name", ["a", "b1", "b2", "b3", "d", "e", "f", "g", "h", "alpha1", "alpha2", "alpha3"]
 )
-def test_a_millionth_of_one_coefficient_turns_it_red(
+def test_a_millionth_of_one_coefficient_fails_the_check(
     zigzag_log: TrialLog, reference: TrialLog, vessel: Vessel, name: str
 ) -> None:
     value = getattr(vessel.coefficients, name) * (1 + 1e-6)
@@ -68,7 +68,7 @@ def test_a_millionth_of_one_coefficient_turns_it_red(
 
 
 @pytest.mark.parametrize("name", ["a", "b1", "b2", "b3", "d", "e", "f", "g", "h"])
-def test_a_millionth_of_one_identified_coefficient_turns_it_red(
+def test_a_millionth_of_one_estimated_coefficient_fails_the_check(
     zigzag_analysis: Analysis, reference: TrialLog, name: str
 ) -> None:
     equation = "yaw" if name in zigzag_analysis.findings.yaw.coefficients else "surge"
@@ -88,11 +88,11 @@ def with_findings(analysis: Analysis, **changed: object) -> Analysis:
 
 def _same(values: np.ndarray, reference: TrialLog, topic: str) -> bool:
     known = reference[topic]
-    away = np.abs(values - known.values)
-    return bool(np.all((away <= float(known.metadata["tolerance"])) | np.isnan(away)))
+    distance = np.abs(values - known.values)
+    return bool(np.all((distance <= float(known.metadata["tolerance"])) | np.isnan(distance)))
 
 
-def test_rounding_in_the_last_place_of_every_sample_stays_green(
+def test_rounding_in_the_last_place_of_every_sample_passes_the_check(
     zigzag_log: TrialLog, reference: TrialLog
 ) -> None:
     ulp = float(np.finfo(float).eps)
@@ -101,7 +101,7 @@ def test_rounding_in_the_last_place_of_every_sample_stays_green(
     assert found.ok, str(found)
 
 
-def test_two_samples_that_change_places_turn_their_own_channel_red_first(
+def test_two_samples_that_change_places_are_detected_in_their_channel(
     zigzag_log: TrialLog, reference: TrialLog
 ) -> None:
     swapped = []
@@ -114,18 +114,18 @@ def test_two_samples_that_change_places_turn_their_own_channel_red_first(
     assert found.changed[0].topic == "/yaw_rate/weighted"
 
 
-def test_every_number_of_the_summary_is_watched(
+def test_every_number_of_the_results_is_compared(
     zigzag_analysis: Analysis, reference: TrialLog
 ) -> None:
-    """Change one result after another, as a careless edit of an estimator would."""
+    """Change one result after another, as a wrong edit of an estimator would."""
     a, findings = zigzag_analysis, zigzag_analysis.findings
-    found, judged, yaw = a.disturbance, findings.residuals[1], findings.yaw
+    found, residuals, yaw = a.disturbance, findings.residuals[1], findings.yaw
     b1, noise, yaw_summary = (
         yaw.coefficients["b1"],
         findings.plan.noise,
         findings.disturbances["yaw"],
     )
-    careless = {
+    changes = {
         "/yaw_rate_measurement_std/noise_model": with_findings(
             a,
             plan=replace(
@@ -134,10 +134,10 @@ def test_every_number_of_the_summary_is_watched(
             ),
         ),
         "/speed_rms/residual_test": with_findings(
-            a, residuals=(findings.residuals[0], replace(judged, rms=judged.rms * 1.0001))
+            a, residuals=(findings.residuals[0], replace(residuals, rms=residuals.rms * 1.0001))
         ),
         "/speed_whiteness/residual_test": with_findings(
-            a, residuals=(findings.residuals[0], replace(judged, whiteness_p=0.5))
+            a, residuals=(findings.residuals[0], replace(residuals, whiteness_p=0.5))
         ),
         "/rudder_disturbance/estimate": replace(
             a, disturbance=replace(found, rudder=found.rudder * 2)
@@ -154,12 +154,13 @@ def test_every_number_of_the_summary_is_watched(
         ),
         "/east/track": replace(a, track=replace(a.track, east=-a.track.east)),
     }
-    for topic, changed in careless.items():
-        away = [c.topic for c in make_reference(changed) if not _same(c.values, reference, c.topic)]
-        assert away[0] == topic
+    for topic, changed in changes.items():
+        channels = make_reference(changed)
+        differing = [c.topic for c in channels if not _same(c.values, reference, c.topic)]
+        assert differing[0] == topic
 
 
-def test_the_first_diverging_time_and_the_size_are_told(
+def test_the_first_time_and_the_size_of_a_difference_are_reported(
     zigzag_log: TrialLog, reference: TrialLog
 ) -> None:
     change, _ = FAULTS["spike of the gyro"]
@@ -169,7 +170,7 @@ def test_the_first_diverging_time_and_the_size_are_told(
     assert first.unit == "rad/s"
 
 
-def test_a_channel_that_is_gone_or_new_turns_it_red(
+def test_a_missing_or_new_channel_fails_the_check(
     zigzag_log: TrialLog, reference: TrialLog
 ) -> None:
     less = replace(reference, channels=reference.channels[1:])
@@ -179,7 +180,7 @@ def test_a_channel_that_is_gone_or_new_turns_it_red(
     assert "missing: only in the reference" in str(compare(zigzag_log, more))
 
 
-def test_a_shorter_log_turns_it_red(zigzag: SimulatedTrial, reference: TrialLog) -> None:
+def test_a_shorter_log_fails_the_check(zigzag: SimulatedTrial, reference: TrialLog) -> None:
     half = tuple(
         replace(
             c,
@@ -217,13 +218,11 @@ def test_a_missing_reference_fails_with_the_remedy(zigzag: SimulatedTrial, tmp_p
     assert compare(tmp_path / "z.mcap").ok
 
 
-def test_a_log_that_is_no_reference_is_refused_as_one(
-    zigzag: SimulatedTrial, zigzag_log: TrialLog
-) -> None:
+def test_a_log_is_refused_as_a_reference(zigzag: SimulatedTrial, zigzag_log: TrialLog) -> None:
     assert "not a reference" in str(compare(zigzag_log, zigzag.truth()))
 
 
-def test_a_log_that_lost_data_is_no_success(zigzag_log: TrialLog, reference: TrialLog) -> None:
+def test_a_log_with_lost_data_fails_the_check(zigzag_log: TrialLog, reference: TrialLog) -> None:
     damaged = replace(zigzag_log, data_lost=True, warnings=("a chunk was damaged",))
     found = compare(damaged, reference)
     assert not found.ok
@@ -232,7 +231,7 @@ def test_a_log_that_lost_data_is_no_success(zigzag_log: TrialLog, reference: Tri
         update_reference(Path("z.mcap"), found)
 
 
-def test_a_new_warning_and_a_moved_position_turn_it_red(
+def test_a_new_warning_and_a_moved_position_fail_the_check(
     zigzag_log: TrialLog, reference: TrialLog
 ) -> None:
     position = zigzag_log["position"]
@@ -245,13 +244,13 @@ def test_a_new_warning_and_a_moved_position_turn_it_red(
     assert [d.topic for d in warned.changed] == ["/warnings/count"]
 
 
-def test_a_log_that_does_not_replay_fails_with_its_error(tmp_path: Path) -> None:
+def test_a_log_that_cannot_be_replayed_fails_with_its_error(tmp_path: Path) -> None:
     (tmp_path / "z.mcap").write_bytes(b"")
     (tmp_path / "z.ref.mcap").write_bytes(b"")
     assert "the file is empty" in str(compare(tmp_path / "z.mcap"))
 
 
-def test_a_folders_logs_are_those_that_are_no_references(tmp_path: Path) -> None:
+def test_the_logs_of_a_folder_exclude_references_and_truths(tmp_path: Path) -> None:
     for name in ("b.mcap", "a.mcap", "a.ref.mcap", "a.truth.mcap", "notes.txt"):
         (tmp_path / name).touch()
     assert [p.name for p in logs_in(tmp_path)] == ["a.mcap", "b.mcap"]
@@ -274,11 +273,11 @@ def test_the_comparison_as_json_names_the_channel(
     zigzag_log: TrialLog, reference: TrialLog
 ) -> None:
     change, topic = FAULTS["dropout of the gyro"]
-    said = json.loads(
+    result = json.loads(
         json.dumps(comparison_json(compare(change(zigzag_log), reference)), allow_nan=False)
     )
-    assert said["ok"] is False
-    assert next(c["topic"] for c in said["channels"] if not c["ok"]) == topic
+    assert result["ok"] is False
+    assert next(c["topic"] for c in result["channels"] if not c["ok"]) == topic
     assert comparison_json(Comparison("x", (), "lost"))["error"] == "lost"
 
 

@@ -29,29 +29,31 @@ def without(log: TrialLog, name: str) -> TrialLog:
     return replace(log, channels=tuple(c for c in log.channels if c.name != name))
 
 
-def test_the_steps_are_told_in_their_order(zigzag_log: TrialLog) -> None:
-    told: list[tuple[str, float]] = []
-    analyse(zigzag_log, on_progress=lambda step, share: told.append((step, share)))
+def test_the_steps_are_reported_in_order(zigzag_log: TrialLog) -> None:
+    reported: list[tuple[str, float]] = []
+    analyse(zigzag_log, on_progress=lambda step, share: reported.append((step, share)))
     steps = [step for step in PROGRESS_STEPS if step != "smooth"]  # only where it is asked for
-    assert list(dict.fromkeys(step for step, _ in told)) == steps
-    shares = [share for step, share in told if step == "replay"]
+    assert list(dict.fromkeys(step for step, _ in reported)) == steps
+    shares = [share for step, share in reported if step == "replay"]
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
 
 
-def test_a_log_replays_alone_with_the_model_it_carries(
+def test_a_log_is_replayed_with_the_model_attached_to_it(
     zigzag_analysis: Analysis, vessel: Vessel
 ) -> None:
     assert zigzag_analysis.findings.plan.model_origin == "attached to the log"
     assert zigzag_analysis.findings.plan.vessel.coefficients == vessel.coefficients
 
 
-def test_a_vessel_given_goes_before_the_one_carried(zigzag_log: TrialLog, vessel: Vessel) -> None:
+def test_a_vessel_given_takes_precedence_over_the_attached_one(
+    zigzag_log: TrialLog, vessel: Vessel
+) -> None:
     other = replace(vessel, name="another")
     assert analyse(zigzag_log, other).findings.plan.vessel is other
 
 
-def test_without_a_model_a_first_one_is_fitted_and_said(zigzag_log: TrialLog) -> None:
+def test_without_a_model_a_first_one_is_fitted(zigzag_log: TrialLog) -> None:
     found = analyse(replace(zigzag_log, vessel_toml=None))
     assert "fitted to this log" in found.findings.plan.model_origin
     assert found.findings.plan.noise.tuned
@@ -63,7 +65,7 @@ def test_without_a_model_a_first_one_is_fitted_and_said(zigzag_log: TrialLog) ->
 
 
 @pytest.mark.parametrize("name", REQUIRED_CHANNELS)
-def test_a_missing_channel_is_named_with_those_there_are(zigzag_log: TrialLog, name: str) -> None:
+def test_a_missing_channel_is_named_with_those_present(zigzag_log: TrialLog, name: str) -> None:
     with pytest.raises(LogError, match=rf"no channel '{name}' in zigzag\.mcap; it has"):
         analyse(without(zigzag_log, name))
 
@@ -99,19 +101,19 @@ def test_times_that_run_backwards_are_named_with_the_remedy(zigzag_log: TrialLog
         analyse(replace(zigzag_log, channels=tuple(swapped)))
 
 
-def test_nan_is_not_measured_and_said(zigzag_log: TrialLog) -> None:
+def test_nan_is_not_measured_and_warned_of(zigzag_log: TrialLog) -> None:
     found = analyse(spike("yaw_rate", 100.0, np.nan)(zigzag_log))
     assert np.isnan(found.estimates.innovations[1000, 0])
     assert np.isfinite(found.estimates.states).all()
     assert any("yaw_rate" in w and "not measured" in w for w in found.findings.warnings)
 
 
-def test_a_channel_of_nothing_but_nan_is_refused(zigzag_log: TrialLog) -> None:
+def test_a_channel_of_nan_only_is_refused(zigzag_log: TrialLog) -> None:
     with pytest.raises(LogError, match="speed"):
         analyse(bias("speed", np.nan)(zigzag_log))
 
 
-def test_a_dropout_is_predicted_through_and_said(
+def test_a_dropout_is_predicted_through_and_warned_of(
     zigzag: SimulatedTrial, zigzag_log: TrialLog
 ) -> None:
     found = analyse(dropout("yaw_rate", 200.0, 30.0)(zigzag_log))
@@ -122,18 +124,18 @@ def test_a_dropout_is_predicted_through_and_said(
     assert any("yaw_rate" in w and "gap" in w for w in found.findings.warnings)
 
 
-def test_a_silent_rudder_is_held_and_said(zigzag_log: TrialLog) -> None:
+def test_a_rudder_is_held_in_a_gap_and_warned_of(zigzag_log: TrialLog) -> None:
     found = analyse(dropout("rudder", 200.0, 30.0)(zigzag_log))
     assert np.isfinite(found.estimates.states).all()
     assert any(w.startswith("rudder: not measured for") for w in found.findings.warnings)
 
 
-def test_a_frozen_gyro_is_said(zigzag_log: TrialLog) -> None:
+def test_a_frozen_gyro_is_warned_of(zigzag_log: TrialLog) -> None:
     found = analyse(freeze("yaw_rate", 100.0, 60.0)(zigzag_log))
     assert any("stuck" in w for w in found.findings.warnings)
 
 
-def test_a_contrary_rudder_is_said(zigzag_log: TrialLog) -> None:
+def test_a_rudder_of_the_wrong_sign_is_warned_of(zigzag_log: TrialLog) -> None:
     contrary = tuple(
         replace(c, values=-c.values) if c.name == "rudder" else c for c in zigzag_log.channels
     )
@@ -147,13 +149,13 @@ def test_a_vessel_with_faults_in_the_log_is_refused_with_all_of_them(zigzag_log:
         analyse(spoilt)
 
 
-def test_a_model_that_runs_away_is_refused(zigzag_log: TrialLog, vessel: Vessel) -> None:
+def test_a_divergent_model_is_refused(zigzag_log: TrialLog, vessel: Vessel) -> None:
     wild = replace(vessel, coefficients=vessel.coefficients._replace(b3=1e9, b1=10.0))
     with pytest.raises(LogError, match="diverges"):
         analyse(zigzag_log, wild)
 
 
-def test_channels_of_other_rates_and_jitter_replay_alike(vessel: Vessel) -> None:
+def test_channels_of_other_rates_with_jitter_are_replayed(vessel: Vessel) -> None:
     settings = {
         "yaw_rate.jitter_secs": 0.01,
         "speed.rate_hz": 1.0,
@@ -190,7 +192,7 @@ def test_a_gyro_out_of_step_with_the_rudder_is_not_moved_on_its_clock(
 
 
 @pytest.mark.parametrize("name", REQUIRED_CHANNELS)
-def test_a_channel_that_sets_in_late_begins_the_replay_and_is_said(
+def test_a_channel_that_starts_late_starts_the_replay_and_is_warned_of(
     zigzag: SimulatedTrial, zigzag_log: TrialLog, name: str
 ) -> None:
     found = analyse(dropout(name, 0.0, 120.0)(zigzag_log))
@@ -203,7 +205,7 @@ def test_a_channel_that_sets_in_late_begins_the_replay_and_is_said(
 
 
 @pytest.mark.parametrize("name", REQUIRED_CHANNELS)
-def test_a_channel_that_falls_silent_is_said(zigzag_log: TrialLog, name: str) -> None:
+def test_a_channel_that_ends_early_is_warned_of(zigzag_log: TrialLog, name: str) -> None:
     found = analyse(dropout(name, 400.0, 200.0)(zigzag_log))
     ended = name in ("rudder", "rpm")
     expected = f"{name}: ends 100" if ended else f"{name}: no samples in the last 100"
@@ -212,7 +214,7 @@ def test_a_channel_that_falls_silent_is_said(zigzag_log: TrialLog, name: str) ->
 
 
 @pytest.mark.parametrize("name", ["rudder", "rpm"])
-def test_a_command_that_begins_with_nothing_measured_does_not_spoil_the_filter(
+def test_an_input_that_starts_with_nan_does_not_spoil_the_filter(
     zigzag_log: TrialLog, name: str
 ) -> None:
     changed = []
@@ -226,20 +228,20 @@ def test_a_command_that_begins_with_nothing_measured_does_not_spoil_the_filter(
 
 
 @pytest.mark.parametrize("name", ["rudder", "rpm"])
-def test_a_dead_command_is_said(zigzag_log: TrialLog, name: str) -> None:
+def test_a_dead_input_sensor_is_warned_of(zigzag_log: TrialLog, name: str) -> None:
     dead = tuple(replace(c, values=0 * c.values) if c.name == name else c for c in zigzag_log)
     found = analyse(replace(zigzag_log, channels=dead))
     expected = "constant throughout" if name == "rudder" else "0 throughout"
     assert any(w.startswith(f"/{name}/") and expected in w for w in found.findings.warnings)
 
 
-def test_a_compass_that_is_off_is_as_no_compass(zigzag_log: TrialLog) -> None:
+def test_a_heading_of_nan_only_is_ignored(zigzag_log: TrialLog) -> None:
     off = bias("heading", np.nan)(zigzag_log)
     found = analyse(off)
     assert "heading" not in found.signals
 
 
-def test_a_clock_that_begins_within_a_gap_of_the_rudder_holds_what_it_was(
+def test_a_clock_that_starts_in_a_gap_of_the_rudder_holds_its_last_value(
     zigzag_log: TrialLog,
 ) -> None:
     late = dropout("speed", 0.0, 20.0)(dropout("rudder", 0.05, 100.0)(zigzag_log))
@@ -247,7 +249,7 @@ def test_a_clock_that_begins_within_a_gap_of_the_rudder_holds_what_it_was(
     assert np.isfinite(found.estimates.states).all()
 
 
-def test_what_no_ship_does_is_left_out_and_said(zigzag_log: TrialLog) -> None:
+def test_impossible_values_are_removed_and_warned_of(zigzag_log: TrialLog) -> None:
     found = analyse(spike("speed", 100.0, 1e300)(zigzag_log))
     assert np.isnan(found.signals["speed"][1000])
     assert any("speed" in w and "impossible" in w for w in found.findings.warnings)
@@ -261,7 +263,7 @@ def test_a_ship_whose_rudder_does_nothing_replays(zigzag_log: TrialLog, vessel: 
     assert "yaw, as rudder angle [deg] |  |" in page
 
 
-def test_noise_stated_for_one_sample_holds_for_the_mean_of_several(vessel: Vessel) -> None:
+def test_noise_set_for_one_sample_is_reduced_for_the_mean_of_several(vessel: Vessel) -> None:
     sensors = suite("white", {"speed.rate_hz": 50.0})
     trial = simulate(vessel, "zigzag-20-20", duration_secs=300.0, sensors=sensors)
     stated = replace(vessel.filter, speed_std=0.1, yaw_rate_std=np.radians(0.005))
@@ -291,10 +293,10 @@ def flat(result: object, name: str = "") -> dict[str, str | np.ndarray]:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("model", ["carried", "fitted"])
-def test_the_chunks_of_a_log_change_nothing_to_the_last_bit(
+def test_where_a_log_is_cut_changes_no_bit_of_the_results(
     zigzag_log: TrialLog, model: str, seed: int
 ) -> None:
-    """Gaps across the cuts, chunks of a few samples and of thousands, channels of many rates."""
+    """With gaps across the cuts, chunks of few samples and of many, channels of many rates."""
     rng = np.random.default_rng(seed)
     log = dropout("rudder", 150.0, 20.0)(dropout("yaw_rate", 0.0, 7.0)(zigzag_log))
     log = dropout("heading", 300.0, 40.0)(dropout("speed", 400.0, 9.0)(log))
@@ -324,8 +326,8 @@ def with_channel(log: TrialLog, changed: Channel) -> TrialLog:
     )
 
 
-def test_a_sensor_that_speaks_in_bursts_is_identified_with(zigzag_log: TrialLog) -> None:
-    """Its usual interval is not that from burst to burst, which is what counts on the clock."""
+def test_coefficients_are_estimated_from_a_sensor_that_sends_bursts(zigzag_log: TrialLog) -> None:
+    """Its median interval is not that from burst to burst, which counts on the clock."""
     c = zigzag_log["speed"]
     rows = np.repeat(np.arange(0, len(c), 20), 3)
     late = np.tile([0, 50_000_000, 100_000_000], len(rows) // 3)
@@ -350,11 +352,11 @@ def test_impossible_positions_are_counted_whatever_the_chunks(zigzag_log: TrialL
         fixes = Channel("position", "gps", "deg", at, at, values, GEOGRAPHIC)
         log = with_channel(zigzag_log, fixes)
         for cut in (log, InChunks(log, [150.0])):
-            said = f"{300 - nans} impossible positions"
-            assert any(said in warning for warning in analyse(cut).findings.warnings)
+            expected = f"{300 - nans} impossible positions"
+            assert any(expected in warning for warning in analyse(cut).findings.warnings)
 
 
-def test_a_trial_before_1970_begins_with_what_its_inputs_were(zigzag_log: TrialLog) -> None:
+def test_a_trial_before_1970_starts_with_its_inputs_held(zigzag_log: TrialLog) -> None:
     late = dropout("speed", 0.0, 5.0)(dropout("rudder", 0.15, 30.0)(zigzag_log))
     shifted = tuple(
         replace(c, measured_ns=c.measured_ns - 3 * 10**18, received_ns=c.received_ns - 3 * 10**18)
@@ -364,16 +366,16 @@ def test_a_trial_before_1970_begins_with_what_its_inputs_were(zigzag_log: TrialL
     assert np.array_equal(before.estimates.states, analyse(late).estimates.states)
 
 
-@pytest.mark.parametrize("wild", [{"g": 1000.0}, {"a": 1e4}])
-def test_a_model_for_which_there_is_no_observer_is_refused_as_one_that_runs_away(
-    zigzag_log: TrialLog, vessel: Vessel, wild: dict[str, float]
+@pytest.mark.parametrize("changes", [{"g": 1000.0}, {"a": 1e4}])
+def test_a_model_without_an_observer_is_refused_as_divergent(
+    zigzag_log: TrialLog, vessel: Vessel, changes: dict[str, float]
 ) -> None:
-    away = replace(vessel, coefficients=vessel.coefficients._replace(**wild))
+    away = replace(vessel, coefficients=vessel.coefficients._replace(**changes))
     with pytest.raises(LogError, match="diverges"):
         analyse(zigzag_log, away)
 
 
-def test_the_chunks_of_a_replay_come_once(zigzag_log: TrialLog) -> None:
+def test_the_chunks_of_a_replay_can_be_read_once(zigzag_log: TrialLog) -> None:
     replay = Replay(zigzag_log, plan_replay(zigzag_log))
     with pytest.raises(ValueError, match="no findings yet"):
         _ = replay.findings
@@ -398,7 +400,7 @@ def test_a_log_cut_anywhere_is_smoothed_the_same(zigzag_log: TrialLog, kind: str
     )  # which are the filter's
 
 
-def test_smoothing_leaves_the_innovations_and_makes_the_states_surer(
+def test_smoothing_keeps_the_innovations_and_reduces_the_standard_deviations(
     zigzag_log: TrialLog, zigzag_analysis: Analysis
 ) -> None:
     found = analyse(zigzag_log, settings={"filter.smooth": True})
@@ -407,7 +409,7 @@ def test_smoothing_leaves_the_innovations_and_makes_the_states_surer(
     assert found.estimates.states[-1] == pytest.approx(zigzag_analysis.estimates.states[-1])
 
 
-def test_a_spike_is_gated_counted_and_does_no_harm(
+def test_a_spike_is_rejected_counted_and_harmless(
     zigzag_log: TrialLog, zigzag_analysis: Analysis
 ) -> None:
     spiked = spike("yaw_rate", 150.0, np.radians(1.0))(zigzag_log)
@@ -418,13 +420,13 @@ def test_a_spike_is_gated_counted_and_does_no_harm(
     moment = np.abs(found.disturbance.yaw - zigzag_analysis.disturbance.yaw)
     assert (
         moment.max() < zigzag_analysis.findings.disturbances["yaw"].std
-    )  # nor does the observer believe it
-    believing = analyse(spiked, settings={"filter.gate": 1e6})
-    assert believing.findings.residuals[0].gated == 0
-    assert believing.findings.residuals[0].mean_nis > found.findings.residuals[0].mean_nis
+    )  # the observer ignores it, too
+    ungated = analyse(spiked, settings={"filter.gate": 1e6})
+    assert ungated.findings.residuals[0].gated == 0
+    assert ungated.findings.residuals[0].mean_nis > found.findings.residuals[0].mean_nis
 
 
-def test_poles_slower_than_the_best_ones_are_taken_all_the_same(zigzag_log: TrialLog) -> None:
+def test_poles_slower_than_the_optimal_ones_are_used(zigzag_log: TrialLog) -> None:
     slow = {"filter.kind": "per-tick", "filter.yaw_decay": 0.004, "filter.surge_decay": 0.004}
     found = analyse(zigzag_log, settings={**slow, "filter.process_ratio": 1e-3})
     best = analyse(zigzag_log, settings={"filter.kind": "extended", "filter.process_ratio": 1e-3})
@@ -432,19 +434,19 @@ def test_poles_slower_than_the_best_ones_are_taken_all_the_same(zigzag_log: Tria
     assert not np.array_equal(found.estimates.states[4000:], best.estimates.states[4000:])
 
 
-def test_more_gated_than_spikes_explain_is_warned_of(zigzag_log: TrialLog) -> None:
+def test_more_rejected_samples_than_spikes_explain_are_warned_of(zigzag_log: TrialLog) -> None:
     found = analyse(zigzag_log, settings={"filter.gate": 1.0})
-    assert any("of the samples, too many for spikes" in said for said in found.findings.warnings)
+    assert any("of the samples, too many for spikes" in text for text in found.findings.warnings)
 
 
-def test_settings_that_do_not_do_are_refused_before_any_work(zigzag_log: TrialLog) -> None:
-    told: list[str] = []
+def test_invalid_settings_are_refused_before_any_pass(zigzag_log: TrialLog) -> None:
+    reported: list[str] = []
     for log in (zigzag_log, replace(zigzag_log, vessel_toml=None)):
         with pytest.raises(UsageError, match=r"filter\.kind must be one of"):
             plan_replay(
-                log, settings={"filter.kind": "kalman"}, on_progress=lambda s, _: told.append(s)
+                log, settings={"filter.kind": "kalman"}, on_progress=lambda s, _: reported.append(s)
             )
-    assert not told
+    assert not reported
 
 
 RUNS = sorted(KVLCC2.glob("*/*.dat"))
@@ -456,7 +458,7 @@ def test_every_real_run_of_the_kvlcc2_replays(run: Path) -> None:
     layout = load_layout(LAYOUTS / f"simman_{run.parent.name}.toml")
     found = analyse(read_table(run, layout))
     assert "fitted to this log" in found.findings.plan.model_origin
-    # the fitted model explains the motion: of the weak form's left sides most is explained
+    # the fitted model explains most of the weak form's left-hand sides
     coefficients = found.findings.plan.vessel.coefficients
     rows_of_both = weak_form(found.signals, coefficients)
     for rows, share in zip(rows_of_both, (0.25, 0.5), strict=True):
@@ -472,7 +474,7 @@ def test_every_real_run_of_the_kvlcc2_replays(run: Path) -> None:
     assert not any("contrary" in w for w in found.findings.warnings)
 
 
-def of_windows(found: Analysis) -> list[str]:
+def window_warnings(found: Analysis) -> list[str]:
     return [text for text in found.findings.warnings if "identifier.window_secs" in text]
 
 
@@ -481,7 +483,7 @@ def test_windows_are_as_long_as_the_settings_say(zigzag_log: TrialLog) -> None:
     assert found.yaw_history.time_secs[0] == pytest.approx(300.0, abs=1.0)
     assert found.surge_history.time_secs[0] == pytest.approx(300.0, abs=1.0)
     assert np.isfinite(found.yaw_history.values).any()
-    assert of_windows(found) == []
+    assert window_warnings(found) == []
     bare = analyse(without_vessel(zigzag_log), settings={"identifier.window_secs": 300})
     assert bare.yaw_history.time_secs[0] == pytest.approx(300.0, abs=1.0)
 
@@ -490,52 +492,52 @@ def without_vessel(log: TrialLog) -> TrialLog:
     return replace(log, vessel_toml=None)
 
 
-def test_a_window_longer_than_the_log_is_the_whole_of_it_and_said(zigzag_log: TrialLog) -> None:
+def test_a_window_longer_than_the_log_covers_it_and_is_warned_of(zigzag_log: TrialLog) -> None:
     found = analyse(zigzag_log, settings={"identifier.window_secs": 1000})
-    (said,) = of_windows(found)
-    assert "longer than the log (500 s): one window covers the whole log" in said
+    (warning,) = window_warnings(found)
+    assert "longer than the log (500 s): one window covers the whole log" in warning
     assert found.yaw_history.values.shape == (1, 6)
 
 
-@pytest.mark.parametrize(("secs", "blind"), [(170, ["yaw"]), (100, ["yaw", "surge"])])
-def test_windows_too_short_for_so_many_coefficients_are_blank_and_said(
-    zigzag_log: TrialLog, secs: float, blind: list[str]
+@pytest.mark.parametrize(("secs", "too_short"), [(170, ["yaw"]), (100, ["yaw", "surge"])])
+def test_windows_too_short_for_the_coefficients_are_empty_and_warned_of(
+    zigzag_log: TrialLog, secs: float, too_short: list[str]
 ) -> None:
     found = analyse(zigzag_log, settings={"identifier.window_secs": secs})
-    (said,) = of_windows(found)
-    assert f"coefficients of {' and '.join(blind)}: their windows are empty" in said
+    (warning,) = window_warnings(found)
+    assert f"coefficients of {' and '.join(too_short)}: their windows are empty" in warning
     for name, history in (("yaw", found.yaw_history), ("surge", found.surge_history)):
-        assert np.isfinite(history.values).any() == (name not in blind)
-    needed = float(said.split("more than ")[1].split(" s")[0])
+        assert np.isfinite(history.values).any() == (name not in too_short)
+    needed = float(warning.split("more than ")[1].split(" s")[0])
     enough = analyse(zigzag_log, settings={"identifier.window_secs": needed + 1})
     assert np.isfinite(enough.yaw_history.values).any()
 
 
 @pytest.mark.parametrize("manoeuvre", ["turning-circle", "zigzag-20-20"])
-def test_ten_seconds_tell_no_coefficient(vessel: Vessel, manoeuvre: str) -> None:
+def test_ten_seconds_determine_no_coefficient(vessel: Vessel, manoeuvre: str) -> None:
     trial = simulate(vessel, manoeuvre, duration_secs=10.0, sensors=suite("paper"))
     found = analyse(as_log(trial), vessel)
     every = found.findings.yaw.coefficients | found.findings.surge.coefficients
     assert not any(coefficient.determined for coefficient in every.values())
-    assert "use a longer log" in of_windows(found)[0]
-    assert "shorten the windows" not in of_windows(found)[0]
+    assert "use a longer log" in window_warnings(found)[0]
+    assert "shorten the windows" not in window_warnings(found)[0]
     with pytest.raises(LogError, match="too little moves in it to fit one"):
         analyse(as_log(trial))
 
 
-def test_a_rudder_at_rest_tells_nothing_of_yaw(vessel: Vessel) -> None:
-    """A straight run of ten minutes, its revolutions kept: not even surge is told."""
+def test_a_rudder_at_rest_determines_no_coefficient(vessel: Vessel) -> None:
+    """A straight run of ten minutes, its revolutions kept: not even surge is determined."""
     trial = simulate(vessel, "turning-circle", duration_secs=10.0, sensors=suite("none"))
     times = np.arange(6001) / 10
     stamps = START_NS + (times * 1e9).astype(np.int64)
-    rng, usual = np.random.default_rng(0), {c.name: c.values[0] for c in trial.channels}
+    rng, constant = np.random.default_rng(0), {c.name: c.values[0] for c in trial.channels}
     noise = {"yaw_rate": 1e-4, "speed": 0.1}
     log = TrialLog(
         "straight.mcap",
         tuple(
             Channel(
                 c.name, c.source, c.unit, stamps, stamps,
-                usual[c.name] + noise.get(c.name, 0.0) * rng.standard_normal(len(times)),
+                constant[c.name] + noise.get(c.name, 0.0) * rng.standard_normal(len(times)),
             )
             for c in trial.channels
             if c.name in REQUIRED_CHANNELS

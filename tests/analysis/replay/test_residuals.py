@@ -28,7 +28,7 @@ def test_missing_samples_do_not_colour_white_noise() -> None:
     assert kstest([whiteness(noise) for noise in gaps], "uniform").pvalue > 0.01
 
 
-def test_a_slow_sine_far_below_the_noise_is_found() -> None:
+def test_a_slow_sine_far_below_the_noise_is_detected() -> None:
     sine = 0.4 * np.sin(np.arange(2000) / 100)
     assert max(whiteness(noise + sine) for noise in noises(20)) < 0.01
 
@@ -41,7 +41,7 @@ def test_a_first_order_process_is_not_white() -> None:
         assert whiteness(coloured) < 0.01
 
 
-def test_too_few_samples_give_no_verdict() -> None:
+def test_too_few_samples_give_no_test_result() -> None:
     assert np.isnan(whiteness(np.array([1.0, -1.0, 2.0])))
 
 
@@ -67,7 +67,7 @@ def test_only_what_was_measured_is_counted() -> None:
     )
 
 
-def test_noise_taken_from_the_same_log_widens_the_band_as_it_must() -> None:
+def test_noise_estimated_from_the_same_log_widens_the_band() -> None:
     ratios = []
     for noise in noises(400, 1000):
         found = assess_innovations(
@@ -88,13 +88,13 @@ def test_a_slow_sensor_on_a_fast_clock_is_tested_over_its_own_measurements() -> 
         assert whiteness(seldom + sine) < 0.01
 
 
-def test_what_was_never_tested_is_not_called_white() -> None:
+def test_untested_innovations_are_not_called_white() -> None:
     few = assess_innovations("speed", "m/s", np.ones(30), np.ones(30), noise_measured=False)
     assert few.white is None
 
 
 @pytest.mark.parametrize("mean", [0.0, 30.0, 1e4, -1e6])
-def test_a_mean_far_from_zero_does_not_change_the_verdict(mean: float) -> None:
+def test_a_mean_far_from_zero_does_not_change_the_whiteness_test(mean: float) -> None:
     noise = noises(1)[0]
     assert whiteness(noise + mean) == pytest.approx(whiteness(noise), rel=1e-6)
 

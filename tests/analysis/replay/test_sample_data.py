@@ -1,4 +1,4 @@
-"""The sample data: each replays as its reference says, and tells the truth that lies beside it."""
+"""The sample logs agree with their references and come near to their truths."""
 
 from itertools import combinations
 from pathlib import Path
@@ -20,13 +20,13 @@ LOGS = logs_in(SAMPLE_DATA)
 
 
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
-def test_every_sample_replays_as_its_reference(log: Path) -> None:
+def test_every_sample_log_agrees_with_its_reference(log: Path) -> None:
     comparison = compare(log)
     assert comparison.ok, str(comparison)
 
 
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
-def test_every_sample_is_filtered_nearer_to_its_truth(log: Path) -> None:
+def test_the_filter_brings_every_sample_log_nearer_to_its_truth(log: Path) -> None:
     found, truth = analyse(read(log)), read(log.with_suffix(".truth.mcap"))
     at = (truth["yaw_rate"].measured_ns - found.signals.start_ns) * 1e-9
     inside = (at >= 0) & (at <= found.signals.time_secs[-1])
@@ -46,25 +46,25 @@ SETS = [list(s) for n in (1, 2, 3) for s in combinations(DISTURBANCES, n)]
 
 @pytest.mark.parametrize(("kind", "smooth"), KINDS)
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
-def test_every_filter_replays_every_sample(log: Path, kind: str, smooth: bool) -> None:
+def test_every_filter_replays_every_sample_log(log: Path, kind: str, smooth: bool) -> None:
     found = analyse(read(log), settings={"filter.kind": kind, "filter.smooth": smooth})
     estimates = found.estimates
     assert np.isfinite(estimates.states).all()
     assert np.isfinite(estimates.stds).all()
-    believed = sum(residuals.count for residuals in found.findings.residuals)
-    assert believed > 0.7 * np.isfinite(estimates.innovations).sum()
+    accepted = sum(residuals.count for residuals in found.findings.residuals)
+    assert accepted > 0.7 * np.isfinite(estimates.innovations).sum()
 
 
 @pytest.mark.parametrize("models", SETS, ids="+".join)
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: log.stem)
-def test_every_disturbance_is_observed_in_every_sample(log: Path, models: list[str]) -> None:
+def test_every_disturbance_model_runs_on_every_sample_log(log: Path, models: list[str]) -> None:
     found = analyse(read(log), settings={"disturbance.models": models})
     assert np.isfinite(found.disturbance.yaw).all()
     assert np.isfinite(found.disturbance.surge).all()
     assert (found.disturbance.yaw_wave is None) == ("wave" not in models)
 
 
-def test_the_samples_are_small_and_carry_all_that_is_promised() -> None:
+def test_the_sample_logs_are_small_and_have_a_vessel_file() -> None:
     names = {log.stem for log in LOGS}
     assert {"turning_circle_35", "zigzag_20_20", "pseudo_random"} <= names
     assert any(name.startswith("zigzag_10_10") for name in names)

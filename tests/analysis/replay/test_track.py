@@ -42,7 +42,7 @@ def test_without_positions_the_track_is_dead_reckoned(zigzag: SimulatedTrial) ->
         assert away.max() < 5  # m, of four kilometres
 
 
-def test_the_yaw_rate_bridges_where_the_compass_was_silent(zigzag: SimulatedTrial) -> None:
+def test_the_yaw_rate_bridges_a_gap_of_the_compass(zigzag: SimulatedTrial) -> None:
     log = TrialLog("x", tuple(c for c in zigzag.channels if c.name != "position"))
     signals = resample(log, channels=("yaw_rate", "rudder", "heading"))
     truth = zigzag.trajectory.at(signals.time_secs)
@@ -78,8 +78,10 @@ def test_positions_on_the_globe_become_metres() -> None:
     assert track.east == pytest.approx([0, 0, 0.001 * metre], rel=1e-3)
 
 
-def test_after_a_long_silence_the_gyro_goes_on_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And does so as it goes, holding no more than that silence."""
+def test_after_a_long_compass_gap_the_yaw_rate_is_integrated_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And no more instants than that gap are held."""
     monkeypatch.setattr("analysis.replay.track.MAX_COMPASS_GAP", 100)
     count = 1000
     heading = np.full(count, np.nan)

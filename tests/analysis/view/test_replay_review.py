@@ -121,7 +121,7 @@ def static(path: Path, entity: str, component: str) -> list[Any]:
 
 
 def layout(path: Path, component: str) -> list[Any]:
-    """What the blueprint says under one component, in no order."""
+    """The values of one component of the blueprint, in no order."""
     reader = RrdReader(path)
     batches = (c.to_record_batch() for c in reader.stream(store=reader.blueprints()[0]))
     return [row[0] for b in batches if component in b.schema.names for row in b[component].tolist()]
@@ -172,7 +172,7 @@ def test_coefficients_stand_beside_the_model(review: Path, analysis: Analysis) -
     np.testing.assert_allclose(ends, [0, analysis.signals.time_secs[-1]])
 
 
-def test_both_timelines_tell_the_same_instants(review: Path, analysis: Analysis) -> None:
+def test_both_timelines_have_the_same_instants(review: Path, analysis: Analysis) -> None:
     at, stamps, _ = columns(review, "yaw_rate/state")
     np.testing.assert_array_equal(stamps, analysis.signals.timestamps_ns)
     np.testing.assert_allclose((stamps - stamps[0]) * 1e-9, at, atol=1e-9)
@@ -227,7 +227,7 @@ def test_the_same_analysis_has_the_same_names(
     assert other.recording_id != first.recording_id
 
 
-def test_rerun_finds_no_fault_with_the_file(review: Path) -> None:
+def test_rerun_verifies_the_file(review: Path) -> None:
     assert RERUN
     done = subprocess.run(
         [RERUN, "rrd", "verify", str(review)], capture_output=True, text=True, check=False
@@ -313,7 +313,7 @@ def test_decimation_keeps_extremes_gaps_and_ends() -> None:
         assert (thin.time_secs[0], thin.time_secs[-1]) == (at[0], at[-1])
 
 
-def test_a_long_trial_is_thinned_and_in_full_it_is_not(
+def test_a_long_trial_is_decimated_unless_in_full(
     analysis: Analysis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("analysis.view.decimation.POINTS", 500)
@@ -359,11 +359,11 @@ def test_wild_windows_do_not_squeeze_a_coefficient(analysis: Analysis) -> None:
     values[:40] *= -1e4
     stds[:40] *= 1e4
     wild = replace(analysis, yaw_history=replace(history, values=values, stds=stds))
-    usual, drawn = (history_panels(a.findings, drawn_of(a))[0] for a in (analysis, wild))
-    assert np.diff(drawn.limits) < 3 * np.diff(usual.limits)
+    normal, drawn = (history_panels(a.findings, drawn_of(a))[0] for a in (analysis, wild))
+    assert np.diff(drawn.limits) < 3 * np.diff(normal.limits)
 
 
-def test_a_single_window_is_a_line_all_the_same(analysis: Analysis) -> None:
+def test_a_single_window_is_drawn_as_a_line(analysis: Analysis) -> None:
     history = analysis.yaw_history
     only = History(
         history.names,
@@ -379,7 +379,9 @@ def test_a_single_window_is_a_line_all_the_same(analysis: Analysis) -> None:
         assert all(len(line.values) == 2 for line in window.lines)
 
 
-def test_what_no_window_can_tell_is_left_out(analysis: Analysis, tmp_path: Path) -> None:
+def test_a_coefficient_that_no_window_determines_is_not_drawn(
+    analysis: Analysis, tmp_path: Path
+) -> None:
     history = analysis.yaw_history
     values = history.values.copy()
     values[:, 1] = np.nan
