@@ -68,7 +68,7 @@ def _residual_table(findings: Findings) -> TextTable:
         )
         rows.append(cells)
     columns = (
-        "innovation of", "rms", "mean\nNIS", "expected\n(99 %)", "whiteness\np-value", "rejected",
+        "output", "rms", "mean\nNIS", "expected\n(99 %)", "whiteness p", "rejected",
     )  # fmt: skip
     remarks = (*_filter_remarks(findings), *map(_residual_remark, findings.residuals))
     return TextTable("Filter residuals", columns, tuple(rows), remarks)

@@ -7,9 +7,11 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from importlib.abc import MetaPathFinder
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import extension_names, load_extension
@@ -61,10 +63,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
+class _BlockedModules(MetaPathFinder):
+    """Refuses to find some modules, as where they are not installed.
+
+    None in `sys.modules` would not do: libraries compiled by Cython take it for the module.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = frozenset(names)
+
+    def find_spec(
+        self, fullname: str, _path: Sequence[str] | None, _target: ModuleType | None = None, /
+    ) -> None:
+        """Raise `ModuleNotFoundError` for a blocked module; leave all others to other finders."""
+        if fullname in self._names:
+            raise ModuleNotFoundError(f"No module named {fullname!r}", name=fullname)
+
+
 def _block(modules: Sequence[str]) -> None:
     """Make an import of these modules fail, as where they are not installed."""
-    for name in modules:
-        sys.modules.setdefault(name, None)  # type: ignore[arg-type]
+    sys.meta_path.insert(0, _BlockedModules(modules))
 
 
 def _fail(error: object, code: ExitCode) -> ExitCode:

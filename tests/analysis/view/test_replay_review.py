@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
+from places import SAMPLE_DATA
 from rerun.chunk import RrdReader
 
 import shiplog
@@ -429,3 +430,13 @@ def test_without_a_screen_the_viewer_says_so(review: Path, monkeypatch: pytest.M
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(ShiplogError, match="viewer cannot start here"):
         view_review(review)
+
+
+def test_the_command_writes_a_review_without_a_warning_of_rerun(tmp_path: Path) -> None:
+    """The process of the command does not import pandas, which Rerun's axes must survive."""
+    log, review = SAMPLE_DATA / "zigzag_20_20.mcap", tmp_path / "review.rrd"
+    command = [sys.executable, "-m", "shiplog", "replay", str(log), "-o", str(review)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "Warning" not in done.stderr
+    assert all(layout(review, "TimeAxis:view_range"))
