@@ -1,4 +1,4 @@
-"""Whether runs are of one ship: clean ones agree, another ship's stands out and is named."""
+"""Agreement of runs: those of one ship agree, another ship is named."""
 
 from dataclasses import replace
 from functools import cache
@@ -60,7 +60,7 @@ def test_the_halves_of_a_run_agree_too(manoeuvre: str) -> None:
         assert found.contradiction == 1.0
 
 
-def test_another_ship_among_the_logs_is_named_and_nothing_of_them_is_believed() -> None:
+def test_the_log_of_another_ship_is_named_and_nothing_is_identifiable() -> None:
     found = mixed()
     (said,) = [w for w in found.warnings if "contradict each other" in w]
     assert "zigzag-20-20-port-2.mcap the others" in said
@@ -68,8 +68,8 @@ def test_another_ship_among_the_logs_is_named_and_nothing_of_them_is_believed() 
     assert set(found.uncertainty.unidentifiable) == set(found.uncertainty.names)
 
 
-def test_no_output_is_given_up_to_please_another_ships() -> None:
-    """An output whose noise may grow explains everything away, the speed first."""
+def test_contradicting_runs_do_not_inflate_the_noise_of_one_output() -> None:
+    """Reweighting without a limit would give up one output, the speed first."""
     fit = mixed().fit
     speed = fit.problem.outputs.index("speed")
     measured = np.concatenate([t.measured[:, 1] for t in fit.problem.segments])
@@ -79,7 +79,7 @@ def test_no_output_is_given_up_to_please_another_ships() -> None:
     assert np.max(np.abs(told.values - truth) / told.std) < 2
 
 
-def test_of_two_logs_none_is_the_odd_one() -> None:
+def test_two_logs_have_no_outlier() -> None:
     fit = output_error(
         [a_trial(*RUNS[0]), a_trial(*RUNS[2], OTHER)], ship_model("burylin-tied"), fixed={"T3": 0.5}
     )
@@ -88,12 +88,12 @@ def test_of_two_logs_none_is_the_odd_one() -> None:
     assert found.contradiction > 20
 
 
-def test_a_run_too_short_to_judge_by_itself_is_not_held_against_the_others() -> None:
+def test_a_run_too_short_for_its_own_noise_is_ignored() -> None:
     assert Agreement(("a", "b"), (np.nan, 9.0), (1.0, 1.0)).contradiction == 1.0
     assert Agreement((), (), ()).enlargement == 1.0
 
 
-def test_four_clean_logs_seldom_raise_the_alarm() -> None:
+def test_four_logs_of_one_ship_do_not_contradict_each_other() -> None:
     manoeuvres = ("zigzag-20-20", "zigzag-10-10-port", "zigzag-20-20-port", "zigzag-10-10")
     for first in (100, 200):
         segments = [a_trial(m, first + i) for i, m in enumerate(manoeuvres)]

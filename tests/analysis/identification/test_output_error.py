@@ -1,4 +1,4 @@
-"""Output error: the truth is found, and how far off the fit may be is said rightly."""
+"""Output error: the true parameters are estimated, with correct uncertainty."""
 
 from functools import cache
 from math import radians
@@ -42,17 +42,17 @@ def errors(fit: OutputError) -> dict[str, float]:
     return {name: 100 * abs(found[name] / TRUTH[name] - 1) for name in fit.problem.free_names}
 
 
-# ---- what is found
+# ---- estimates
 
 
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "turning-circle-35", "pseudo-random"])
-def test_clean_data_give_the_truth_without_a_start(manoeuvre: str) -> None:
+def test_noise_free_data_give_the_true_parameters_from_any_start(manoeuvre: str) -> None:
     fit = output_error([a_trial(manoeuvre, noise="none")], ship_model("burylin"))
     assert max(errors(fit).values()) < 1e-2
     assert fit.minimum.converged
 
 
-def test_tied_zigzags_meet_what_was_asked_for() -> None:
+def test_tied_fits_of_zigzags_reach_the_required_accuracy() -> None:
     model, seeds = ship_model("burylin-tied"), range(5)
     rng = np.random.default_rng(3)
     off = [{n: TRUTH[n] * rng.choice([0.5, 1.5]) for n in model.names[:8]} for _ in seeds]
@@ -80,7 +80,7 @@ def test_free_fits_reach_the_cramer_rao_bound_and_their_intervals_hold_the_truth
     assert 0.88 < np.mean(inside) <= 1.0
 
 
-def test_each_trial_has_its_own_rudder_zero_and_gyro_bias() -> None:
+def test_each_segment_has_its_own_rudder_offset_and_gyro_bias() -> None:
     offsets, biases = (radians(0.4), radians(-0.3)), (radians(0.003), radians(-0.002))
     segments = []
     for seed, (offset, bias) in enumerate(zip(offsets, biases, strict=True)):
@@ -96,7 +96,7 @@ def test_each_trial_has_its_own_rudder_zero_and_gyro_bias() -> None:
     assert max(errors(fit).values()) < 3
 
 
-def test_a_known_parameter_stays_and_a_freed_one_is_sought() -> None:
+def test_fixed_parameters_are_kept_and_freed_ones_estimated() -> None:
     fit = output_error(
         [a_trial("pseudo-random", noise="none")], ship_model("burylin"),
         fixed={"b3": TRUTH["b3"]}, free=["alpha2"], nuisance=Nuisance.none(),
@@ -105,7 +105,7 @@ def test_a_known_parameter_stays_and_a_freed_one_is_sought() -> None:
     assert errors(fit)["alpha2"] < 1
 
 
-def test_samples_that_were_not_measured_do_not_count() -> None:
+def test_missing_samples_have_no_effect() -> None:
     s = sailed(noise="none")
     values = {name: np.array(v) for name, v in s.values.items()}
     values["yaw_rate"][100:900] = np.nan
@@ -114,7 +114,7 @@ def test_samples_that_were_not_measured_do_not_count() -> None:
     assert max(errors(output_error([trial], ship_model("burylin"))).values()) < 1e-2
 
 
-def test_one_spike_in_a_hundred_changes_little() -> None:
+def test_one_outlier_in_a_hundred_samples_changes_little() -> None:
     s = sailed(seed=4)
     values = {name: np.array(v) for name, v in s.values.items()}
     values["yaw_rate"][::100] += radians(0.3)
@@ -124,10 +124,10 @@ def test_one_spike_in_a_hundred_changes_little() -> None:
     assert errors(fit)["b2"] < 2
 
 
-# ---- how far off it may be
+# ---- uncertainty
 
 
-def test_what_one_turning_circle_cannot_tell_is_said_to_be_vague() -> None:
+def test_b1_is_unidentifiable_from_one_turning_circle() -> None:
     fit = output_error([a_trial("turning-circle-35")], ship_model("burylin"))
     unidentifiable = uncertainty(fit).unidentifiable
     assert "b1" in unidentifiable
@@ -138,13 +138,13 @@ def test_what_one_turning_circle_cannot_tell_is_said_to_be_vague() -> None:
     assert uncertainty(tied).unidentifiable == ()
 
 
-def test_the_alphas_are_vague_at_constant_revolutions() -> None:
+def test_alphas_are_unidentifiable_at_constant_revolutions() -> None:
     segments = [a_trial("turning-circle-35")]
     fit = output_error(segments, ship_model("burylin"), free=["alpha1", "alpha2", "alpha3"])
     assert {"alpha1", "alpha2", "alpha3"} <= set(uncertainty(fit).unidentifiable)
 
 
-def test_what_was_believed_and_not_measured_is_all_prior() -> None:
+def test_prior_share_of_an_undetermined_parameter_is_large() -> None:
     segments = [a_trial("turning-circle-35", noise="white")]
     fit = output_error(segments, ship_model("three-dof"), length=200.0)
     found = uncertainty(fit)
@@ -165,7 +165,7 @@ def test_runs_of_different_ships_widen_the_intervals() -> None:
     assert np.all(unlike.std > 2 * alike.std)
 
 
-def test_four_runs_are_judged_by_leaving_each_out() -> None:
+def test_four_runs_give_jackknife_errors() -> None:
     runs = [a_trial(seed=s, seconds=200.0) for s in range(4)]
     found = uncertainty(output_error(runs, ship_model("burylin-tied"), fixed={"T3": 0.5}))
     assert np.isfinite(found.between_runs).all()
@@ -177,7 +177,7 @@ def test_four_runs_are_judged_by_leaving_each_out() -> None:
 # ---- the noise
 
 
-def test_noise_is_told_apart_by_its_law() -> None:
+def test_white_proportional_and_slow_noise_are_separated() -> None:
     rng = np.random.default_rng(0)
     level = np.sin(np.arange(20_000) / 300)
     white = 0.02 * rng.standard_normal(20_000) + 0.05 * level * rng.uniform(-1, 1, 20_000) * 3**0.5
@@ -203,7 +203,7 @@ def test_a_wave_is_found_and_white_noise_has_none() -> None:
     assert swell_frequency(noise, std, 0.1) == pytest.approx(0.1, rel=0.03)
 
 
-def test_a_swell_is_a_nuisance_and_no_longer_stays_off() -> None:
+def test_a_swell_is_fitted_and_leaves_no_slow_noise() -> None:
     fit = output_error([a_trial(seed=6)], ship_model("burylin"))
     assert len(fit.problem.waves[0]) == 1
     omega = fit.minimum.unknowns[fit.problem.own_slice(0)][-5]
@@ -212,10 +212,10 @@ def test_a_swell_is_a_nuisance_and_no_longer_stays_off() -> None:
     assert not output_error([a_trial(seed=6, noise="white")], ship_model("burylin")).problem.waves
 
 
-# ---- what cannot be fitted
+# ---- segments and errors
 
 
-def test_no_trials_unknown_names_and_a_rudder_at_rest_are_refused() -> None:
+def test_no_segments_unknown_names_and_a_rudder_at_rest_are_rejected() -> None:
     with pytest.raises(UsageError, match="at least one log"):
         output_error([], ship_model("nomoto"))
     with pytest.raises(UsageError, match="no parameter 'T4'; it has a, b2"):
@@ -226,7 +226,7 @@ def test_no_trials_unknown_names_and_a_rudder_at_rest_are_refused() -> None:
         output_error(split_into_segments(still, "still.mcap"), ship_model("nomoto"))
 
 
-def test_ten_seconds_are_too_short_and_gaps_part_a_trial() -> None:
+def test_short_runs_are_rejected_and_gaps_split_a_run() -> None:
     s = sailed()
     with pytest.raises(LogError, match=r"less than 60 s at a time.*short\.mcap"):
         split_into_segments(s.part(0, 100), "short.mcap")
@@ -238,7 +238,7 @@ def test_ten_seconds_are_too_short_and_gaps_part_a_trial() -> None:
     assert all(np.isfinite(piece.signals["rudder"]).all() for piece in pieces)
 
 
-def test_a_sparse_run_does_not_hide_what_stays_off_in_another() -> None:
+def test_a_sparse_run_does_not_hide_slow_noise_in_another() -> None:
     rng = np.random.default_rng(0)
     slow = np.zeros(6000)
     for k in range(1, len(slow)):
