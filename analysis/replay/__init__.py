@@ -1,5 +1,6 @@
-"""The replay of a log: plan, filter, disturbance observer, regression, residuals.
+"""Replay of a log: plan, filter, disturbance observer, regression, residual tests, track.
 
-`plan` makes two passes over the log and returns a `Plan`; `replay` runs the estimators over its
-chunks. Imports `signals`, `filters`, `disturbance` and `regression`.
+`plan.plan_replay` makes two passes over the log and returns a `Plan`; `replay.Replay` runs the
+estimators over its chunks; `replay.analyse` does both in memory. Imports `signals`, `filters`,
+`disturbance` and `regression`, never `identification`, `report`, `view` or `check`.
 """
