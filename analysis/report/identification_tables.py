@@ -215,7 +215,7 @@ def _fit_table(ship: IdentifiedShip) -> TextTable:
         "Of each output the residual rms, measured minus fitted; then what is estimated for each "
         "run by itself."
     )
-    return TextTable("Fit", columns, tuple(rows), (remark,))
+    return TextTable("Fit: residual rms", columns, tuple(rows), (remark,))
 
 
 def _validation_table(ship: IdentifiedShip) -> TextTable:
@@ -239,7 +239,7 @@ def _validation_table(ship: IdentifiedShip) -> TextTable:
         "rudder and revolutions: the rms of simulated minus measured, and the distance between "
         "the final positions."
     )
-    return TextTable("Validation", columns, tuple(rows), (remark,))
+    return TextTable("Validation: rms of simulated minus measured", columns, tuple(rows), (remark,))
 
 
 def _index_table(validation: Validation) -> TextTable:
