@@ -23,11 +23,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .check.compare import Comparison, compare
-    from .identification.identified_ship import IdentifiedShip
-    from .identification.identify import identify
-    from .replay.plan import Plan, plan_replay
-    from .replay.replay import Analysis, Findings, Replay, ReplayChunk, analyse
+    from analysis.check.compare import Comparison, compare
+    from analysis.identification.identified_ship import IdentifiedShip
+    from analysis.identification.identify import identify
+    from analysis.replay.plan import Plan, plan_replay
+    from analysis.replay.replay import Analysis, Findings, Replay, ReplayChunk, analyse
 
 _MODULES = {
     "Analysis": "replay.replay",

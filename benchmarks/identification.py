@@ -15,14 +15,14 @@ from time import process_time
 
 import numpy as np
 
-from analysis.identification.least_squares import (
+from analysis.identification.fit.least_squares import (
     ResidualStd,
     information_matrix,
     marginal_information,
 )
-from analysis.identification.output_error import MIN_STDS, make_problem, output_error
-from analysis.identification.segment import Segment, split_into_segments
-from analysis.identification.uncertainty import uncertainty
+from analysis.identification.fit.output_error import MIN_STDS, make_problem, output_error
+from analysis.identification.fit.segment import Segment, split_into_segments
+from analysis.identification.fit.uncertainty import uncertainty
 from recorders.simulated.sensors import Sensor, suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, load_vessel, resample

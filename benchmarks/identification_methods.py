@@ -11,8 +11,8 @@ from analysis.identification.comparison.paper_scheme import (
     solve_window,
 )
 from analysis.identification.comparison.parameter_ekf import parameter_ekf
-from analysis.identification.output_error import OutputError, output_error
-from analysis.identification.segment import Segment
+from analysis.identification.fit.output_error import OutputError, output_error
+from analysis.identification.fit.segment import Segment
 from analysis.regression.coefficients import Coefficient, identify
 from analysis.regression.weak_form import weak_form
 from shiplog.ships import ship_model

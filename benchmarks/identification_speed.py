@@ -7,17 +7,17 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from analysis.identification.initial_guess import initial_guesses
-from analysis.identification.least_squares import OUTLIER_STDS
-from analysis.identification.output_error import (
+from analysis.identification.fit.initial_guess import initial_guesses
+from analysis.identification.fit.least_squares import OUTLIER_STDS
+from analysis.identification.fit.output_error import (
     OutputError,
     fit_problem,
     initial_residual_stds,
     make_problem,
     output_error,
 )
-from analysis.identification.problem import Nuisance
-from analysis.identification.segment import Segment
+from analysis.identification.fit.problem import Nuisance
+from analysis.identification.fit.segment import Segment
 from shiplog.ships import ship_model
 from shiplog.types import FloatArray
 

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.identification.fit.output_error import OutputError, output_error
+from analysis.identification.fit.uncertainty import uncertainty
 from shiplog.ships import ship_model
-
-from .output_error import OutputError, output_error
-from .uncertainty import uncertainty
 
 MAX_TIE_DEVIATION = 3.0  # standard deviations of (b1 + d)/d from zero: beyond, the tie fails
 MAX_TIE_HALF_INTERVAL = 1.0  # of (b1 + d)/d at 95 %: beyond, the data do not decide

@@ -4,12 +4,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from analysis.identification.fit.output_error import OutputError
+from analysis.identification.fit.problem import residuals
+from analysis.identification.fit.uncertainty import Uncertainty
 from shiplog.ships.motion import MODEL_OUTPUTS
 
-from .output_error import OutputError
 from .prior_sensitivity import PriorSensitivity
-from .problem import residuals
-from .uncertainty import Uncertainty
 from .validation import Validation, nan_rms
 
 MAX_RESIDUAL_SHARE = 0.2  # rms of a run's residuals, white noise subtracted, over the measured std

@@ -6,16 +6,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from analysis.identification.comparison.history import ParameterHistory
+from analysis.identification.fit.output_error import OutputError
+from analysis.identification.fit.problem import residuals
+from analysis.identification.fit.uncertainty import Uncertainty
 from shiplog.ships import Model
 from shiplog.types import FloatArray
 from shiplog.vessel.vessel import Vessel
 
 from .advice import TieCheck
 from .model_selection import Candidate
-from .output_error import OutputError
 from .prior_sensitivity import PriorSensitivity
-from .problem import residuals
-from .uncertainty import Uncertainty
 from .validation import Validation, nan_rms
 
 

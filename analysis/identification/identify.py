@@ -11,6 +11,8 @@ from analysis.identification.comparison.history import ParameterHistory, two_pri
 from analysis.identification.comparison.paper_scheme import paper_scheme
 from analysis.identification.comparison.parameter_ekf import parameter_ekf
 from analysis.identification.comparison.windows import window_estimates
+from analysis.identification.fit.output_error import OutputError, make_problem, output_error
+from analysis.identification.fit.uncertainty import Uncertainty, uncertainty
 from shiplog.errors import LogError, UsageError
 from shiplog.mcap.stream import open_log
 from shiplog.progress import ProgressCallback, no_progress
@@ -23,10 +25,8 @@ from .fit_warnings import fit_warnings
 from .fixed_parameters import check_fixed, fixed_values
 from .identified_ship import IdentifiedShip, run_fits
 from .model_selection import Candidate, rank_models
-from .output_error import OutputError, make_problem, output_error
 from .prior_sensitivity import prior_sensitivity
 from .runs import Run, common_vessel, consistency_warnings, distinct_runs
-from .uncertainty import Uncertainty, uncertainty
 from .validation import validate
 
 AUTO = "auto"

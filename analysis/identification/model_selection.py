@@ -14,17 +14,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.identification.fit.least_squares import minimise
+from analysis.identification.fit.output_error import (
+    OutputError,
+    initial_residual_stds,
+    output_error,
+    reweighted_fit,
+)
+from analysis.identification.fit.segment import Segment
 from shiplog.errors import LogError, UsageError
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
-from .least_squares import minimise
-from .output_error import OutputError, initial_residual_stds, output_error, reweighted_fit
 from .parallel import parallel_map
 from .prediction import SCORED_OUTPUTS, misfit
-from .segment import Segment
 
 JUDGED_COLUMNS = [MODEL_OUTPUTS.index(name) for name in SCORED_OUTPUTS]  # the same for all models
 MAX_MISFIT = 10.0  # relative error that a diverging simulation counts with

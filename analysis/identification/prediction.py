@@ -4,16 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.identification.fit.least_squares import minimise
+from analysis.identification.fit.output_error import OutputError, initial_residual_stds
+from analysis.identification.fit.segment import Segment
 from analysis.manoeuvres.indices import manoeuvre_indices
 from analysis.manoeuvres.manoeuvre import ManoeuvreIndex, ManoeuvreMotion
 from analysis.manoeuvres.zigzag import overshoots
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.ships.path import input_path
 from shiplog.types import FloatArray, Signals
-
-from .least_squares import minimise
-from .output_error import OutputError, initial_residual_stds
-from .segment import Segment
 
 SCORED_OUTPUTS = ("yaw_rate", "speed", "heading")  # every model predicts them
 ZIGZAG_STEP_SECS = 0.5  # of the simulation of a zig-zag

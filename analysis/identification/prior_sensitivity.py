@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.identification.comparison.history import two_priors
+from analysis.identification.fit.least_squares import minimise
+from analysis.identification.fit.output_error import OutputError
+from analysis.identification.fit.problem import Problem
+from analysis.identification.fit.uncertainty import Uncertainty
 from shiplog.types import FloatArray
-
-from .least_squares import minimise
-from .output_error import OutputError
-from .problem import Problem
-from .uncertainty import Uncertainty
 
 MAX_COST_DIFFERENCE = 2.0  # half a sum of squared standard deviations; beyond it another minimum
 

@@ -6,6 +6,7 @@ from itertools import count
 
 import numpy as np
 
+from analysis.identification.fit.segment import Segment, initial_level, split_into_segments
 from shiplog.checks.channel_stats import LogStats
 from shiplog.checks.data_quality import data_warnings
 from shiplog.checks.log_stats import compute_log_stats
@@ -16,8 +17,6 @@ from shiplog.types import FloatArray, Log
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, IdentifierSettings
 from shiplog.vessel.vessel import Vessel
 from shiplog.vessel.vessel_parser import parse_vessel
-
-from .segment import Segment, initial_level, split_into_segments
 
 REQUIRED_CHANNELS = ("yaw_rate", "speed", "rudder", "rpm")
 OPTIONAL_CHANNELS = ("sway", "heading")

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.identification.fit.output_error import OutputError
+from analysis.identification.fit.segment import Segment
 from analysis.manoeuvres.execute import first_execute
 from analysis.manoeuvres.manoeuvre import ManoeuvreIndex
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
-from .output_error import OutputError
 from .prediction import dead_reckoning, predict, predicted_indices
 from .runs import Run
-from .segment import Segment
 
 HEADING = MODEL_OUTPUTS.index("heading")
 MIN_FIXES_SECS, MAX_FIXES_SECS = 5.0, 60.0  # of fixes before the rudder moves, to find a heading

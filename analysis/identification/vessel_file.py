@@ -10,6 +10,14 @@ from math import pi
 
 import numpy as np
 
+from analysis.identification.fit.output_error import DEFAULT_LENGTH, OutputError, output_error
+from analysis.identification.fit.segment import initial_level
+from analysis.identification.fit.uncertainty import (
+    MAX_PRIOR_SHARE,
+    MAX_RELATIVE_STD,
+    Uncertainty,
+    uncertainty,
+)
 from shiplog.errors import LogError
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model, ship_model
@@ -20,9 +28,6 @@ from shiplog.vessel.vessel import Vessel
 from .advice import RUDDER_PARAMETERS
 from .fixed_parameters import fixed_values
 from .identified_ship import IdentifiedShip
-from .output_error import DEFAULT_LENGTH, OutputError, output_error
-from .segment import initial_level
-from .uncertainty import MAX_PRIOR_SHARE, MAX_RELATIVE_STD, Uncertainty, uncertainty
 
 SECTIONS = {"yaw": YAW_COEFFICIENTS, "surge": ("f", "g", "h")}
 ANGLE_POWERS = {"b2": 1, "b3": 2, "f": 2}  # power of the angle in the unit's denominator

@@ -9,8 +9,8 @@ from analysis.identification.comparison.history import ParameterHistory, total_d
 from analysis.identification.comparison.paper_scheme import PAPER_METHOD
 from analysis.identification.comparison.parameter_ekf import EKF_METHOD
 from analysis.identification.comparison.windows import WINDOW_METHOD
+from analysis.identification.fit.segment import Segment
 from analysis.identification.identified_ship import IdentifiedShip
-from analysis.identification.segment import Segment
 from analysis.identification.validation import Validation
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.ships.paper import PAPER_INPUTS

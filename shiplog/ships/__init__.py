@@ -80,7 +80,7 @@ def loadable_models() -> tuple[tuple["Model", ...], tuple[str, ...]]:
 def __getattr__(name: str) -> Any:  # noqa: ANN401
     """Import the classes on their first use: they need numba, the list of names does not."""
     if name in {"Model", "Parameter", "Scale", "StateValue"}:
-        from . import model  # noqa: PLC0415
+        from shiplog.ships import model  # noqa: PLC0415
 
         return getattr(model, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

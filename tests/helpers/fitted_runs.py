@@ -4,9 +4,9 @@ from functools import cache
 
 from trial_logs import as_log
 
-from analysis.identification.output_error import OutputError, output_error
-from analysis.identification.segment import Segment, split_into_segments
-from analysis.identification.uncertainty import Uncertainty, uncertainty
+from analysis.identification.fit.output_error import OutputError, output_error
+from analysis.identification.fit.segment import Segment, split_into_segments
+from analysis.identification.fit.uncertainty import Uncertainty, uncertainty
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import load_vessel, resample

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.identification.segment import Segment
-from analysis.identification.uncertainty import MAX_PRIOR_SHARE, Uncertainty
+from analysis.identification.fit.segment import Segment
+from analysis.identification.fit.uncertainty import MAX_PRIOR_SHARE, Uncertainty
 from shiplog.types import FloatArray
 
 PRIOR_OFFSET = 0.3  # distance of each prior from the fitted value, as a share of that value

@@ -12,8 +12,8 @@ import numpy as np
 
 from analysis.filters.factory import filter_states
 from analysis.filters.noise_model import NoiseModel
-from analysis.identification.output_error import OutputError
-from analysis.identification.segment import Segment
+from analysis.identification.fit.output_error import OutputError
+from analysis.identification.fit.segment import Segment
 from shiplog.ships.paper import Coefficients, rudder_effects
 from shiplog.types import FloatArray, Signals
 from shiplog.vessel.settings import FilterSettings

@@ -18,10 +18,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from analysis.identification.least_squares import weighted_residuals
-from analysis.identification.output_error import OutputError
-from analysis.identification.problem import Problem, residuals
-from analysis.identification.segment import Segment
+from analysis.identification.fit.least_squares import weighted_residuals
+from analysis.identification.fit.output_error import OutputError
+from analysis.identification.fit.problem import Problem, residuals
+from analysis.identification.fit.segment import Segment
 from shiplog.ships.motion import InputPath
 from shiplog.ships.path import path_part
 from shiplog.types import FloatArray

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from analysis.identification.output_error import OutputError
-from analysis.identification.segment import Segment
+from analysis.identification.fit.output_error import OutputError
+from analysis.identification.fit.segment import Segment
 from analysis.regression.coefficients import identify
 from analysis.regression.sliding import History
 from analysis.regression.weak_form import CHANNELS, weak_form

@@ -8,8 +8,10 @@ import pytest
 from places import KVLCC2, PROJECT
 from trial_logs import as_log
 
+from analysis.identification.fit.output_error import OutputError, output_error
+from analysis.identification.fit.segment import Segment, split_into_segments
+from analysis.identification.fit.uncertainty import uncertainty
 from analysis.identification.model_selection import rank_models
-from analysis.identification.output_error import OutputError, output_error
 from analysis.identification.prediction import (
     dead_reckoning,
     manoeuvre_motion,
@@ -17,8 +19,6 @@ from analysis.identification.prediction import (
     predict,
     zigzag_overshoots,
 )
-from analysis.identification.segment import Segment, split_into_segments
-from analysis.identification.uncertainty import uncertainty
 from analysis.manoeuvres.turning_circle import turning_circle
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from fitted_runs import a_trial, fitted
 
-from analysis.identification.output_error import output_error
+from analysis.identification.fit.output_error import output_error
+from analysis.identification.fit.uncertainty import uncertainty
 from analysis.identification.prior_sensitivity import PriorSensitivity, prior_sensitivity
-from analysis.identification.uncertainty import uncertainty
 from shiplog.ships import Model, ship_model
 
 

@@ -9,7 +9,7 @@ import pytest
 from places import KVLCC2, PROJECT
 from trial_logs import as_log
 
-from analysis.identification.output_error import OutputError, output_error
+from analysis.identification.fit.output_error import OutputError, output_error
 from analysis.identification.runs import run_from_log
 from analysis.identification.validation import Validation, initial_heading, nan_rms, validate
 from analysis.manoeuvres.execute import first_execute

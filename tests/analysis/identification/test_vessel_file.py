@@ -9,11 +9,11 @@ from model_ships import LENGTH, SHIPS, toml_of, vessel_of
 from trial_logs import as_log
 
 from analysis.identification import vessel_file
+from analysis.identification.fit.output_error import fit_problem
+from analysis.identification.fit.uncertainty import uncertainty
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.identify import identify
 from analysis.identification.model_selection import Candidate
-from analysis.identification.output_error import fit_problem
-from analysis.identification.uncertainty import uncertainty
 from analysis.identification.vessel_file import vessel_toml
 from analysis.replay.plan import FITTED_MODEL
 from analysis.replay.replay import analyse

@@ -12,9 +12,9 @@ from fitted_runs import a_trial
 from rerun.chunk import RrdReader
 from trial_logs import as_log
 
+from analysis.identification.fit.problem import residuals
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.identify import identify
-from analysis.identification.problem import residuals
 from analysis.view.identification_panels import autocorrelation, parameter_panels, run_sheets
 from analysis.view.identification_review import write_identification_review
 from recorders.simulated.sensors import suite

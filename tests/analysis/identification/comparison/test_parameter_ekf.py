@@ -15,9 +15,9 @@ from analysis.identification.comparison.parameter_ekf import (
     _update_and_predict,
     parameter_ekf,
 )
-from analysis.identification.output_error import output_error
-from analysis.identification.problem import Nuisance
-from analysis.identification.uncertainty import uncertainty
+from analysis.identification.fit.output_error import output_error
+from analysis.identification.fit.problem import Nuisance
+from analysis.identification.fit.uncertainty import uncertainty
 from shiplog.ships import ship_model
 
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from trial_logs import as_log
 
-from analysis.identification.output_error import OutputError, output_error
-from analysis.identification.problem import Nuisance
-from analysis.identification.residual_noise import OutputResiduals, fit_residual_noise
-from analysis.identification.segment import Segment, split_into_segments
-from analysis.identification.swell import swell_frequency
-from analysis.identification.uncertainty import uncertainty
+from analysis.identification.fit.output_error import OutputError, output_error
+from analysis.identification.fit.problem import Nuisance
+from analysis.identification.fit.residual_noise import OutputResiduals, fit_residual_noise
+from analysis.identification.fit.segment import Segment, split_into_segments
+from analysis.identification.fit.swell import swell_frequency
+from analysis.identification.fit.uncertainty import uncertainty
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import LogError, Signals, UsageError, load_vessel, resample

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from trial_logs import as_log
 
-from analysis.identification.agreement import Agreement, assess_agreement
+from analysis.identification.fit.agreement import Agreement, assess_agreement
+from analysis.identification.fit.output_error import output_error
+from analysis.identification.fit.segment import Segment
+from analysis.identification.fit.uncertainty import uncertainty
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.identify import identify
-from analysis.identification.output_error import output_error
 from analysis.identification.runs import run_from_log
-from analysis.identification.segment import Segment
-from analysis.identification.uncertainty import uncertainty
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, Vessel, load_vessel
