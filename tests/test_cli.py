@@ -551,7 +551,7 @@ def test_a_ship_of_another_model_is_identified_written_sailed_and_replayed(
     assert main(["replay", "again.mcap", "--vessel", "alone.toml", "-o", "r.rrd"]) == FINE
     said = capsys.readouterr()
     assert "first model, fitted to this log" in said.out
-    assert "has norrbin alone" in said.err
+    assert "has only a model 'norrbin'" in said.err
 
 
 def test_the_best_model_is_chosen_on_the_command_line(

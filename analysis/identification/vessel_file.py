@@ -41,8 +41,8 @@ PAPER_MODEL_COMMENT = (
 )
 NO_PAPER_MODEL_COMMENT = (
     "",
-    "# The paper's model, on which `shiplog replay` designs its filters, cannot be identified from",
-    "# these logs: `shiplog replay` fits a preliminary model to each log instead.",
+    "# `shiplog replay` designs its filters on the paper's model. It cannot be identified from",
+    "# these logs: a preliminary one is fitted to each log that is replayed.",
 )
 
 

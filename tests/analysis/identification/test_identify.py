@@ -404,7 +404,7 @@ def test_a_result_pickles_and_copies() -> None:
 def test_logs_are_given_as_one_or_several_objects_or_paths(tmp_path: Path) -> None:
     log, other = a_log(seconds=200.0), a_log(seed=1, seconds=200.0)
     path = tmp_path / "a.mcap"
-    write(path, log)
+    write(log, path)
     one = identify([log], "nomoto").parameters
     for given in (log, path, str(path), [path]):
         assert identify(given, "nomoto").parameters == pytest.approx(one, rel=1e-6)

@@ -158,7 +158,7 @@ def test_where_the_papers_model_diverges_the_identified_one_is_written_alone(
     text = vessel_toml(identified("norrbin")[0])
     vessel = parse_vessel(text, "v.toml")
     assert vessel.coefficients is None
-    assert "cannot be identified from these logs" in text
+    assert "cannot be identified from\n# these logs" in text
     assert (vessel.rudder_max, vessel.rudder_rate) == (0.6, 0.04)
     filtered = text + '[filter]\nkind = "extended"\n'
     log = replace(logs_of("norrbin")[0], vessel_toml=filtered)
@@ -167,7 +167,7 @@ def test_where_the_papers_model_diverges_the_identified_one_is_written_alone(
     assert replayed.findings.plan.vessel.filter.kind == "extended"
     assert replayed.findings.plan.vessel.name == vessel.name
     assert any(
-        "has norrbin alone, and filters are built on" in w for w in replayed.findings.warnings
+        "has only a model 'norrbin', but the filters use" in w for w in replayed.findings.warnings
     )
     without = analyse(replace(log, vessel_toml=None), settings={"filter.kind": "extended"})
     assert replayed.findings.plan.vessel.coefficients == without.findings.plan.vessel.coefficients

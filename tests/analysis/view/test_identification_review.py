@@ -81,7 +81,7 @@ def test_residuals_are_measured_minus_simulated_over_their_standard_deviation() 
     fit = ship().fit
     residual = residuals(fit.problem, fit.minimum.unknowns)[0][:, 0]
     predicted = fit.problem.predicted(fit.minimum.unknowns, 0)[:, 0]
-    _, std = fit.noises[0].spread(predicted, 0.1)
+    _, std = fit.noises[0].stds(predicted, 0.1)
     np.testing.assert_allclose(drawn, (residual / std)[np.isfinite(residual)], rtol=1e-9)
     assert 0.9 < np.std(drawn) < 1.1
 
