@@ -105,7 +105,9 @@ def rank_models(
             "models are compared by predicting each run from the others: give two logs or more, "
             "or name the model"
         )
-    progress = _RankingProgress(models, len(runs), on_progress)
+    # the models with the most parameters take longest, and are begun first
+    order = sorted(range(len(models)), key=lambda i: -_free_count(models[i]))
+    progress = _RankingProgress(models, order, len(runs), on_progress)
 
     def fit_all(i: int) -> OutputError | None:
         given = (fixed or {}).get(models[i].name)
@@ -114,8 +116,6 @@ def rank_models(
         except LogError:  # its simulation diverges from every start
             return None
 
-    # the models with the most parameters take longest, and are begun first
-    order = sorted(range(len(models)), key=lambda i: -_free_count(models[i]))
     done = parallel_map(fit_all, order, progress.reporter([(i, None) for i in order]), threads)
     fits = dict(zip(order, done, strict=True))
     left_out = [(i, k) for i in order if fits[i] is not None for k in range(len(runs))]
@@ -150,8 +150,15 @@ def _free_count(model: Model) -> int:
 class _RankingProgress:
     """Progress of a ranking: of each model the fit to all runs, then one without each run."""
 
-    def __init__(self, models: Sequence[Model], runs: int, on_progress: ProgressCallback) -> None:
+    def __init__(
+        self,
+        models: Sequence[Model],
+        order: Sequence[int],
+        runs: int,
+        on_progress: ProgressCallback,
+    ) -> None:
         self._models = models
+        self._numbers = {i: number for number, i in enumerate(order, start=1)}
         self._runs = runs
         self._on_progress = on_progress
         # a fit takes about as long as its parameters, squared, times its runs
@@ -166,7 +173,7 @@ class _RankingProgress:
             i, run = fits[item]
             if done:
                 self._done += self._weights[i] * (self._runs - (run is not None))
-            step = f"model {i + 1} of {len(self._models)} ({self._models[i].name})"
+            step = f"model {self._numbers[i]} of {len(self._models)} ({self._models[i].name})"
             step += ", all runs" if run is None else f", run {run + 1} of {self._runs}"
             self._on_progress(step, self._done / self._whole)
 
