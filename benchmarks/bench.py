@@ -1,4 +1,4 @@
-"""What the comparisons work on."""
+"""The log that the comparisons work on, and how much of it a slow peer is given."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,42 +12,64 @@ from shiplog import Signals, TrialLog, Vessel, load_vessel, resample
 from .logs import NAMES
 
 VESSEL: Vessel = load_vessel("table1")[0]
-NOISE = NoiseModel(
-    np.array([8e-5, 0.12]), np.full(2, 2.5e-5)
-)  # as good as any: both are told the same
+# the values do not matter, as both sides are given the same
+NOISE = NoiseModel(np.array([8e-5, 0.12]), np.full(2, 2.5e-5))
 
 
 @dataclass(frozen=True)
 class Bench:
-    """A log, the same in a file, a folder to work in, and how much the peers are given of it."""
+    """The input of the comparisons.
+
+    Attributes
+    ----------
+    log
+        The log in memory.
+    path
+        The same log as a file.
+    folder
+        A folder for output files.
+    peer_secs
+        The duration of log that a slow peer is given; its time is scaled up.
+    info_hours
+        The length of the file that `shiplog info` reads.
+    short
+        Whether the run only verifies that every line runs.
+    """
 
     log: TrialLog
     path: Path
     folder: Path
-    peer_secs: float  # of the log for a peer that is slow; its time is scaled up
-    info_hours: float  # the length of the file that `shiplog info` is asked about
+    peer_secs: float
+    info_hours: float
+    short: bool = False
 
     @cached_property
     def signals(self) -> Signals:
-        """The log on one clock."""
+        """The log resampled to one clock."""
         return resample(self.log, channels=NAMES)
 
     @cached_property
     def peer_signals(self) -> Signals:
-        """What a slow peer is given of them."""
+        """The first `peer_secs` of the signals, for a slow peer."""
         return head(self.signals, self.peer_secs)
 
     @property
     def share(self) -> float:
-        """How much of the log that is."""
+        """The share of the log that a slow peer is given, 0 to 1."""
         return len(self.peer_signals) / len(self.signals)
 
 
 def head(signals: Signals, secs: float) -> Signals:
-    """The first so many seconds."""
+    """Return the first `secs` seconds of the signals."""
     return signals.part(0, round(secs / signals.dt_secs))
 
 
-def said_share(share: float) -> str:
-    """Such as `peer timed on 1/24 of the log`; nothing where it was timed on all of it."""
+def share_note(share: float) -> str:
+    """Return a note such as ``peer timed on 1/24 of the log``; empty if it is the whole log.
+
+    Examples
+    --------
+    >>> share_note(1 / 24)
+    'peer timed on 1/24 of the log'
+    """
     return "" if share > 0.999 else f"peer timed on 1/{1 / share:.3g} of the log"

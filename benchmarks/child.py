@@ -1,6 +1,7 @@
-"""Run a command and say, as JSON, how long it took and how much memory: for `measure.run`.
+"""A small process that runs a command and prints its duration and peak memory as JSON.
 
-Imports nothing large: on Linux the peak told of a child is at least that of its parent.
+Used by `measure.run`. It imports nothing large: on Linux the peak reported for a child process is
+at least the memory of its parent.
 """
 
 import json
@@ -11,7 +12,7 @@ import time
 
 
 def main(command: list[str]) -> int:
-    """The command's exit code; its standard output is dropped, its errors are passed on."""
+    """Run the command and return its exit code; its stdout is dropped, its stderr is passed on."""
     start = time.perf_counter()
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     peak = None

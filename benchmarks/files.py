@@ -1,4 +1,4 @@
-"""Reading, writing and asking: mcap's own reader and writer, one message after the other."""
+"""Reading, writing and `shiplog info`, against mcap's own reader and writer, message by message."""
 
 import struct
 import sys
@@ -15,12 +15,12 @@ from shiplog.mcap.schema import encode_messages, schema_for
 from shiplog.mcap.writer import channel_metadata
 
 from .bench import Bench
-from .logs import require_room, write_repeated
-from .measure import Line, run, timed
+from .logs import require_disk_space, write_repeated
+from .measure import Limit, Line, run, timed
 
 
-def lines(bench: Bench) -> list[Line]:
-    """Read and write."""
+def file_lines(bench: Bench) -> list[Line]:
+    """Return the comparisons of reading and writing."""
     ours, theirs = bench.folder / "ours.mcap", bench.folder / "theirs.mcap"
     return [
         Line(
@@ -28,34 +28,34 @@ def lines(bench: Bench) -> list[Line]:
             "mcap's reader, and decode",
             timed(partial(read, bench.path)),
             timed(partial(read_messages, bench.path)),
-            at_least=80,
-            same=partial(_same_read, bench),
+            Limit(at_least=80),
+            verify=partial(_verify_read, bench),
         ),
         Line(
             "read to arrays, CRCs on",
             "zstd alone",
             timed(partial(read, bench.path)),
-            timed(partial(inflate, bench.path)),
-            at_most=2.5,
+            timed(partial(decompress_chunks, bench.path)),
+            Limit(at_most=2.5),
         ),
         Line(
             "write",
             "mcap's writer",
-            timed(partial(write_ours, bench.log, ours)),
+            timed(partial(write_columns, bench.log, ours)),
             timed(partial(write_messages, bench.log, theirs)),
-            at_least=8,
-            same=partial(_same_written, bench.log, ours, theirs),
+            Limit(at_least=8),
+            verify=partial(_verify_written, bench.log, ours, theirs),
         ),
     ]
 
 
-def info_line(bench: Bench) -> list[Line]:
-    """Whole processes, the start of Python included."""
+def info_lines(bench: Bench) -> list[Line]:
+    """Return the comparison of `shiplog info`: whole processes, the start of Python included."""
     days = f"{bench.info_hours / 24:.3g} days"
     path = bench.folder / "info.mcap"
 
-    def written() -> None:
-        require_room(bench.folder, bench.info_hours)
+    def write_log() -> None:
+        require_disk_space(bench.folder, bench.info_hours)
         write_repeated(bench.log, bench.info_hours, path)
 
     return [
@@ -64,45 +64,45 @@ def info_line(bench: Bench) -> list[Line]:
             '`python -c "import numpy"`',
             lambda: run([sys.executable, "-m", "shiplog", "info", str(path)]).secs,
             lambda: run([sys.executable, "-c", "import numpy"]).secs,
-            at_most=3,
+            Limit(at_most=3),
             note="whole processes",
-            same=written,
+            verify=write_log,
         )
     ]
 
 
 def read_messages(path: Path) -> dict[str, tuple[list[int], list[float]]]:
-    """The times and the values of each topic."""
-    found: dict[str, tuple[list[int], list[float]]] = {}
+    """Read a log with mcap's reader; return the times and values of each topic."""
+    columns: dict[str, tuple[list[int], list[float]]] = {}
     with path.open("rb") as stream:
         for _, channel, message in make_reader(stream).iter_messages():
             (value,) = struct.unpack_from("<d", message.data, 1)
-            times, values = found.setdefault(channel.topic, ([], []))
+            times, values = columns.setdefault(channel.topic, ([], []))
             times.append(message.publish_time)
             values.append(value)
-    return found
+    return columns
 
 
-def inflate(path: Path) -> int:
-    """What zstd alone takes: no reader can be faster."""
-    inflater, total, data = zstandard.ZstdDecompressor(), 0, memoryview(path.read_bytes())
+def decompress_chunks(path: Path) -> int:
+    """Decompress all MCAP chunks with zstd and return their size; no reader can be faster."""
+    decompressor, total, data = zstandard.ZstdDecompressor(), 0, memoryview(path.read_bytes())
     with path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
     for index in summary.chunk_indexes if summary else ():
         end = index.chunk_start_offset + index.chunk_length
         body = data[end - index.compressed_size : end]
-        total += len(inflater.decompress(body, index.uncompressed_size))
+        total += len(decompressor.decompress(body, index.uncompressed_size))
     return total
 
 
-def write_ours(log: TrialLog, path: Path) -> None:
-    """By columns."""
+def write_columns(log: TrialLog, path: Path) -> None:
+    """Write a log with our writer, by columns."""
     with LogWriter(path) as writer:
         writer.write(*log)
 
 
 def write_messages(log: TrialLog, path: Path) -> None:
-    """One message after the other, in the order of reception."""
+    """Write a log with mcap's writer, message by message in the order of reception."""
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start()
@@ -110,8 +110,8 @@ def write_messages(log: TrialLog, path: Path) -> None:
         schema_id = writer.register_schema(scalar.name, "protobuf", scalar.descriptor_set)
         messages = []
         for channel in log:
-            said = channel_metadata(channel)
-            channel_id = writer.register_channel(channel.topic, "protobuf", schema_id, said)
+            metadata = channel_metadata(channel)
+            channel_id = writer.register_channel(channel.topic, "protobuf", schema_id, metadata)
             stamps = zip(channel.received_ns.tolist(), channel.measured_ns.tolist(), strict=True)
             messages += [
                 (received, channel_id, measured, data)
@@ -123,7 +123,7 @@ def write_messages(log: TrialLog, path: Path) -> None:
         writer.finish()  # type: ignore[no-untyped-call]
 
 
-def _same_read(bench: Bench) -> None:
+def _verify_read(bench: Bench) -> None:
     theirs = read_messages(bench.path)
     for channel in read(bench.path):
         times, values = theirs[channel.topic]
@@ -131,8 +131,8 @@ def _same_read(bench: Bench) -> None:
         np.testing.assert_array_equal(channel.values, values)
 
 
-def _same_written(log: TrialLog, ours: Path, theirs: Path) -> None:
-    write_ours(log, ours)
+def _verify_written(log: TrialLog, ours: Path, theirs: Path) -> None:
+    write_columns(log, ours)
     write_messages(log, theirs)
     for one, other in zip(read(ours), read(theirs), strict=True):
         assert one.topic == other.topic  # noqa: S101 - this is what is verified

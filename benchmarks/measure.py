@@ -1,4 +1,4 @@
-"""Times, ratios and what is held: medians of rounds in which ours and the peer take turns."""
+"""Comparisons with a peer: both take turns in the same run, and the median of the ratios counts."""
 
 import json
 import os
@@ -6,7 +6,7 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,42 +17,128 @@ LIBRARIES = ("numpy", "scipy", "numba", "mcap", "zstandard", "rerun-sdk", "filte
 
 
 class SkippedError(Exception):
-    """A line that cannot be measured here; it says why."""
+    """A comparison that cannot be measured here; its message states the reason."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The limit that a comparison is held to; none where every field is None.
+
+    Attributes
+    ----------
+    at_least
+        How many times as fast as the peer.
+    at_most
+        Or how many times the peer's time.
+    at_most_secs
+        Or how many seconds of our own time.
+    """
+
+    at_least: float | None = None
+    at_most: float | None = None
+    at_most_secs: float | None = None
+
+    @property
+    def of_ours_over_peer(self) -> bool:
+        """Whether the ratio is our time over the peer's; else it is the peer's over ours."""
+        return self.at_most is not None or self.at_most_secs is not None
+
+    def met(self, ratio: float, ours_secs: float) -> bool | None:
+        """Whether the limit is kept; None if there is none.
+
+        Examples
+        --------
+        >>> Limit(at_most=2.5).met(ratio=3.0, ours_secs=0.3)
+        False
+        """
+        if self.at_least is not None:
+            return ratio >= self.at_least
+        if self.at_most is not None:
+            return ratio <= self.at_most
+        return None if self.at_most_secs is None else ours_secs <= self.at_most_secs
+
+    def __str__(self) -> str:
+        """Return such as ``at most 2.5``; empty if there is no limit."""
+        if self.at_least is not None:
+            return f"at least {self.at_least:g}"
+        if self.at_most is not None:
+            return f"at most {self.at_most:g}"
+        return "" if self.at_most_secs is None else f"at most {self.at_most_secs:g} s"
+
+
+NO_LIMIT = Limit()
 
 
 @dataclass(frozen=True)
 class Line:
-    """One comparison. `ours` and `peer` do the work and return the seconds that all of it takes."""
+    """A comparison of our work with a peer's: one line of the table.
+
+    Attributes
+    ----------
+    work
+        What is measured.
+    against
+        The peer.
+    ours, peer
+        Do the work and return the seconds that all of it takes.
+    limit
+        The limit that the comparison is held to.
+    note
+        A remark, such as on which share of the log the peer was timed.
+    verify
+        Called first; raises where the two results differ, or `SkippedError`.
+    warm_up
+        Whether our work is done once before it is timed, to compile loops and to fill the disk
+        cache.
+    """
 
     work: str
     against: str
     ours: Callable[[], float]
     peer: Callable[[], float]
-    at_least: float | None = None  # how many times as fast as the peer
-    at_most: float | None = None  # or how many times the peer's time
-    note: str = ""  # such as on which share of the log the peer was timed
-    same: Callable[[], None] | None = None  # first; raises where the two do not find the same
+    limit: Limit = NO_LIMIT
+    note: str = ""
+    verify: Callable[[], None] | None = None
+    warm_up: bool = True
 
 
 @dataclass(frozen=True)
-class Result:
-    """What came out of a line."""
+class LineResult:
+    """The result of a comparison.
+
+    Attributes
+    ----------
+    work, against, limit, note
+        As in the `Line`.
+    ours_secs, peer_secs
+        Medians over the rounds, s; None if skipped.
+    ratio
+        The median ratio: peer over ours, or ours over peer where the limit is an upper one.
+    met
+        Whether the limit is kept; None if there is none or nothing was judged.
+    rounds
+        Our seconds and the peer's in each round.
+    skipped
+        The reason if there is no ratio.
+    """
 
     work: str
     against: str
-    ours_secs: float | None
-    peer_secs: float | None
-    ratio: float | None  # peer over ours; ours over peer where `at_most` is what is asked
-    at_least: float | None
-    at_most: float | None
-    met: bool | None  # None where nothing is asked, or nothing was measured
-    note: str
+    limit: Limit = NO_LIMIT
+    ours_secs: float | None = None
+    peer_secs: float | None = None
+    ratio: float | None = None
+    met: bool | None = None
+    note: str = ""
     rounds: tuple[tuple[float, float], ...] = ()
-    skipped: str = ""  # why there is no ratio
+    skipped: str = ""
 
 
 def timed(work: Callable[[], object], scale: float = 1.0) -> Callable[[], float]:
-    """Do the work and tell the seconds it took, `scale` times them if it was but a share."""
+    """Return a function that does the work and returns its seconds, multiplied by `scale`.
+
+    The scale is above one where the work is a share of the whole.
+    """
 
     def measured() -> float:
         start = time.perf_counter()
@@ -62,76 +148,90 @@ def timed(work: Callable[[], object], scale: float = 1.0) -> Callable[[], float]
     return measured
 
 
-def compare(line: Line, rounds: int, *, judged: bool = True) -> Result:
-    """Check that both find the same, then let them take turns; the median of the ratios.
+def compare(line: Line, rounds: int, *, judged: bool = True) -> LineResult:
+    """Verify that both results agree, then time both in turn, and return the median ratio.
 
-    It is held to what is asked if it is to be judged.
+    Parameters
+    ----------
+    line
+        The comparison.
+    rounds
+        How often each side is timed. With a single round nothing is warmed up: such a run shows
+        only that the line runs.
+    judged
+        Whether the limit applies.
     """
     try:
-        if line.same is not None:
-            line.same()
-        line.ours()  # compile, and fill the disk's cache
+        if line.verify is not None:
+            line.verify()
+        if line.warm_up and rounds > 1:
+            line.ours()
         times = tuple((line.ours(), line.peer()) for _ in range(rounds))
     except SkippedError as reason:
-        return Result(
-            line.work, line.against, None, None, None, line.at_least, line.at_most, None,
-            line.note, skipped=str(reason),
-        )  # fmt: skip
-    if line.at_most is None:
-        ratio = median(peer / ours for ours, peer in times)
-    else:
-        ratio = median(ours / peer for ours, peer in times)
-    return Result(
+        return LineResult(line.work, line.against, line.limit, note=line.note, skipped=str(reason))
+    inverse = line.limit.of_ours_over_peer
+    ratio = median(ours / peer if inverse else peer / ours for ours, peer in times)
+    ours_secs = median(ours for ours, _ in times)
+    return LineResult(
         line.work,
         line.against,
-        median(ours for ours, _ in times),
-        median(peer for _, peer in times),
-        ratio,
-        line.at_least,
-        line.at_most,
-        holds(ratio, line.at_least, line.at_most) if judged else None,
-        line.note,
-        times,
+        line.limit,
+        ours_secs,
+        peer_secs=median(peer for _, peer in times),
+        ratio=ratio,
+        met=line.limit.met(ratio, ours_secs) if judged else None,
+        note=line.note,
+        rounds=times,
     )
-
-
-def holds(value: float, at_least: float | None, at_most: float | None) -> bool | None:
-    """Whether a bound is kept; None where there is none."""
-    if at_least is None and at_most is None:
-        return None
-    return (at_least is None or value >= at_least) and (at_most is None or value <= at_most)
 
 
 @dataclass(frozen=True)
 class Process:
-    """A command that was run to its end."""
+    """A finished command.
+
+    Attributes
+    ----------
+    secs
+        Its duration.
+    peak_bytes
+        Its peak of resident memory; None where the system does not report it.
+    """
 
     secs: float
-    peak_bytes: int | None  # of resident memory; None where the system does not tell
+    peak_bytes: int | None
 
 
-def run(command: list[str]) -> Process:
-    """Run a command; `SkippedError` with its last words where it fails.
+def run(command: list[str], environment: Mapping[str, str] | None = None) -> Process:
+    """Run a command to its end, with additional environment variables.
 
-    A small process of its own starts it and waits for it: a child's peak is counted from that of
-    the process it was forked from, and this one is large.
+    A small process of its own starts it and waits for it: a child's peak of memory is counted from
+    that of the process it was forked from, and this one is large.
+
+    Raises
+    ------
+    SkippedError
+        The command failed; with the last line of its stderr.
     """
     done = subprocess.run(
-        [sys.executable, str(CHILD), *command], capture_output=True, text=True, check=False
+        [sys.executable, str(CHILD), *command],
+        env={**os.environ, **(environment or {})},
+        capture_output=True,
+        text=True,
+        check=False,
     )
     if done.returncode:
         raise SkippedError(f"{' '.join(command[1:4])} failed: {_last_line(done.stderr)}")
-    said = json.loads(done.stdout.splitlines()[-1])
-    return Process(said["secs"], said["peak_bytes"])
+    result = json.loads(done.stdout.splitlines()[-1])
+    return Process(result["secs"], result["peak_bytes"])
 
 
 def _last_line(text: str) -> str:
-    return (text.strip().splitlines() or ["it does not say why"])[-1]
+    return (text.strip().splitlines() or ["no error message"])[-1]
 
 
 def machine() -> dict[str, str]:
-    """What it all ran on."""
-    said = {
+    """Return the machine and the versions of the libraries, by name."""
+    facts = {
         "processor": _processor(),
         "cores": str(_cores()),
         "memory": _memory(),
@@ -141,10 +241,10 @@ def machine() -> dict[str, str]:
     }
     for name in LIBRARIES:
         try:
-            said[name] = version(name)
+            facts[name] = version(name)
         except PackageNotFoundError:
-            said[name] = "not installed"
-    return said
+            facts[name] = "not installed"
+    return facts
 
 
 def _processor() -> str:

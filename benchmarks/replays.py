@@ -1,6 +1,7 @@
-"""The whole of `replay`: against the obvious one, and as the log grows."""
+"""The whole replay: against a straightforward one, and its cost as the log grows."""
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -9,80 +10,104 @@ import numpy as np
 
 from shiplog import TrialLog
 
-from .bench import VESSEL, Bench, said_share
+from .bench import VESSEL, Bench, share_note
 from .filters import require_filterpy
-from .logs import NAMES, RATE_HZ, require_room, write_repeated
-from .measure import Line, Process, SkippedError, holds, run
+from .logs import NAMES, RATE_HZ, require_disk_space, write_repeated
+from .measure import Limit, Line, Process, SkippedError, run
 
-MOST_MEMORY = 1.5 * 2**30  # bytes, resident, however long the log
-STEEPEST = 1.05  # exponent of time over length
-FEWEST_SECS = 240.0  # of the log for the obvious replay, whose windows are 200 s
-STEADY_HOURS = 24.0  # from here on the start of Python is no part of the time worth telling
+MAX_MEMORY_BYTES = 1.5 * 2**30  # resident, however long the log
+MAX_GROWTH_EXPONENT = 1.05  # of time over length
+MIN_PEER_SECS = 240.0  # of the log for the straightforward replay, whose windows are 200 s
+STEADY_HOURS = 24.0  # from this length on the start of Python hardly counts
 
 
-def lines(bench: Bench, stages: dict[str, float]) -> list[Line]:
-    """The whole replay; what each stage takes the peer is put into `stages`.
+def replay_lines(bench: Bench, stages: dict[str, float]) -> list[Line]:
+    """Return the comparisons of the whole replay.
 
-    Our review is thinned to what a screen can show unless it is told not to; the peer's is whole.
-    Both are compared with it.
+    Our review is reduced to what a screen shows unless ``--full`` is given; the peer's holds every
+    sample. Both are compared with it.
+
+    Parameters
+    ----------
+    bench
+        The log.
+    stages
+        Filled with the seconds that the peer spends in each stage.
     """
-    peer = _Obvious(bench, stages)
+    peer = _StraightforwardPeer(bench, stages)
     out = bench.folder / "ours.rrd"
-    note = "; ".join(filter(None, ("ours a whole process", said_share(bench.share))))
+    note = "; ".join(filter(None, ("ours a whole process", share_note(bench.share))))
     return [
         Line(
             "the whole `replay`, to .rrd",
-            "mcap, filterpy, pinv and rr.log, written the obvious way",
+            "mcap, filterpy, pinv and rr.log, the straightforward way",
             lambda: replay_process(bench.path, out).secs,
             peer.secs,
-            at_least=100,
+            Limit(at_least=100),
             note=note,
-            same=require_filterpy,
+            verify=require_filterpy,
         ),
         Line(
             "the same with --full, every sample drawn",
             "the same",
             lambda: replay_process(bench.path, out, "--full").secs,
-            peer.again,
+            peer.repeated_secs,
             note=note,
-            same=require_filterpy,
+            verify=require_filterpy,
         ),
     ]
 
 
 def replay_process(log: Path, out: Path, *options: str) -> Process:
-    """`shiplog replay` as it is called."""
+    """Run `shiplog replay` as a process."""
     return run([sys.executable, "-m", "shiplog", "replay", str(log), "-o", str(out), *options])
 
 
-class _Obvious:
-    """The obvious replay, and what it took in the rounds so far: it is too long to be repeated."""
+class _StraightforwardPeer:
+    """The straightforward replay; its rounds are kept, as it takes too long to be repeated."""
 
     def __init__(self, bench: Bench, stages: dict[str, float]) -> None:
         self._bench, self._stages = bench, stages
         self._rounds: list[float] = []
 
     def secs(self) -> float:
-        from .obvious import replay  # noqa: PLC0415 - filterpy may not be installed
+        """Run it, and return the seconds it takes for the whole log."""
+        from .straightforward import straightforward_replay  # noqa: PLC0415 - needs filterpy
 
         bench = self._bench
-        if bench.peer_secs < FEWEST_SECS:
-            raise SkippedError(f"the peer needs {FEWEST_SECS / 60:g} min of the log at the least")
+        if bench.peer_secs < MIN_PEER_SECS:
+            raise SkippedError(f"the peer needs at least {MIN_PEER_SECS / 60:g} min of the log")
         minutes = None if bench.share > 0.999 else bench.peer_secs / 60
-        found = replay(bench.path, bench.folder / "theirs.rrd", VESSEL.paper_coefficients, minutes)
-        self._stages.update({name: stage.scaled_secs for name, stage in found.stages.items()})
-        self._rounds.append(found.scaled_secs)
-        return found.scaled_secs
+        result = straightforward_replay(
+            bench.path, bench.folder / "theirs.rrd", VESSEL.paper_coefficients, minutes
+        )
+        self._stages.update({name: stage.scaled_secs for name, stage in result.stages.items()})
+        self._rounds.append(result.scaled_secs)
+        return result.scaled_secs
 
-    def again(self) -> float:
-        """One of the rounds that were measured already, in turn."""
+    def repeated_secs(self) -> float:
+        """Return one of the rounds measured so far, in turn."""
         self._rounds.append(self._rounds.pop(0))
         return self._rounds[-1]
 
 
 @dataclass(frozen=True)
-class Length:
-    """What a log of one length took."""
+class ReplayCost:
+    """The cost of replaying a log of one length.
+
+    Attributes
+    ----------
+    hours, messages, log_bytes
+        The length and size of the log.
+    secs
+        The time of the process; None if skipped.
+    peak_bytes
+        Its peak of resident memory; None if the system does not report it.
+    review_bytes
+        The size of the review.
+    skipped
+        The reason if it was not measured.
+    """
 
     hours: float
     messages: int
@@ -95,19 +120,45 @@ class Length:
 
 @dataclass(frozen=True)
 class Growth:
-    """How a replay's cost grows with the length of the log."""
+    """How the cost of a replay grows with the length of the log.
 
-    lengths: tuple[Length, ...]
-    exponent: float | None  # of time over length, fitted on log-log
-    fitted_hours: tuple[float, ...]  # to these
-    exponent_met: bool | None  # None where fewer than two lengths of a day or more were measured
-    memory_met: bool | None  # of every length measured
+    Attributes
+    ----------
+    costs
+        For each length.
+    exponent
+        Of time over length, the slope on a log-log scale; None with fewer than two lengths.
+    fitted_hours
+        The lengths that the exponent was fitted to.
+    exponent_met
+        Whether it is within its limit; None without two lengths of a day or more.
+    memory_met
+        Whether the memory of every length is; None where it was not measured.
+    """
+
+    costs: tuple[ReplayCost, ...]
+    exponent: float | None
+    fitted_hours: tuple[float, ...]
+    exponent_met: bool | None
+    memory_met: bool | None
 
 
-def growth(day: TrialLog, hours: list[float], folder: Path, rounds: int) -> Growth:
-    """Replay logs of so many hours, each in a process of its own."""
-    lengths = tuple(_length(day, h, folder, rounds) for h in sorted(set(hours)))
-    measured = [(x.hours, x.secs) for x in lengths if x.secs is not None]
+def measure_growth(day: TrialLog, hours: Sequence[float], folder: Path, rounds: int) -> Growth:
+    """Replay logs of several lengths, each in a process of its own.
+
+    Parameters
+    ----------
+    day
+        The trial that the logs repeat.
+    hours
+        The lengths.
+    folder
+        Where a log and its review are written; they are deleted afterwards.
+    rounds
+        How often logs up to a day are replayed; longer ones are replayed once.
+    """
+    costs = tuple(_cost(day, h, folder, rounds) for h in sorted(set(hours)))
+    measured = [(cost.hours, cost.secs) for cost in costs if cost.secs is not None]
     steady = [pair for pair in measured if pair[0] >= STEADY_HOURS]
     fitted = steady if len(steady) > 1 else measured
     exponent = None
@@ -115,29 +166,29 @@ def growth(day: TrialLog, hours: list[float], folder: Path, rounds: int) -> Grow
         log_hours, log_secs = np.log(np.array(fitted)).T
         exponent = float(np.polyfit(log_hours, log_secs, 1)[0])
     judged = exponent if len(steady) > 1 else None
-    peaks = [x.peak_bytes for x in lengths if x.peak_bytes is not None]
+    peaks = [cost.peak_bytes for cost in costs if cost.peak_bytes is not None]
     return Growth(
-        lengths,
+        costs,
         exponent,
         tuple(h for h, _ in fitted),
-        holds(judged, None, STEEPEST) if judged is not None else None,
-        holds(max(peaks), None, MOST_MEMORY) if peaks else None,
+        exponent_met=None if judged is None else judged <= MAX_GROWTH_EXPONENT,
+        memory_met=max(peaks) <= MAX_MEMORY_BYTES if peaks else None,
     )
 
 
-def _length(day: TrialLog, hours: float, folder: Path, rounds: int) -> Length:
+def _cost(day: TrialLog, hours: float, folder: Path, rounds: int) -> ReplayCost:
     messages = round(hours * 3600 * RATE_HZ) * len(NAMES)
     log, out = folder / "long.mcap", folder / "long.rrd"
     try:
-        require_room(folder, hours)
+        require_disk_space(folder, hours)
         write_repeated(day, hours, log)
         times = rounds if hours <= STEADY_HOURS else 1
         runs = [replay_process(log, out) for _ in range(times)]
     except SkippedError as reason:
-        return Length(hours, messages, skipped=str(reason))
+        return ReplayCost(hours, messages, skipped=str(reason))
     else:
         peaks = [r.peak_bytes for r in runs if r.peak_bytes is not None]
-        return Length(
+        return ReplayCost(
             hours,
             messages,
             log.stat().st_size,

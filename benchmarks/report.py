@@ -1,4 +1,4 @@
-"""What was measured, as tables on a terminal, as JSON, and as Markdown."""
+"""The results of the benchmarks as tables on a terminal, as JSON, and as Markdown."""
 
 import sys
 from collections.abc import Sequence
@@ -8,39 +8,59 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from .measure import Result
-from .replays import MOST_MEMORY, STEEPEST, Growth, Length
+from .measure import LineResult
+from .replays import MAX_GROWTH_EXPONENT, MAX_MEMORY_BYTES, Growth, ReplayCost
+
+FILE_WIDTH = 140  # characters, where the output is not a terminal
 
 
 @dataclass
-class Report:
-    """All that a run tells, as it comes."""
+class BenchmarkReport:
+    """All results of a run, filled as they are measured.
+
+    Attributes
+    ----------
+    machine
+        The machine and the versions of the libraries.
+    hours
+        The length of the log.
+    rounds
+        How often each comparison is timed.
+    results
+        The comparisons.
+    our_stages, peer_stages
+        Seconds that a replay spends in each stage.
+    growth
+        How the cost of a replay grows; None if not measured.
+    """
 
     machine: dict[str, str]
     hours: float
     rounds: int
-    results: list[Result]
-    our_stages: dict[str, float] = field(default_factory=dict)  # seconds
+    results: list[LineResult]
+    our_stages: dict[str, float] = field(default_factory=dict)
     peer_stages: dict[str, float] = field(default_factory=dict)
     growth: Growth | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """The same as plain values."""
+        """Return the report as plain values for JSON."""
         return asdict(self)
 
 
 @dataclass(frozen=True)
 class _Grid:
+    """A table with a title, and remarks below it."""
+
     title: str
     columns: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
     remarks: tuple[str, ...] = ()
 
 
-def show(report: Report) -> None:
-    """On the terminal."""
-    wide = None if sys.stdout.isatty() else 140  # a file has no width of its own
-    console = Console(highlight=False, markup=False, width=wide)
+def print_report(report: BenchmarkReport) -> None:
+    """Print the tables of a report on the terminal."""
+    width = None if sys.stdout.isatty() else FILE_WIDTH
+    console = Console(highlight=False, markup=False, width=width)
     for grid in _grids(report):
         table = Table(title=grid.title, title_justify="left")
         for i, column in enumerate(grid.columns):
@@ -53,12 +73,12 @@ def show(report: Report) -> None:
         console.print()
 
 
-def markdown(report: Report) -> str:
-    """The same for a page."""
-    return "\n".join(_markdown(grid) for grid in _grids(report))
+def report_as_markdown(report: BenchmarkReport) -> str:
+    """Return the tables of a report as Markdown."""
+    return "\n".join(_grid_as_markdown(grid) for grid in _grids(report))
 
 
-def _markdown(grid: _Grid) -> str:
+def _grid_as_markdown(grid: _Grid) -> str:
     def row(cells: tuple[str, ...]) -> str:
         return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
@@ -68,85 +88,82 @@ def _markdown(grid: _Grid) -> str:
     return f"## {grid.title}\n\n{rows}\n{remarks}"
 
 
-def _grids(report: Report) -> list[_Grid]:
-    grids = [_ratios(report)] if report.results else []
+def _grids(report: BenchmarkReport) -> list[_Grid]:
+    grids = [_ratio_grid(report)] if report.results else []
     if report.our_stages or report.peer_stages:
-        grids.append(_stages(report))
+        grids.append(_stage_grid(report))
     if report.growth is not None:
-        grids.append(_growth(report.growth))
-    grids.append(_Grid("Measured on", ("what", "is"), list(report.machine.items())))
+        grids.append(_growth_grid(report.growth))
+    grids.append(_Grid("Measured on", ("item", "value"), list(report.machine.items())))
     return grids
 
 
-def _ratios(report: Report) -> _Grid:
+def _ratio_grid(report: BenchmarkReport) -> _Grid:
     title = (
         f"{report.hours:g} h of four channels at 10 Hz: medians of {report.rounds} "
         f"{'round' if report.rounds == 1 else 'rounds'}"
     )
-    columns = ("work", "against", "ours [s]", "peer [s]", "ratio", "held to", "", "note")
+    columns = ("work", "against", "ours [s]", "peer [s]", "ratio", "limit", "", "note")
     rows = []
     for r in report.results:
         if r.ratio is None:
-            figures = ("", "", "", _held_to(r), "skipped", r.skipped)
+            cells = ("", "", "", str(r.limit), "skipped", r.skipped)
         else:
-            figures = (
-                _figure(r.ours_secs), _figure(r.peer_secs), f"{_figure(r.ratio)} x", _held_to(r),
+            cells = (
+                _figure(r.ours_secs), _figure(r.peer_secs), f"{_figure(r.ratio)} x", str(r.limit),
                 _met(r.met), r.note,
             )  # fmt: skip
-        rows.append((r.work, r.against, *figures))
+        rows.append((r.work, r.against, *cells))
     remark = (
-        "The ratio is the peer's time over ours; held to `at most`, it is ours over the peer's."
+        "The ratio is the peer's time over ours; with a limit `at most`, it is ours over the "
+        "peer's. A limit in s is one on our own time."
     )
     return _Grid(title, columns, rows, (remark,))
 
 
-def _stages(report: Report) -> _Grid:
+def _stage_grid(report: BenchmarkReport) -> _Grid:
     both = (report.our_stages, report.peer_stages)
     names = dict.fromkeys(name for stages in both for name in stages)
     rows = [(name, *(_figure(stages.get(name)) for stages in both)) for name in names]
-    rows.append(("in all", *(_figure(sum(stages.values()) or None) for stages in both)))
-    return _Grid(
-        f"The stages of a replay of {report.hours:g} h",
-        ("stage", "ours [s]", "the obvious way [s]"),
-        rows,
-        ("Ours with Python started and loops loaded; the obvious way's scaled to the whole log.",),
+    rows.append(("total", *(_figure(sum(stages.values()) or None) for stages in both)))
+    remark = (
+        "Our times do not include the start of Python and the loading of compiled loops; those of "
+        "the straightforward way are scaled to the whole log."
     )
+    title = f"The stages of a replay of {report.hours:g} h"
+    return _Grid(title, ("stage", "ours [s]", "straightforward [s]"), rows, (remark,))
 
 
-def _growth(growth: Growth) -> _Grid:
+def _growth_grid(growth: Growth) -> _Grid:
     columns = ("hours", "messages", "log [MB]", "time [s]", "peak memory [MiB]", "review [MB]")
     remarks = []
     if growth.exponent is not None:
         fitted = ", ".join(f"{hours:g}" for hours in growth.fitted_hours)
         remarks.append(
-            f"Time grows with length to the power {growth.exponent:.3f} (of {fitted} h); "
-            f"held to at most {STEEPEST:g} from a day on: "
+            f"Time grows with length to the power {growth.exponent:.3f} (fitted to {fitted} h); "
+            f"limit from a day on: at most {MAX_GROWTH_EXPONENT:g}, "
             f"{_met(growth.exponent_met) or 'not measured'}."
         )
     remarks.append(
-        f"Memory under {MOST_MEMORY / 2**30:g} GiB: {_met(growth.memory_met) or 'not measured'}."
+        f"Memory, limit {MAX_MEMORY_BYTES / 2**30:g} GiB: "
+        f"{_met(growth.memory_met) or 'not measured'}."
     )
-    return _Grid("How a replay grows", columns, list(map(_grown, growth.lengths)), tuple(remarks))
+    rows = list(map(_cost_row, growth.costs))
+    return _Grid("How the cost of a replay grows", columns, rows, tuple(remarks))
 
 
-def _grown(length: Length) -> tuple[str, ...]:
-    head = (f"{length.hours:g}", f"{length.messages:,}")
-    if length.secs is None:
-        return (*head, "", f"skipped: {length.skipped}", "", "")
-    peak = "not told" if length.peak_bytes is None else f"{length.peak_bytes / 2**20:.0f}"
+def _cost_row(cost: ReplayCost) -> tuple[str, ...]:
+    head = (f"{cost.hours:g}", f"{cost.messages:,}")
+    if cost.secs is None:
+        return (*head, "", f"skipped: {cost.skipped}", "", "")
+    peak = "not reported" if cost.peak_bytes is None else f"{cost.peak_bytes / 2**20:.0f}"
     return (
         *head,
-        f"{length.log_bytes / 1e6:.1f}",
-        _figure(length.secs),
+        f"{cost.log_bytes / 1e6:.1f}",
+        _figure(cost.secs),
         peak,
-        f"{length.review_bytes / 1e6:.1f}",
+        f"{cost.review_bytes / 1e6:.1f}",
     )
-
-
-def _held_to(result: Result) -> str:
-    if result.at_least is not None:
-        return f"at least {result.at_least:g}"
-    return "" if result.at_most is None else f"at most {result.at_most:g}"
 
 
 def _met(met: bool | None) -> str:

@@ -1,9 +1,10 @@
-"""Where the time of a replay goes: by the module that spends it."""
+"""The time of a replay by stage, attributed by the module in which it is spent."""
 
 import sys
 import time
 from collections import defaultdict
 from contextlib import redirect_stderr, redirect_stdout
+from functools import cache
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,38 +14,58 @@ from shiplog.cli.main import main
 if TYPE_CHECKING:
     from types import FrameType
 
+# the folders and modules of each stage; the time of any other module counts to its caller's stage
 STAGES = {
-    # stage: the modules whose time is its own; of the others it is their caller's
-    "read": ("reader", "log_file", "scan", "messages", "mcap_summary"),
-    "check": ("log_stats", "quality", "stuck", "doubts", "rudder_sign", "gyro_bias"),
-    "one clock": ("clock", "inputs"),
-    "signal_stats": ("signal_stats", "first_model"),
-    "filter": ("pseudo_input", "three_state", "smoother", "tuning", "residuals"),
-    "disturbance": ("disturbance", "ship_observer"),
-    "coefficients": ("weak_form", "sliding", "identification", "two_stack", "newey_west"),
-    "track": ("track",),
-    "review": ("panels", "drawing", "chart", "rerun_view", "summary", "tables"),
-}
+    "read": ("shiplog.mcap",),
+    "check": (
+        "shiplog.checks.log_stats", "shiplog.checks.data_quality", "shiplog.checks.stuck",
+        "shiplog.checks.rudder_sign", "shiplog.checks.gyro_bias",
+        "analysis.replay.channel_warnings",
+    ),
+    "resample": ("shiplog.resampling", "analysis.signals.hold"),
+    "signal statistics": ("analysis.signals.signal_stats",),
+    "filter": ("analysis.filters", "analysis.replay.residuals"),
+    "disturbance": ("analysis.disturbance",),
+    "coefficients": ("analysis.regression",),
+    "track": ("analysis.replay.track",),
+    "review": ("analysis.view", "analysis.report"),
+}  # fmt: skip
 REST = "the rest"
-_STAGE_OF = {module: stage for stage, modules in STAGES.items() for module in modules}
+_STAGE_OF = {name: stage for stage, names in STAGES.items() for name in names}
 
 
 def our_stages(path: Path, out: Path) -> dict[str, float]:
-    """Seconds that `shiplog replay` spends in each stage, Python and the loops being loaded."""
+    """Return the seconds that `shiplog replay` spends in each stage.
+
+    The replay runs twice in this process and the second is timed, so that neither the start of
+    Python nor the loading of compiled loops counts.
+    """
     command = ["replay", str(path), "-o", str(out)]
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         main(command)
-        watch = _Watch()
-        sys.setprofile(watch)
+        stopwatch = _Stopwatch()
+        sys.setprofile(stopwatch)
         try:
             main(command)
         finally:
             sys.setprofile(None)
-    return {stage: watch.secs[stage] for stage in (*STAGES, REST) if watch.secs[stage] > 0}
+    return {stage: stopwatch.secs[stage] for stage in (*STAGES, REST) if stopwatch.secs[stage] > 0}
 
 
-class _Watch:
-    """Told of every call and return, generators' too; counts the time to the stage on top."""
+@cache
+def stage_of(module: str) -> str | None:
+    """Return the stage of a module by its full name, or of its folder; None if it has none.
+
+    Examples
+    --------
+    >>> stage_of("shiplog.mcap.reader"), stage_of("shiplog.types.channel")
+    ('read', None)
+    """
+    return _STAGE_OF.get(module) or _STAGE_OF.get(module.rpartition(".")[0])
+
+
+class _Stopwatch:
+    """A profiling function: adds the time between calls and returns to the current stage."""
 
     def __init__(self) -> None:
         self.secs: dict[str, float] = defaultdict(float)
@@ -52,9 +73,7 @@ class _Watch:
 
     def __call__(self, frame: "FrameType", event: str, _: object) -> None:
         if event == "call":
-            package, *inner = frame.f_globals.get("__name__", "").split(".")
-            ours = package in ("shiplog", "analysis")
-            stage = _STAGE_OF.get(inner[-1]) if ours and inner else None
+            stage = stage_of(frame.f_globals.get("__name__", ""))
             self._count()
             self._stack.append(stage or self._stack[-1])
         elif event == "return" and len(self._stack) > 1:

@@ -1,5 +1,6 @@
-"""Least squares over a window that slides a sample at a time, against `np.linalg.pinv` in each."""
+"""Least squares in a window that slides by one sample, against `np.linalg.pinv` in each window."""
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -8,40 +9,54 @@ from analysis.regression.window_qr import slide
 from shiplog.types import FloatArray
 
 from .bench import Bench
-from .measure import Line, Result, holds, timed
+from .measure import NO_LIMIT, Limit, Line, LineResult, timed
 
-LENGTHS = (100, 500, 2000, 8000)
-HELD = 500  # of these the one that is held to a ratio
-EVENNESS = 1.5  # times the shortest window's time, at the most, for any other
+WINDOW_LENGTHS = (100, 500, 2000, 8000)  # samples
+LIMITED_LENGTH = 500  # the one length whose ratio is held to a limit
+MAX_LENGTH_RATIO = 1.5  # our time at any length over that at the shortest
 COLUMNS = 6
-PEER_ROWS = 2_000_000  # are given to the peer: so many over N windows
-COMPARED = 200  # windows, before anything is timed
+MAX_PEER_ROWS = 2_000_000  # rows that the peer solves at each length
+MAX_SHORT_PEER_ROWS = 200_000
+VERIFIED_WINDOWS = 200
 
 
-def lines(bench: Bench) -> list[Line]:
-    """One a window length, as far as the log is long enough."""
-    X, y = regression(len(bench.signals))
-    return [_line(X, y, length) for length in LENGTHS if 2 * length <= len(y)]
+def window_lines(bench: Bench) -> list[Line]:
+    """Return a comparison for each window length, of as many rows as the log has samples.
+
+    A log shorter than two of the longest windows counts as that long.
+    """
+    X, y = random_regression(max(len(bench.signals), 2 * WINDOW_LENGTHS[-1]))
+    peer_rows = MAX_SHORT_PEER_ROWS if bench.short else MAX_PEER_ROWS
+    return [_line(X, y, length, peer_rows) for length in WINDOW_LENGTHS]
 
 
-def evenness(results: list[Result], *, judged: bool) -> Result | None:
-    """That the time does not depend on the window's length: longest against shortest."""
+def length_dependence(results: Sequence[LineResult], *, judged: bool) -> LineResult | None:
+    """Return our time at the slowest length over that at the shortest; None without two lengths.
+
+    The time must not depend on the window's length.
+    """
     secs = [r.ours_secs for r in results if r.work.startswith("sliding window, N = ")]
-    known = [s for s in secs if s is not None]
-    if len(known) < 2:
+    measured = [s for s in secs if s is not None]
+    if len(measured) < 2:
         return None
-    ratio = max(known[1:]) / known[0]
-    met = holds(ratio, None, EVENNESS) if judged else None
-    return Result(
-        "sliding window, the slowest N", f"our own time at N = {LENGTHS[0]}", max(known[1:]),
-        known[0], ratio, None, EVENNESS, met, "independent of N",
-    )  # fmt: skip
+    slowest, limit = max(measured[1:]), Limit(at_most=MAX_LENGTH_RATIO)
+    ratio = slowest / measured[0]
+    return LineResult(
+        "sliding window, the slowest N",
+        f"our own time at N = {WINDOW_LENGTHS[0]}",
+        limit,
+        ours_secs=slowest,
+        peer_secs=measured[0],
+        ratio=ratio,
+        met=limit.met(ratio, slowest) if judged else None,
+        note="independent of N",
+    )
 
 
-def regression(count: int) -> tuple[FloatArray, FloatArray]:
-    """Regressors (n, 6) and left side (n,): noise, so that no window is left blank.
+def random_regression(count: int) -> tuple[FloatArray, FloatArray]:
+    """Return random regressors (n, 6) and left side (n,), so that no window is rank deficient.
 
-    A blank one would cost little; what the others cost does not depend on what is in them.
+    A rank-deficient window would take less time; that of the others does not depend on the data.
     """
     random = np.random.default_rng(0)
     X = random.normal(size=(count, COLUMNS))
@@ -49,32 +64,39 @@ def regression(count: int) -> tuple[FloatArray, FloatArray]:
 
 
 def slide_pinv(X: FloatArray, y: FloatArray, length: int) -> FloatArray:
-    """The coefficients of every window, (n - length + 1, p), each window for itself."""
-    found = np.empty((len(y) - length + 1, X.shape[1]))
-    for k in range(len(found)):
-        found[k] = np.linalg.pinv(X[k : k + length]) @ y[k : k + length]
-    return found
+    """Return the coefficients of every window, (n - length + 1, p), each window solved by itself.
+
+    Parameters
+    ----------
+    X
+        (n, p) regressors.
+    y
+        (n,) left side.
+    length
+        Samples in a window.
+    """
+    values = np.empty((len(y) - length + 1, X.shape[1]))
+    for k in range(len(values)):
+        values[k] = np.linalg.pinv(X[k : k + length]) @ y[k : k + length]
+    return values
 
 
-def _line(X: FloatArray, y: FloatArray, length: int) -> Line:
-    whole = len(y) - length + 1
-    given = min(whole, max(50, PEER_ROWS // length))
+def verify_windows(X: FloatArray, y: FloatArray, length: int) -> None:
+    """Raise `AssertionError` if the coefficients of any window differ from the peer's."""
+    ours, theirs = slide(X, y, length).values, slide_pinv(X, y, length)
+    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
+
+
+def _line(X: FloatArray, y: FloatArray, length: int, peer_rows: int) -> Line:
+    windows = len(y) - length + 1
+    solved = min(windows, max(50, peer_rows // length))
+    rows, verified_rows = solved + length - 1, min(windows, VERIFIED_WINDOWS) + length - 1
     return Line(
         f"sliding window, N = {length}, p = {COLUMNS}",
         "np.linalg.pinv a window",
         timed(partial(slide, X, y, length)),
-        timed(partial(slide_pinv, *_first(X, y, given + length - 1), length), whole / given),
-        at_least=60 if length == HELD else None,
-        note=f"every sample; peer timed on {given} of {whole} windows",
-        same=partial(require_same, *_first(X, y, min(whole, COMPARED) + length - 1), length),
+        timed(partial(slide_pinv, X[:rows], y[:rows], length), windows / solved),
+        Limit(at_least=60) if length == LIMITED_LENGTH else NO_LIMIT,
+        note=f"every sample; peer timed on {solved} of {windows} windows",
+        verify=partial(verify_windows, X[:verified_rows], y[:verified_rows], length),
     )
-
-
-def _first(X: FloatArray, y: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    return X[:count], y[:count]
-
-
-def require_same(X: FloatArray, y: FloatArray, length: int) -> None:
-    """Refuse windows that are solved otherwise."""
-    ours, theirs = slide(X, y, length).values, slide_pinv(X, y, length)
-    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
