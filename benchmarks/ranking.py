@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from functools import partial
 
+from analysis.identification.fit.segment import Segment
 from analysis.identification.model_selection import Candidate, rank_models
 from analysis.identification.parallel import usable_cores
 from analysis.identification.runs import run_from_log
-from analysis.identification.segment import Segment
 from shiplog import read
 from shiplog.ships import Model, loadable_models, ship_model
 
