@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from analysis.regression.changes import Change, ShipChangeTest
-from analysis.regression.first_model import BARE
+from analysis.regression.first_model import SPEED_PROPORTIONAL_RUDDER
 from analysis.regression.weak_form import CHANNELS, WeakForm
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
@@ -85,7 +85,11 @@ class Case:
 def told(log: TrialLog, case: Case) -> tuple[Change, ...]:
     """The changes that a replay tells of a log."""
     signals = resample(log, channels=CHANNELS)
-    model = BARE if case.guessed else load_vessel(case.vessel)[0].paper_coefficients
+    model = (
+        SPEED_PROPORTIONAL_RUDDER
+        if case.guessed
+        else load_vessel(case.vessel)[0].paper_coefficients
+    )
     equations = WeakForm(model, len(signals), signals.dt_secs, (1, 1, 1, 1))
     watch = ShipChangeTest(equations, guessed=case.guessed)
     watch.add(*equations.step(signals, float(np.max(np.abs(signals["speed"])))))
@@ -164,10 +168,11 @@ def _power_line(case: Case, name: str, seeds: int) -> tuple[str, list[bool]]:
         factor = FACTORS[seed % 2]
         changes = told(halfway(case, name, factor, seed), case)
         near = [c for c in changes if abs(c.at_secs - HALFWAY_SECS) < WINDOW_SECS]
-        right = [c for c in near if name in (c.name, *c.instead)]
+        right = [c for c in near if name in (c.name, *c.alternatives)]
         found, others = found + bool(right), others + len(changes) - len(right)
         named += [
-            (abs(c.at_secs - HALFWAY_SECS), abs(c.share - factor + 1), c.share_half)
+            (abs(c.at_secs - HALFWAY_SECS), abs(c.relative_change - factor + 1),
+             c.relative_change_half_width)
             for c in right if c.name == name
         ]  # fmt: skip
     of = np.array(named).reshape(-1, 3)

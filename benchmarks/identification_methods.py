@@ -13,7 +13,7 @@ from analysis.identification.comparison.paper_scheme import (
 from analysis.identification.comparison.parameter_ekf import parameter_ekf
 from analysis.identification.fit.output_error import OutputError, output_error
 from analysis.identification.fit.segment import Segment
-from analysis.regression.coefficients import Coefficient, identify
+from analysis.regression.coefficients import Coefficient, fit_coefficients
 from analysis.regression.weak_form import weak_form
 from shiplog.ships import ship_model
 from shiplog.ships.paper import Coefficients
@@ -98,7 +98,7 @@ def _paper(trial: Segment, prior: Coefficients) -> FloatArray:
 def _integral(trial: Segment, truth: Coefficients) -> FloatArray:
     found: dict[str, Coefficient] = {}
     for rows in weak_form(trial.signals, truth):  # of the truth the alphas alone are used
-        found |= identify(rows)[0].coefficients
+        found |= fit_coefficients(rows)[0].coefficients
     return np.array([found[name].value for name in IDENTIFIED_NAMES])
 
 

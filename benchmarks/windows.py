@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from analysis.regression.window_qr import slide
+from analysis.regression.window_qr import sliding_least_squares
 from shiplog.types import FloatArray
 
 from .bench import Bench
@@ -83,7 +83,7 @@ def slide_pinv(X: FloatArray, y: FloatArray, length: int) -> FloatArray:
 
 def verify_windows(X: FloatArray, y: FloatArray, length: int) -> None:
     """Raise `AssertionError` if the coefficients of any window differ from the peer's."""
-    ours, theirs = slide(X, y, length).values, slide_pinv(X, y, length)
+    ours, theirs = sliding_least_squares(X, y, length).values, slide_pinv(X, y, length)
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
 
 
@@ -94,7 +94,7 @@ def _line(X: FloatArray, y: FloatArray, length: int, peer_rows: int) -> Line:
     return Line(
         f"sliding window, N = {length}, p = {COLUMNS}",
         "np.linalg.pinv a window",
-        timed(partial(slide, X, y, length)),
+        timed(partial(sliding_least_squares, X, y, length)),
         timed(partial(slide_pinv, X[:rows], y[:rows], length), windows / solved),
         Limit(at_least=60) if length == LIMITED_LENGTH else NO_LIMIT,
         note=f"every sample; peer timed on {solved} of {windows} windows",

@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.filters.base import STATES
 from analysis.regression.coefficients import CoefficientFit
-from analysis.regression.sliding import History
+from analysis.regression.sliding import CoefficientHistory
 from analysis.replay.replay import Analysis
 from shiplog import Channel, TrialLog
 from shiplog.ships.paper import COEFFICIENT_UNITS, PAPER_OUTPUTS
@@ -126,7 +126,9 @@ def _disturbances(analysis: Analysis) -> Iterator[Channel]:
         yield _single(analysis, f"{kind}_disturbance", "std", summary.std)
 
 
-def _coefficients(analysis: Analysis, fit: CoefficientFit, history: History) -> Iterator[Channel]:
+def _coefficients(
+    analysis: Analysis, fit: CoefficientFit, history: CoefficientHistory
+) -> Iterator[Channel]:
     at = history.time_secs
     for i, (name, coefficient) in enumerate(fit.coefficients.items()):
         yield _single(analysis, name, "trial", coefficient.value)

@@ -13,12 +13,12 @@ from shiplog.compiled import compiled
 from shiplog.types import FloatArray
 
 TINY = 1e-290  # a sum of squares below this is none: the quotients of such are no rotations
-PRECISION = 4e-16  # of a step of Laguerre's method, beyond which there is none
-SINGULAR = 2.0**52  # a condition that the arithmetic cannot tell from an infinite one
-MOST_STEPS = 100  # it takes five; some thirty where eigenvalues meet
+MIN_RELATIVE_STEP = 4e-16  # of a step of Laguerre's method, beyond which there is none
+MAX_FINITE_CONDITION = 2.0**52  # a condition that the arithmetic cannot tell from an infinite one
+MAX_STEPS = 100  # it takes five; some thirty where eigenvalues meet
 
 
-class Solutions(NamedTuple):
+class BatchSolutions(NamedTuple):
     """Least squares of k systems."""
 
     values: FloatArray  # (p, k), zero for a column that is zero throughout
@@ -27,20 +27,20 @@ class Solutions(NamedTuple):
     inverses: FloatArray  # (p, p, k) of X'X, with zeros for the columns that are zero throughout
 
 
-def no_solutions(k: int, p: int) -> Solutions:
+def allocate_solutions(k: int, p: int) -> BatchSolutions:
     """Room for those of `k` systems of `p` columns."""
-    return Solutions(np.empty((p, k)), np.empty(k), np.empty((p, k)), np.empty((p, p, k)))
+    return BatchSolutions(np.empty((p, k)), np.empty(k), np.empty((p, k)), np.empty((p, p, k)))
 
 
-def solve_one(factor: FloatArray) -> Solutions:
+def solve_single(factor: FloatArray) -> BatchSolutions:
     """One system [R Q'y] (p, p + 1)."""
-    found = no_solutions(1, len(factor))
+    found = allocate_solutions(1, len(factor))
     solve(factor[:, :, None].copy(), 1, 0, found)
     return found
 
 
 @compiled
-def solve(factors: FloatArray, m: int, first: int, found: Solutions) -> None:
+def solve(factors: FloatArray, m: int, first: int, found: BatchSolutions) -> None:
     """The first `m` of the systems [R Q'y] (p, p + 1, n) into `found` from `first` on.
 
     `factors` is used up.
@@ -69,11 +69,11 @@ def solve(factors: FloatArray, m: int, first: int, found: Solutions) -> None:
     _greatest_eigenvalues(inverse_gram, least)  # the reciprocal of the least of R'R
     for l in range(m):
         condition = sqrt(greatest[l] * least[l])
-        found.conditions[first + l] = condition if 0 < condition < SINGULAR else np.inf
+        found.conditions[first + l] = condition if 0 < condition < MAX_FINITE_CONDITION else np.inf
 
 
 @compiled
-def merge(factors: FloatArray, others: FloatArray, m: int) -> None:
+def merge_factors(factors: FloatArray, others: FloatArray, m: int) -> None:
     """The rows of `others` into `factors`, both [R Q'y] (p, p + 1, n); of the first `m` systems.
 
     By Householder's reflections, which need not touch what is zero in both. `others` is used up.
@@ -244,7 +244,7 @@ def _laguerre(A: FloatArray, squares: FloatArray, x: FloatArray) -> None:
     p, _, m = A.shape
     f, g, h = np.empty((2, m)), np.empty((2, m)), np.empty((2, m))
     x[:] = 1.0
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         f[0], f[1] = 0.0, 1.0
         g[:] = 0.0
         h[:] = 0.0
@@ -261,7 +261,7 @@ def _laguerre(A: FloatArray, squares: FloatArray, x: FloatArray) -> None:
             G = g[1, l] / f[1, l]
             H = G**2 - h[1, l] / f[1, l]
             step = p / (G + sqrt(max(0.0, (p - 1) * (p * H - G**2))))
-            moves = f[1, l] > 0 and step > PRECISION * x[l]
+            moves = f[1, l] > 0 and step > MIN_RELATIVE_STEP * x[l]
             x[l] -= step if moves else 0.0
             moving += moves
         if moving == 0:

@@ -21,14 +21,18 @@ from scipy.special import ndtri, stdtr
 
 from shiplog.types import FloatArray
 
-from .sliding import CORRELATED, WORST_CONDITION
+from .sliding import CORRELATION_SHARE, MAX_CONDITION
 from .weak_form import SLIPSTREAM, Equation
 
-ALARM = 0.02  # how often, at the most, an equation that never changed may be said to have done so
-DOUBT = 0.05  # a coefficient that need not have changed, at this level, has not
-TRIM = 0.15  # of what the rows tell of a coefficient, the least on either side of a change
-STRADDLE = 0.75  # of a bump's length: rows so near to the change belong to neither side
-TURNS = 8  # at finding the slipstream's share; four are enough
+MAX_FALSE_ALARM_RATE = (
+    0.02  # how often, at the most, an equation that never changed may be said to have done so
+)
+SIGNIFICANCE_LEVEL = 0.05  # a coefficient that need not have changed, at this level, has not
+MIN_INFORMATION_SHARE = (
+    0.15  # of what the rows tell of a coefficient, the least on either side of a change
+)
+GUARD_SHARE = 0.75  # of a bump's length: rows so near to the change belong to neither side
+MAX_MIXING_STEPS = 8  # at finding the slipstream's share; four are enough
 TINY = 1e-150  # an error below this is none
 
 
@@ -42,7 +46,7 @@ class Blocks(NamedTuple):
     tallies: FloatArray  # (k, 3) rows known, least and greatest excitation
     edges_secs: FloatArray  # (k + 1,)
     equation: Equation
-    least_excitation: float
+    min_excitation: float
     least_share: float  # by which a coefficient must change
     run: int  # blocks over which the rows share data
 
@@ -50,7 +54,7 @@ class Blocks(NamedTuple):
     def clear(self) -> int:
         """How many blocks on either side of a change belong to neither."""
         block_secs = self.edges_secs[1] - self.edges_secs[0]
-        return int(np.ceil(STRADDLE * self.equation.bump_secs / block_secs))
+        return int(np.ceil(GUARD_SHARE * self.equation.bump_secs / block_secs))
 
     def part(self, start: int, stop: int) -> "Blocks":
         """The blocks from `start` to before `stop`."""
@@ -62,7 +66,7 @@ class Blocks(NamedTuple):
         )
 
 
-class ChangeFit(NamedTuple):
+class ChangePointFit(NamedTuple):
     """A regression with columns that change between two blocks."""
 
     at: int  # the first block after the change
@@ -75,7 +79,7 @@ class ChangeFit(NamedTuple):
     spread: float  # of the instants tried, what makes the largest of them larger
 
 
-def changed(blocks: Blocks) -> ChangeFit | None:
+def changed(blocks: Blocks) -> ChangePointFit | None:
     """The change that the blocks tell most surely, if they tell any."""
     candidates = [i for i, name in enumerate(blocks.names) if name != SLIPSTREAM]
     splits = [split for i in candidates if (split := best_change(blocks, (i,))) is not None]
@@ -95,15 +99,15 @@ def changed(blocks: Blocks) -> ChangeFit | None:
     return None if all(small) else best
 
 
-def share_of(split: ChangeFit, c: int) -> float:
+def share_of(split: ChangePointFit, c: int) -> float:
     """How much of itself the c-th column changed by."""
     difference = split.values[len(split.values) - len(split.columns) + c]
     return float(abs(difference / split.values[split.columns[c]]))
 
 
-def _without_idle(blocks: Blocks, split: ChangeFit) -> ChangeFit:
+def _without_idle(blocks: Blocks, split: ChangePointFit) -> ChangePointFit:
     """The split without columns of which it cannot be said that they had to change."""
-    while len(split.columns) > 1 and split.chances.max() > DOUBT:
+    while len(split.columns) > 1 and split.chances.max() > SIGNIFICANCE_LEVEL:
         idle = int(np.argmax(split.chances))
         fewer = best_change(blocks, (*split.columns[:idle], *split.columns[idle + 1 :]))
         if fewer is None:
@@ -112,7 +116,7 @@ def _without_idle(blocks: Blocks, split: ChangeFit) -> ChangeFit:
     return split
 
 
-def best_change(blocks: Blocks, columns: tuple[int, ...]) -> ChangeFit | None:
+def best_change(blocks: Blocks, columns: tuple[int, ...]) -> ChangePointFit | None:
     """The likeliest instant at which these columns changed; None where none can be told.
 
     Where nothing is known of the rudder, how much of it is slipstream is found by turns.
@@ -121,7 +125,7 @@ def best_change(blocks: Blocks, columns: tuple[int, ...]) -> ChangeFit | None:
         return _split_as_given(blocks, columns)
     d, slipstream = (blocks.names.index(name) for name in ("d", SLIPSTREAM))
     changing, share, split = len(blocks.names) + columns.index(d), 0.5, None
-    for _ in range(TURNS):
+    for _ in range(MAX_MIXING_STEPS):
         split = _split_as_given(_mixed(blocks, share), columns)
         if split is None:
             return None
@@ -131,7 +135,7 @@ def best_change(blocks: Blocks, columns: tuple[int, ...]) -> ChangeFit | None:
     return split
 
 
-def _split_as_given(blocks: Blocks, columns: tuple[int, ...]) -> ChangeFit | None:
+def _split_as_given(blocks: Blocks, columns: tuple[int, ...]) -> ChangePointFit | None:
     dated = _dated(blocks, columns)
     if dated is None:
         return None
@@ -145,7 +149,7 @@ def _split_as_given(blocks: Blocks, columns: tuple[int, ...]) -> ChangeFit | Non
     squares = every.transpose(0, 2, 1) @ blocks.squares[kept] @ every
     products = np.einsum("kji,kj->ki", every, blocks.products[kept])
     inverse = inverse_of(squares.sum(0))
-    independent = known / (blocks.equation.overlap * CORRELATED)
+    independent = known / (blocks.equation.overlap * CORRELATION_SHARE)
     freedom = independent - p - len(columns)
     if inverse is None or freedom <= 0:
         return None
@@ -158,7 +162,7 @@ def _split_as_given(blocks: Blocks, columns: tuple[int, ...]) -> ChangeFit | Non
     inflation = independent / freedom
     stds = np.sqrt(inflation * run_squares(influences[:, p:], blocks.run))
     chances = 2 * stdtr(degrees, -np.abs(values[p:]) / np.maximum(stds, TINY))  # Student's t
-    return ChangeFit(at, columns, values, influences, inflation, degrees, chances, spread)
+    return ChangePointFit(at, columns, values, influences, inflation, degrees, chances, spread)
 
 
 def _dated(blocks: Blocks, columns: tuple[int, ...]) -> tuple[int, float] | None:
@@ -172,7 +176,9 @@ def _dated(blocks: Blocks, columns: tuple[int, ...]) -> tuple[int, float] | None
         return None
     shares = np.einsum("ij,kjl,li->ki", inverse[columns, :], blocks.squares, inverse[:, columns])
     shares = np.cumsum(shares, axis=0)[:-1] / shares.sum(0)
-    allowed = ((shares >= TRIM) & (shares <= 1 - TRIM)).all(axis=1) & _moves(blocks)
+    allowed = ((shares >= MIN_INFORMATION_SHARE) & (shares <= 1 - MIN_INFORMATION_SHARE)).all(
+        axis=1
+    ) & _moves(blocks)
     if not allowed.any():
         return None
     left = blocks.products - blocks.squares @ (inverse @ blocks.products.sum(0))
@@ -190,7 +196,7 @@ def _moves(blocks: Blocks) -> NDArray[np.bool_]:
     low, high = blocks.tallies[:, 1], blocks.tallies[:, 2]
     before = np.maximum.accumulate(high) - np.minimum.accumulate(low)
     after = np.maximum.accumulate(high[::-1]) - np.minimum.accumulate(low[::-1])
-    return np.asarray(np.minimum(before[:-1], after[-2::-1]) >= blocks.least_excitation)
+    return np.asarray(np.minimum(before[:-1], after[-2::-1]) >= blocks.min_excitation)
 
 
 def inverse_of(squares: FloatArray) -> FloatArray | None:
@@ -199,7 +205,7 @@ def inverse_of(squares: FloatArray) -> FloatArray | None:
     if not (sizes > 0).all():
         return None
     scaled = squares / np.outer(sizes, sizes)
-    if np.linalg.cond(scaled) > WORST_CONDITION**2:
+    if np.linalg.cond(scaled) > MAX_CONDITION**2:
         return None
     return np.asarray(np.linalg.inv(scaled) / np.outer(sizes, sizes))
 
@@ -210,11 +216,11 @@ def run_squares(influences: FloatArray, run: int) -> FloatArray:
     return np.asarray(((sums[run:] - sums[:-run]) ** 2).sum(0) / run)
 
 
-def is_sure(blocks: Blocks, split: ChangeFit) -> bool:
+def is_sure(blocks: Blocks, split: ChangePointFit) -> bool:
     """Whether the last column changed, though every instant and every column was tried."""
     candidates = sum(name != SLIPSTREAM for name in blocks.names)
     chance = largest_of_instants(float(split.chances[-1]), split.spread)
-    return chance * candidates < ALARM
+    return chance * candidates < MAX_FALSE_ALARM_RATE
 
 
 def largest_of_instants(chance: float, spread: float) -> float:

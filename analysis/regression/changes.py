@@ -16,9 +16,9 @@ from shiplog.ships.paper import COEFFICIENT_UNITS
 from shiplog.types import FloatArray
 
 from .change_point import (
-    DOUBT,
+    SIGNIFICANCE_LEVEL,
     Blocks,
-    ChangeFit,
+    ChangePointFit,
     best_change,
     changed,
     inverse_of,
@@ -26,15 +26,17 @@ from .change_point import (
     run_squares,
     share_of,
 )
-from .sliding import WORST_INFLATION
+from .sliding import MAX_INFLATION
 from .weak_form import SLIPSTREAM, Equation, Rows, WeakForm, with_constant, with_slipstream
-from .window_qr import rotate_in
+from .window_qr import rotate_row
 
-PARTS = 6  # blocks in a bump's length: so sharp is the instant
-MOST_BLOCKS = 4096
-DEPTH = 3  # how often a side is parted again
-LEAST_SHARE = 0.01  # of itself by which a coefficient must change, to be worth telling,
-LEAST_GUESSED = 0.1  # and where the model was guessed, which by itself makes smaller ones
+BLOCKS_PER_BUMP = 6  # blocks in a bump's length: so sharp is the instant
+MAX_BLOCKS = 4096
+MAX_SPLIT_DEPTH = 3  # how often a side is parted again
+MIN_RELATIVE_CHANGE = 0.01  # of itself by which a coefficient must change, to be worth telling,
+MIN_RELATIVE_CHANGE_FITTED = (
+    0.1  # and where the model was guessed, which by itself makes smaller ones
+)
 
 
 @dataclass(frozen=True)
@@ -50,25 +52,29 @@ class Change:
     after: float
     before_std: float
     after_std: float
-    share: float  # by which it changed, of the value before; NaN unless that one is determined
-    share_half: float  # half of its 95 % interval
-    instead: tuple[str, ...]  # any of these may have changed in its place
+    relative_change: (
+        float  # by which it changed, of the value before; NaN unless that one is determined
+    )
+    relative_change_half_width: float  # half of its 95 % interval
+    alternatives: tuple[str, ...]  # any of these may have changed in its place
 
     @property
-    def by(self) -> str:
+    def description(self) -> str:
         """By how much, or from what to what."""
-        if np.isfinite(self.share):
-            half = 100 * self.share_half
+        if np.isfinite(self.relative_change):
+            half = 100 * self.relative_change_half_width
             digits = 0 if half >= 1 else 1
-            return f"by {100 * self.share:+.{digits}f} % ± {max(half, 0.1):.{digits}f} %"
+            return f"by {100 * self.relative_change:+.{digits}f} % ± {max(half, 0.1):.{digits}f} %"
         return f"from {self.before:.3g} to {self.after:.3g} {self.unit}"
 
     def __str__(self) -> str:
         """The change in a sentence."""
-        instead = f" (or {' or '.join(self.instead)} in its place)" if self.instead else ""
+        alternatives = (
+            f" (or {' or '.join(self.alternatives)} in its place)" if self.alternatives else ""
+        )
         return (
-            f"{self.name}{instead} differs before and after {self.at_secs:.0f} s {self.by}: the "
-            "ship, her loading, the depth, the weather, or a model that does not hold for both"
+            f"{self.name}{alternatives} differs before and after {self.at_secs:.0f} s "
+            f"{self.description}: the ship, her loading, the depth, the weather, or a model that does not hold for both"
         )
 
 
@@ -84,7 +90,9 @@ class ShipChangeTest:
         yaw, count = equations.yaw.with_constant(), equations.row_count
         self._guessed = guessed
         rudder = yaw.with_slipstream() if guessed else yaw
-        self._yaw = ChangeTest(rudder, count, least=LEAST_GUESSED if guessed else LEAST_SHARE)
+        self._yaw = ChangeTest(
+            rudder, count, least=MIN_RELATIVE_CHANGE_FITTED if guessed else MIN_RELATIVE_CHANGE
+        )
         self._surge = ChangeTest(equations.surge, count)
 
     def add(self, yaw: Rows, surge: Rows) -> None:
@@ -107,9 +115,11 @@ class ChangeTest:
     is told by a share of less than `least`.
     """
 
-    def __init__(self, equation: Equation, count: int, *, least: float = LEAST_SHARE) -> None:
+    def __init__(
+        self, equation: Equation, count: int, *, least: float = MIN_RELATIVE_CHANGE
+    ) -> None:
         self._equation, self._count, self._least, self._seen = equation, count, least, 0
-        self._size = max(1, equation.overlap // PARTS, -(-count // MOST_BLOCKS))
+        self._size = max(1, equation.overlap // BLOCKS_PER_BUMP, -(-count // MAX_BLOCKS))
         blocks, p = -(-count // self._size), len(equation.names)
         self._factors = np.zeros((blocks, p, p + 1))
         self._tallies = np.tile([0.0, inf, -inf], (blocks, 1))
@@ -120,7 +130,7 @@ class ChangeTest:
         every = np.column_stack((rows.regressors, rows.target, rows.excitation))
         _fold(self._factors, self._tallies, every, self._seen, self._size)
         self._seen += len(every)
-        self._least_excitation = rows.least_excitation
+        self._least_excitation = rows.min_excitation
 
     def result(self) -> tuple[Change, ...]:
         """What changed, in the order of time."""
@@ -128,7 +138,7 @@ class ChangeTest:
         if blocks is None:
             return ()
         last, clear = len(blocks.products), blocks.clear
-        at = _sought(blocks, 0, last, DEPTH)
+        at = _sought(blocks, 0, last, MAX_SPLIT_DEPTH)
         found: list[Change] = []
         for before, after in zip([-clear, *at], [*at[1:], last + clear], strict=False):
             part = blocks.part(before + clear, after - clear)  # between its neighbours
@@ -170,7 +180,7 @@ def _fold(
     for k in range(len(rows)):
         block = (first + k) // size
         if np.isfinite(rows[k]).all():
-            rotate_in(factors[block], rows[:, :last], k)
+            rotate_row(factors[block], rows[:, :last], k)
             tallies[block, 0] += 1
             tallies[block, 1] = min(tallies[block, 1], rows[k, last])
             tallies[block, 2] = max(tallies[block, 2], rows[k, last])
@@ -179,7 +189,7 @@ def _fold(
 def _without_needless(blocks: Blocks) -> Blocks:
     """Without the slipstream, if the rudder alone can do what it does: at a speed that stays."""
     last, inverse = blocks.names.index(SLIPSTREAM), inverse_of(blocks.squares.sum(0))
-    if inverse is not None and sqrt(inverse[last, last]) <= WORST_INFLATION:
+    if inverse is not None and sqrt(inverse[last, last]) <= MAX_INFLATION:
         return blocks
     return blocks._replace(
         names=blocks.names[:last],
@@ -199,17 +209,17 @@ def _sought(blocks: Blocks, start: int, stop: int, depth: int) -> list[int]:
     return [*earlier, at, *_sought(blocks, at + clear, stop, depth - 1)]
 
 
-def _told(blocks: Blocks, split: ChangeFit) -> list[Change]:
+def _told(blocks: Blocks, split: ChangePointFit) -> list[Change]:
     """The changes of a split that are a coefficient's, and not too small."""
-    instead = _instead(blocks, split) if len(split.columns) == 1 else ()
+    alternatives = _instead(blocks, split) if len(split.columns) == 1 else ()
     return [
-        _change(blocks, split, c, instead)
+        _change(blocks, split, c, alternatives)
         for c, i in enumerate(split.columns)
         if blocks.names[i] in COEFFICIENT_UNITS and share_of(split, c) >= blocks.least_share
     ]
 
 
-def _change(blocks: Blocks, split: ChangeFit, c: int, instead: tuple[str, ...]) -> Change:
+def _change(blocks: Blocks, split: ChangePointFit, c: int, alternatives: tuple[str, ...]) -> Change:
     i, edges = split.columns[c], blocks.edges_secs
     j = len(blocks.names) + c
     before, difference = split.values[i], split.values[j]
@@ -227,20 +237,22 @@ def _change(blocks: Blocks, split: ChangeFit, c: int, instead: tuple[str, ...]) 
         after=float((before + difference) / blocks.units[i]),
         before_std=float(stds[0] / blocks.units[i]),
         after_std=float(stds[1] / blocks.units[i]),
-        share=float(share) if sure else nan,
-        share_half=float(-stdtrit(split.degrees[c], 0.025) * stds[2]) if sure else nan,
-        instead=instead,
+        relative_change=float(share) if sure else nan,
+        relative_change_half_width=float(-stdtrit(split.degrees[c], 0.025) * stds[2])
+        if sure
+        else nan,
+        alternatives=alternatives,
     )
 
 
-def _instead(blocks: Blocks, split: ChangeFit) -> tuple[str, ...]:
+def _instead(blocks: Blocks, split: ChangePointFit) -> tuple[str, ...]:
     """The coefficients that might have changed alone: beside one the found one is in doubt."""
     found = []
     for i, name in enumerate(blocks.names):
         if name not in COEFFICIENT_UNITS or i in split.columns:
             continue
         alone, both = best_change(blocks, (i,)), best_change(blocks, (i, *split.columns))
-        doubted = both is None or both.chances[-1] > DOUBT
+        doubted = both is None or both.chances[-1] > SIGNIFICANCE_LEVEL
         if alone is not None and is_sure(blocks, alone) and doubted:
             found.append(name)
     return tuple(found)

@@ -8,10 +8,17 @@ from analysis.signals.concat import concatenate
 from shiplog.ships.paper import COEFFICIENT_UNITS
 from shiplog.types import FloatArray
 
-from .sliding import WINDOW_SECS, Errors, History, Regression, Solution, Windows
+from .sliding import (
+    WINDOW_SECS,
+    CoefficientHistory,
+    RegressionAccumulator,
+    RegressionSolution,
+    StandardErrorAccumulator,
+    WindowedRegression,
+)
 from .weak_form import Equation, Rows, with_constant
 
-ROWS = 1 << 13  # a chunk
+CHUNK_ROWS = 1 << 13  # a chunk
 
 
 @dataclass(frozen=True)
@@ -48,13 +55,13 @@ class WholeTrialRegression:
 
     def __init__(self, equation: Equation, *, constant: bool = False) -> None:
         self._constant = constant
-        self._regression = Regression(equation.with_constant() if constant else equation)
+        self._regression = RegressionAccumulator(equation.with_constant() if constant else equation)
 
     def add(self, rows: Rows) -> None:
         """Add the next rows to the sums."""
         self._regression.add(with_constant(rows) if self._constant else rows)
 
-    def solution(self, names: tuple[str, ...] | None = None) -> Solution:
+    def solution(self, names: tuple[str, ...] | None = None) -> RegressionSolution:
         """Solve for all coefficients, or for `names` alone, over the rows added so far."""
         if names is None:
             return self._regression.solve()
@@ -86,19 +93,19 @@ class CoefficientStage:
         self,
         equation: Equation,
         count: int,
-        solution: Solution,
+        solution: RegressionSolution,
         *,
         constant: bool = False,
         window_secs: float = WINDOW_SECS,
     ) -> None:
         self._names, self._constant = equation.names, constant
-        self._errors = Errors(solution)
-        self._windows = Windows(equation, count, window_secs)
+        self._errors = StandardErrorAccumulator(solution)
+        self._windows = WindowedRegression(equation, count, window_secs)
         self._ends: list[FloatArray] = []
         self._conditions: list[FloatArray] = []
         self._blank = 0
 
-    def step(self, rows: Rows) -> History:
+    def step(self, rows: Rows) -> CoefficientHistory:
         """Take the next rows; return the windows that end in them."""
         self._errors.add(with_constant(rows) if self._constant else rows)
         history = self._windows.step(rows)
@@ -123,9 +130,9 @@ class CoefficientStage:
         )
 
 
-def identify(
+def fit_coefficients(
     rows: Rows, *, constant: bool = False, window_secs: float = WINDOW_SECS
-) -> tuple[CoefficientFit, History]:
+) -> tuple[CoefficientFit, CoefficientHistory]:
     """The coefficients over the whole trial and over each window, of rows that are all there.
 
     A trial shorter than the window is one window.
@@ -136,6 +143,6 @@ def identify(
     stage = CoefficientStage(
         rows.equation, count, regression.solution(), constant=constant, window_secs=window_secs
     )
-    chunks = [rows.part(start, start + ROWS) for start in range(0, max(count, 1), ROWS)]
+    chunks = [rows.part(start, start + CHUNK_ROWS) for start in range(0, max(count, 1), CHUNK_ROWS)]
     history = concatenate([stage.step(chunk) for chunk in chunks])
     return stage.result(), history

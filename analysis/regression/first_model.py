@@ -9,7 +9,7 @@ from .coefficients import WholeTrialRegression
 
 # The rudder works in proportion to the speed: without a model nothing is known of the
 # slipstream, and d and e take the factor up.
-BARE = Coefficients(
+SPEED_PROPORTIONAL_RUDDER = Coefficients(
     a=0.0, b1=0.0, b2=0.0, b3=0.0, d=0.0, e=0.0, f=0.0, g=0.0, h=0.0,
     alpha1=1.0, alpha2=0.0, alpha3=0.0,
 )  # fmt: skip
@@ -35,13 +35,15 @@ def fit_first_model(
             f"the log carries no model, and too little moves in it to fit one of "
             f"{' and '.join(unknown)}; give the ship's with --vessel: {name}"
         )
-    return Vessel(f"fitted to {name}", BARE._replace(**found), approach_rpm=stats.rpm)
+    return Vessel(
+        f"fitted to {name}", SPEED_PROPORTIONAL_RUDDER._replace(**found), approach_rpm=stats.rpm
+    )
 
 
 def _richest(rows: WholeTrialRegression, forms: tuple[tuple[str, ...], ...]) -> dict[str, float]:
     """The coefficients of the first of the forms that the rows can tell; none if they cannot."""
     for names in forms:
         solution = rows.solution(names)
-        if solution.told[: len(names)].all():
+        if solution.determined[: len(names)].all():
             return dict(zip(names, solution.values.tolist(), strict=False))
     return {}

@@ -15,7 +15,7 @@ from shiplog.compiled import compiled
 from shiplog.types import FloatArray
 
 
-class Runs(NamedTuple):
+class OverlapSums(NamedTuple):
     """What is remembered of the rows so far; changed in place."""
 
     last: FloatArray  # (overlap, p) influences, in a ring
@@ -23,14 +23,14 @@ class Runs(NamedTuple):
     squares: FloatArray  # (p,) the sum of the squares of such sums
 
 
-def no_runs(overlap: int, p: int) -> Runs:
+def empty_sums(overlap: int, p: int) -> OverlapSums:
     """Before any row."""
-    return Runs(np.zeros((overlap, p)), np.zeros(p), np.zeros(p))
+    return OverlapSums(np.zeros((overlap, p)), np.zeros(p), np.zeros(p))
 
 
 @compiled
-def add_runs(
-    runs: Runs, rows: FloatArray, count: int, values: FloatArray, inverse: FloatArray
+def add_rows(
+    runs: OverlapSums, rows: FloatArray, count: int, values: FloatArray, inverse: FloatArray
 ) -> None:
     """The runs that end in the next rows [X y] (m, p + 1), after `count` others.
 
@@ -52,12 +52,12 @@ def add_runs(
             runs.last[at, i] = influence
 
 
-def variances(runs: Runs, count: int) -> FloatArray:
+def newey_west_variances(runs: OverlapSums, count: int) -> FloatArray:
     """Of the values over the `count` rows so far, (p,)."""
     overlap, p = runs.last.shape
-    whole = Runs(*(part.copy() for part in runs))
+    whole = OverlapSums(*(part.copy() for part in runs))
     after = np.zeros((overlap - 1, p + 1))  # the last runs reach over the end
-    add_runs(whole, after, count, np.zeros(p), np.zeros((p, p)))
+    add_rows(whole, after, count, np.zeros(p), np.zeros((p, p)))
     return np.asarray(whole.squares / overlap)
 
 
@@ -131,7 +131,7 @@ def _squares(influence: FloatArray, residual: FloatArray, n: np.int64, overlap: 
     return squares
 
 
-def few_rows(b: FloatArray | float) -> FloatArray:
+def small_sample_factor(b: FloatArray | float) -> FloatArray:
     """What errors are to be enlarged by where rows overlap over a share `b` of them all.
 
     The 95 % point of Kiefer and Vogelsang (2005) over the Gaussian's.

@@ -32,8 +32,10 @@ from shiplog.types import FloatArray, Signals
 CHANNELS = (*PAPER_OUTPUTS, *PAPER_INPUTS)
 BUMP_SECS = 60.0  # long against the noise, short against the ship's turning
 STRIDE_SECS = 1.0
-LEAST_RUDDER = np.radians(2.0)  # a rudder that moves less tells nothing of yaw,
-LEAST_SPEED = 0.02  # nor does a speed that changes by a smaller share of itself tell of surge
+MIN_RUDDER_RANGE = np.radians(2.0)  # a rudder that moves less tells nothing of yaw,
+MIN_RELATIVE_SPEED_RANGE = (
+    0.02  # nor does a speed that changes by a smaller share of itself tell of surge
+)
 SLIPSTREAM = "slipstream"  # a regressor: what the rudder does in the propeller's race
 BUMP_POWER = 4  # (1 - s^2)^4: three derivatives vanish at the ends
 
@@ -69,7 +71,7 @@ class Rows:
     target: FloatArray  # (m,)
     regressors: FloatArray  # (m, p)
     excitation: FloatArray  # (m,) what must move for the rows to tell anything
-    least_excitation: float  # by how much, at the least
+    min_excitation: float  # by how much, at the least
 
     def part(self, start: int, stop: int) -> "Rows":
         """The rows from `start` to before `stop`."""
@@ -141,9 +143,14 @@ class WeakForm:
         centres = (self._half + self._stride * np.arange(first, until)) * self._dt
         yaw, surge = sums[:, :8], sums[:, 8:]  # each: target, excitation, regressors
         return (
-            Rows(self.yaw, centres, yaw[:, 0], yaw[:, 2:], yaw[:, 1], LEAST_RUDDER),
+            Rows(self.yaw, centres, yaw[:, 0], yaw[:, 2:], yaw[:, 1], MIN_RUDDER_RANGE),
             Rows(
-                self.surge, centres, surge[:, 0], surge[:, 2:], surge[:, 1], LEAST_SPEED * fastest
+                self.surge,
+                centres,
+                surge[:, 0],
+                surge[:, 2:],
+                surge[:, 1],
+                MIN_RELATIVE_SPEED_RANGE * fastest,
             ),
         )
 

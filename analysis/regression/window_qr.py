@@ -16,21 +16,23 @@ from numpy.typing import NDArray
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray
 
-from .batched_qr import TINY, Solutions, merge, no_solutions, solve
+from .batched_qr import TINY, BatchSolutions, allocate_solutions, merge_factors, solve
 
-ABREAST = 56  # windows solved together; a power of two would have their rows in one line of cache
-CHUNK = 8192  # rows taken at a time where all are there
-NOTHING = (0.0, np.inf, -np.inf)  # the tally of no rows
+BATCH_SIZE = (
+    56  # windows solved together; a power of two would have their rows in one line of cache
+)
+CHUNK_ROWS = 8192  # rows taken at a time where all are there
+EMPTY_TALLY = (0.0, np.inf, -np.inf)  # the tally of no rows
 
 
-class Slid(NamedTuple):
+class WindowSolutions(NamedTuple):
     """Least squares of each of k windows, the first of which ends with the `length`-th row."""
 
     values: FloatArray  # (k, p), NaN for a column that is zero throughout, or if X is singular
     conditions: FloatArray  # (k,) 2-norm, of the columns scaled to unit length; inf if singular
 
 
-class Stacks(NamedTuple):
+class WindowState(NamedTuple):
     """What is remembered of the rows so far; changed in place."""
 
     seen: NDArray[np.int64]  # (1,) rows so far
@@ -42,14 +44,14 @@ class Stacks(NamedTuple):
     newer_tally: FloatArray  # (1, 3)
 
 
-class Unjudged(NamedTuple):
+class RawWindows(NamedTuple):
     """Windows as they stand before anyone has judged them."""
 
-    solutions: Solutions
+    solutions: BatchSolutions
     tallies: FloatArray  # (k, 3) rows known, least and greatest excitation
 
 
-def slide(X: FloatArray, y: FloatArray, length: int) -> Slid:
+def sliding_least_squares(X: FloatArray, y: FloatArray, length: int) -> WindowSolutions:
     """Least squares over every `length` successive rows of X (m, p) and y (m,), p being small.
 
     Rows that are not finite take up room in a window and count for nothing; a column that is zero
@@ -58,25 +60,25 @@ def slide(X: FloatArray, y: FloatArray, length: int) -> Slid:
     the least.
     """
     p = X.shape[1]
-    stacks, still = no_rows(length, p), np.zeros(len(y))
+    state, still = empty_window(length, p), np.zeros(len(y))
     values: list[FloatArray] = [np.empty((0, p))]
     conditions: list[FloatArray] = [np.empty(0)]
-    for start in range(0, len(y), CHUNK):
-        chunk = slice(start, start + CHUNK)
-        found, tallies = push(stacks, X[chunk], y[chunk], still[chunk])
+    for start in range(0, len(y), CHUNK_ROWS):
+        chunk = slice(start, start + CHUNK_ROWS)
+        found, tallies = push_rows(state, X[chunk], y[chunk], still[chunk])
         kept = found.inflations > 0
         enough = np.isfinite(found.conditions) & (tallies[:, 0] >= kept.sum(axis=0))
         values.append(np.where(kept & enough, found.values, np.nan).T)
         conditions.append(np.where(enough, found.conditions, np.inf))
-    return Slid(np.concatenate(values), np.concatenate(conditions))
+    return WindowSolutions(np.concatenate(values), np.concatenate(conditions))
 
 
-def no_rows(length: int, p: int) -> Stacks:
+def empty_window(length: int, p: int) -> WindowState:
     """For windows of `length` rows of `p` regressors; `ValueError` unless there is a row."""
     if length < 1:
         raise ValueError(f"a window has one row at the least, not {length}")
-    nothing = np.array([NOTHING])
-    return Stacks(
+    nothing = np.array([EMPTY_TALLY])
+    return WindowState(
         np.zeros(1, np.int64),
         np.zeros((length, p + 1)),
         np.zeros((length, p, p + 1)),
@@ -87,7 +89,9 @@ def no_rows(length: int, p: int) -> Stacks:
     )
 
 
-def push(stacks: Stacks, X: FloatArray, y: FloatArray, excitation: FloatArray) -> Unjudged:
+def push_rows(
+    state: WindowState, X: FloatArray, y: FloatArray, excitation: FloatArray
+) -> RawWindows:
     """The windows that end in the next rows X (m, p), y (m,) and excitation (m,).
 
     However the rows are parted into chunks, the windows are the same.
@@ -95,16 +99,16 @@ def push(stacks: Stacks, X: FloatArray, y: FloatArray, excitation: FloatArray) -
     rows = np.column_stack((X, y)).astype(np.float64, copy=False)
     unknown = ~np.isfinite(rows).all(axis=1)
     tallies = np.column_stack((np.ones(len(y)), excitation, excitation))
-    rows[unknown], tallies[unknown] = 0.0, NOTHING
-    length, before = len(stacks.block), int(stacks.seen[0])
+    rows[unknown], tallies[unknown] = 0.0, EMPTY_TALLY
+    length, before = len(state.block), int(state.seen[0])
     k = max(0, before + len(y) - length + 1) - max(0, before - length + 1)
-    window = Unjudged(no_solutions(k, X.shape[1]), np.tile(NOTHING, (k, 1)))
-    _push(stacks, rows, tallies, window)
+    window = RawWindows(allocate_solutions(k, X.shape[1]), np.tile(EMPTY_TALLY, (k, 1)))
+    _push_rows(state, rows, tallies, window)
     return window
 
 
 @compiled
-def rotate_in(factor: FloatArray, rows: FloatArray, t: int) -> None:
+def rotate_row(factor: FloatArray, rows: FloatArray, t: int) -> None:
     """Row t of [X y] into a factor [R Q'y], by Givens' rotations; the row is used up."""
     p = len(factor)
     for j in range(p):
@@ -121,64 +125,66 @@ def rotate_in(factor: FloatArray, rows: FloatArray, t: int) -> None:
 
 
 @compiled
-def rotate_all(factor: FloatArray, rows: FloatArray) -> None:
+def rotate_rows(factor: FloatArray, rows: FloatArray) -> None:
     """Rows [X y] (m, p + 1) into a factor [R Q'y] (p, p + 1); they are used up."""
     for t in range(len(rows)):
-        rotate_in(factor, rows, t)
+        rotate_row(factor, rows, t)
 
 
 @compiled
-def _push(stacks: Stacks, rows: FloatArray, tallies: FloatArray, window: Unjudged) -> None:
+def _push_rows(
+    state: WindowState, rows: FloatArray, tallies: FloatArray, window: RawWindows
+) -> None:
     """Rows (m, p + 1), used up, and their tallies (m, 3) onto the stacks."""
-    length, p, _ = stacks.older.shape
-    factors, others = np.zeros((p, p + 1, ABREAST)), np.empty((p, p + 1, ABREAST))
+    length, p, _ = state.older.shape
+    factors, others = np.zeros((p, p + 1, BATCH_SIZE)), np.empty((p, p + 1, BATCH_SIZE))
     first = waiting = 0
     for t in range(len(rows)):
-        at = stacks.seen[0] % length
-        if at == 0 and stacks.seen[0] > 0:
-            _turn_over(stacks)
+        at = state.seen[0] % length
+        if at == 0 and state.seen[0] > 0:
+            _turn_over(state)
         for j in range(p + 1):
-            stacks.block[at, j] = rows[t, j]
-        _count_in(stacks.block_tally, at, tallies, t)
-        rotate_in(stacks.newer, rows, t)
-        _count_in(stacks.newer_tally, 0, tallies, t)
-        stacks.seen[0] += 1
-        if stacks.seen[0] < length:
+            state.block[at, j] = rows[t, j]
+        _count_in(state.block_tally, at, tallies, t)
+        rotate_row(state.newer, rows, t)
+        _count_in(state.newer_tally, 0, tallies, t)
+        state.seen[0] += 1
+        if state.seen[0] < length:
             continue
         suffix = (at + 1) % length  # none is left of a whole block:
         held = 1.0 if suffix else 0.0
         for i in range(p):
             for j in range(i, p + 1):
-                factors[i, j, waiting] = stacks.newer[i, j]
-                others[i, j, waiting] = held * stacks.older[suffix, i, j]
-        _count_in(window.tallies, first + waiting, stacks.newer_tally, 0)
+                factors[i, j, waiting] = state.newer[i, j]
+                others[i, j, waiting] = held * state.older[suffix, i, j]
+        _count_in(window.tallies, first + waiting, state.newer_tally, 0)
         if suffix:
-            _count_in(window.tallies, first + waiting, stacks.older_tally, suffix)
+            _count_in(window.tallies, first + waiting, state.older_tally, suffix)
         waiting += 1
-        if waiting == ABREAST or t + 1 == len(rows):
-            merge(factors, others, waiting)
+        if waiting == BATCH_SIZE or t + 1 == len(rows):
+            merge_factors(factors, others, waiting)
             solve(factors, waiting, first, window.solutions)
             first, waiting = first + waiting, 0
 
 
 @compiled
-def _turn_over(stacks: Stacks) -> None:
+def _turn_over(state: WindowState) -> None:
     """The block is full: its suffixes, and an empty one in its place."""
-    length, p, _ = stacks.older.shape
-    newer, tally = stacks.newer, stacks.newer_tally
+    length, p, _ = state.older.shape
+    newer, tally = state.newer, state.newer_tally
     newer[:] = 0.0
-    tally[0, 0], tally[0, 1], tally[0, 2] = NOTHING
+    tally[0, 0], tally[0, 1], tally[0, 2] = EMPTY_TALLY
     for t in range(length - 1, -1, -1):
-        rotate_in(newer, stacks.block, t)
-        _count_in(tally, 0, stacks.block_tally, t)
+        rotate_row(newer, state.block, t)
+        _count_in(tally, 0, state.block_tally, t)
         for i in range(p):
             for j in range(i, p + 1):
-                stacks.older[t, i, j] = newer[i, j]
+                state.older[t, i, j] = newer[i, j]
         for j in range(3):
-            stacks.older_tally[t, j] = tally[0, j]
-            stacks.block_tally[t, j] = NOTHING[j]
+            state.older_tally[t, j] = tally[0, j]
+            state.block_tally[t, j] = EMPTY_TALLY[j]
     newer[:] = 0.0
-    tally[0, 0], tally[0, 1], tally[0, 2] = NOTHING
+    tally[0, 0], tally[0, 1], tally[0, 2] = EMPTY_TALLY
 
 
 @compiled

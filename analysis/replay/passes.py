@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.regression.coefficients import WholeTrialRegression
-from analysis.regression.first_model import BARE
-from analysis.regression.sliding import least_window_secs
+from analysis.regression.first_model import SPEED_PROPORTIONAL_RUDDER
+from analysis.regression.sliding import min_window_secs
 from analysis.regression.weak_form import WeakForm
 from analysis.signals.hold import InputHold
 from analysis.signals.signal_stats import SignalStats, SignalStatsCollector
@@ -122,7 +122,10 @@ def second_pass(
         Where an output has too few samples.
     """
     log_stats, clock = first.log_stats, first.clock
-    alphas, window_secs = vessel.coefficients or BARE, vessel.identifier.window_secs
+    alphas, window_secs = (
+        vessel.coefficients or SPEED_PROPORTIONAL_RUDDER,
+        vessel.identifier.window_secs,
+    )
     checks = RudderSignCheck(log_stats), GyroBiasCheck(log_stats)
     hold, collector = InputHold(clock), SignalStatsCollector(alphas)
     expected = [clock.channels[name].valid_interval_secs / clock.dt_secs for name in PAPER_OUTPUTS]
@@ -226,8 +229,8 @@ class _Equations:
         """Warn of windows longer than the log, or too short for the number of coefficients."""
         window = f"identifier.window_secs = {self._window_secs:g}"
         least = {
-            "yaw": least_window_secs(self._weak_form.yaw),
-            "surge": least_window_secs(self._weak_form.surge),
+            "yaw": min_window_secs(self._weak_form.yaw),
+            "surge": min_window_secs(self._weak_form.surge),
         }
         if self._window_secs > self._log_secs:
             long_enough = self._log_secs > max(*least.values(), MIN_WINDOW_SECS)

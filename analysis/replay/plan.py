@@ -15,7 +15,7 @@ from analysis.filters.noise_model import NoiseModel
 from analysis.filters.settings_check import check_filter_settings, unused_setting_warnings
 from analysis.filters.tuning import noise_of, wave_in
 from analysis.regression.first_model import fit_first_model
-from analysis.regression.sliding import Solution
+from analysis.regression.sliding import RegressionSolution
 from analysis.signals.signal_stats import SignalStats
 from shiplog import Vessel
 from shiplog.checks.channel_stats import LogStats
@@ -73,8 +73,8 @@ class Plan:
     stats: SignalStats
     noise: NoiseModel
     disturbance_settings: DisturbanceSettings
-    yaw_solution: Solution
-    surge_solution: Solution
+    yaw_solution: RegressionSolution
+    surge_solution: RegressionSolution
     warnings: tuple[str, ...]
 
     @property

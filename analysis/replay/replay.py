@@ -17,7 +17,7 @@ from analysis.filters.factory import smoothable
 from analysis.filters.smoother import Adjoint, SmoothingPass, smoothed
 from analysis.regression.changes import Change, ShipChangeTest
 from analysis.regression.coefficients import CoefficientFit, CoefficientStage
-from analysis.regression.sliding import History
+from analysis.regression.sliding import CoefficientHistory
 from analysis.signals.concat import concatenate
 from analysis.signals.hold import InputHold, held_throughout
 from shiplog import LogError, Signals, Vessel, open_log
@@ -56,8 +56,8 @@ class ReplayChunk:
     signals: Signals
     estimates: Estimates
     disturbance: Disturbance
-    yaw_history: History
-    surge_history: History
+    yaw_history: CoefficientHistory
+    surge_history: CoefficientHistory
     track: Track
 
 
@@ -113,8 +113,8 @@ class Analysis:
     signals: Signals
     estimates: Estimates
     disturbance: Disturbance
-    yaw_history: History
-    surge_history: History
+    yaw_history: CoefficientHistory
+    surge_history: CoefficientHistory
     track: Track
 
     def as_chunk(self) -> ReplayChunk:

@@ -149,7 +149,7 @@ def _coefficients(fit: CoefficientFit) -> JsonObject:
 
 
 def _change(change: Change) -> JsonObject:
-    return asdict(change) | {"instead": list(change.instead)}
+    return asdict(change) | {"alternatives": list(change.alternatives)}
 
 
 def _windows(fit: CoefficientFit) -> JsonObject:

@@ -180,7 +180,9 @@ def _change_tables(findings: Findings) -> tuple[TextTable, ...]:
             f"{change.at_secs:.0f} s",
             f"{change.before:.3g} ± {BAND_STDS * change.before_std:.2g}",
             f"{change.after:.3g} ± {BAND_STDS * change.after_std:.2g}",
-            change.by.removeprefix("by ").replace(" %", "", 1) if isfinite(change.share) else "",
+            change.description.removeprefix("by ").replace(" %", "", 1)
+            if isfinite(change.relative_change)
+            else "",
         )
         for change in findings.changes
     )
@@ -191,10 +193,10 @@ def _change_tables(findings: Findings) -> tuple[TextTable, ...]:
     )
     remarks = [explanation]
     remarks += [
-        f"At {change.at_secs:.0f} s {' or '.join(change.instead)} may have changed instead of "
+        f"At {change.at_secs:.0f} s {' or '.join(change.alternatives)} may have changed instead of "
         f"{change.name}: the data do not show which."
         for change in findings.changes
-        if change.instead
+        if change.alternatives
     ]
     columns = ("coefficient", "at", "before", "after", "difference")
     return (TextTable("Changes within the trial", columns, rows, tuple(remarks)),)

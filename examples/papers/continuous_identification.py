@@ -31,8 +31,8 @@ from analysis.identification.comparison.paper_scheme import (
     solve_window,
     window_coefficients,
 )
-from analysis.regression.coefficients import identify
-from analysis.regression.sliding import History
+from analysis.regression.coefficients import fit_coefficients
+from analysis.regression.sliding import CoefficientHistory
 from analysis.regression.weak_form import weak_form
 from recorders.simulated.manoeuvres import manoeuvre
 from recorders.simulated.sensors import suite
@@ -196,12 +196,12 @@ def percent(found: FloatArray, true: FloatArray) -> FloatArray:
     return 100 * (found / true - 1)
 
 
-def in_weak_form(signals: Signals, c: Coefficients) -> tuple[FloatArray, list[History]]:
+def in_weak_form(signals: Signals, c: Coefficients) -> tuple[FloatArray, list[CoefficientHistory]]:
     """Shiplog's coefficients of the whole run, (9,), and their histories of yaw and surge."""
     values: list[float] = []
     histories = []
     for rows in weak_form(signals, c):
-        found, history = identify(rows)
+        found, history = fit_coefficients(rows)
         values += [found.coefficients[name].value for name in rows.equation.names]
         histories.append(history)
     return np.array(values), histories

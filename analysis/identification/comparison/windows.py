@@ -4,8 +4,8 @@ import numpy as np
 
 from analysis.identification.fit.output_error import OutputError
 from analysis.identification.fit.segment import Segment
-from analysis.regression.coefficients import identify
-from analysis.regression.sliding import History
+from analysis.regression.coefficients import fit_coefficients
+from analysis.regression.sliding import CoefficientHistory
 from analysis.regression.weak_form import CHANNELS, weak_form
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.ships.paper import Coefficients
@@ -53,7 +53,7 @@ def _segment_history(
     segment: Segment, model: Coefficients, start: float, names: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return instants, values and standard deviations of one segment: (k,), (k, p), (k, p)."""
-    yaw, surge = (identify(rows)[1] for rows in weak_form(segment.signals, model))
+    yaw, surge = (fit_coefficients(rows)[1] for rows in weak_form(segment.signals, model))
     columns = [_column(yaw if name in yaw.names else surge, name) for name in names]
     return (
         start + yaw.time_secs,
@@ -62,6 +62,6 @@ def _segment_history(
     )
 
 
-def _column(history: History, name: str) -> tuple[FloatArray, FloatArray]:
+def _column(history: CoefficientHistory, name: str) -> tuple[FloatArray, FloatArray]:
     i = history.names.index(name)
     return history.values[:, i], history.stds[:, i]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.regression.sliding import Regression
+from analysis.regression.sliding import RegressionAccumulator
 from analysis.regression.weak_form import CHANNELS, Equation, Rows, weak_form
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.ships.paper import Coefficients
@@ -77,11 +77,11 @@ def _solve(rows: Sequence[Rows], forms: tuple[tuple[str, ...], ...]) -> dict[str
     if not rows:
         return {}
     equation: Equation = rows[0].equation
-    regression = Regression(equation)
+    regression = RegressionAccumulator(equation)
     for part in rows:
         regression.add(part)
     for names in forms:
         solution = regression.solve(names)
-        if solution.told.all():
+        if solution.determined.all():
             return dict(zip(names, solution.values.tolist(), strict=True))
     return {}

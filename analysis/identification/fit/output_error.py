@@ -18,7 +18,7 @@ from math import radians
 
 import numpy as np
 
-from analysis.regression.weak_form import LEAST_RUDDER
+from analysis.regression.weak_form import MIN_RUDDER_RANGE
 from shiplog.errors import LogError, UsageError
 from shiplog.ships import Model
 from shiplog.ships.motion import MODEL_OUTPUTS
@@ -160,7 +160,7 @@ def make_problem(
 
 def _require_steering(segments: Sequence[Segment]) -> None:
     range_rad = max(float(np.ptp(segment.signals["rudder"])) for segment in segments)
-    if range_rad < LEAST_RUDDER:
+    if range_rad < MIN_RUDDER_RANGE:
         raise LogError(
             f"the rudder moves by {np.degrees(range_rad):.1f}° in all, too little to identify a "
             f"ship; give a log of a zig-zag or of a turning circle: {_names(segments)}"

@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
-from analysis.regression.newey_west import few_rows
+from analysis.regression.newey_west import small_sample_factor
 from shiplog.types import FloatArray
 
 from .agreement import Agreement, assess_agreement
@@ -213,7 +213,7 @@ def _sandwich(fit: OutputError, residual: Sequence[FloatArray], inverse: FloatAr
         windows = ends - starts
         at = problem.unknown_indices(i)
         middle[np.ix_(at, at)] += (
-            float(few_rows(window / len(scores))) ** 2 * (windows.T @ windows) / window
+            float(small_sample_factor(window / len(scores))) ** 2 * (windows.T @ windows) / window
         )
     return np.asarray(inverse @ middle @ inverse)
 

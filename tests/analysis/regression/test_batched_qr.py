@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.regression.batched_qr import solve_one
+from analysis.regression.batched_qr import solve_single
 from shiplog.types import FloatArray
 
 
@@ -34,13 +34,13 @@ def test_the_condition_is_numpys(values: list[float]) -> None:
         X = with_singular_values(values, seed)
         scaled = X / np.linalg.norm(X, axis=0)
         expected = np.linalg.cond(scaled)
-        found = solve_one(factor_of(X, X[:, 0])).conditions[0]
+        found = solve_single(factor_of(X, X[:, 0])).conditions[0]
         assert found == pytest.approx(expected, rel=4e-15 * expected)
 
 
 def test_orthogonal_columns_are_of_condition_one_whatever_their_lengths() -> None:
     X = np.eye(8, 5) * [1e-9, 1.0, 3.0, 1e12, 7.0]
-    found = solve_one(factor_of(X, X.sum(axis=1)))
+    found = solve_single(factor_of(X, X.sum(axis=1)))
     assert found.conditions[0] == pytest.approx(1.0, rel=1e-15)
     assert found.values[:, 0] == pytest.approx(np.ones(5), rel=1e-15)
     assert found.inflations[:, 0] == pytest.approx(np.ones(5), rel=1e-15)
@@ -50,7 +50,7 @@ def test_inverse_and_inflation_are_those_of_the_normal_equations() -> None:
     rng = np.random.default_rng(0)
     X = rng.standard_normal((40, 4)) * [1.0, 10.0, 0.1, 3.0]
     X[:, 3] += X[:, 1]
-    found = solve_one(factor_of(X, X[:, 0]))
+    found = solve_single(factor_of(X, X[:, 0]))
     inverse = np.linalg.inv(X.T @ X)
     assert found.inverses[:, :, 0] == pytest.approx(inverse, rel=1e-10, abs=1e-15)
     inflations = np.sqrt(np.diag(inverse)) * np.linalg.norm(X, axis=0)
@@ -58,7 +58,7 @@ def test_inverse_and_inflation_are_those_of_the_normal_equations() -> None:
 
 
 def test_of_nothing_but_zeros_nothing_is_told() -> None:
-    found = solve_one(np.zeros((3, 4)))
+    found = solve_single(np.zeros((3, 4)))
     assert np.isinf(found.conditions[0])
     assert not found.inflations.any()
     assert not found.inverses.any()

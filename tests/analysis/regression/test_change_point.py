@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from analysis.regression.change_point import (
-    STRADDLE,
-    TRIM,
+    GUARD_SHARE,
+    MIN_INFORMATION_SHARE,
     Blocks,
     best_change,
     changed,
@@ -39,7 +39,7 @@ def blocks_of(X: FloatArray, y: FloatArray) -> Blocks:
         tallies=np.array([[len(b), x[:, 0].min(), x[:, 0].max()] for x, b in parts]),
         edges_secs=np.arange(len(parts) + 1) * float(SIZE),
         equation=Equation(("a", "d"), 1.0, float(OVERLAP)),
-        least_excitation=0.0,
+        min_excitation=0.0,
         least_share=0.0,
         run=OVERLAP // SIZE,
     )
@@ -77,7 +77,7 @@ def brute_instant(X: FloatArray, y: FloatArray, column: int) -> int:
     left = {}
     for at in range(1, len(y) // SIZE):
         share = weight[at * SIZE - 1] / weight[-1]
-        if TRIM <= share <= 1 - TRIM:
+        if MIN_INFORMATION_SHARE <= share <= 1 - MIN_INFORMATION_SHARE:
             after = X[:, column] * (np.arange(len(y)) >= at * SIZE)
             every = np.column_stack((X, after))
             residual = y - every @ np.linalg.lstsq(every, y)[0]
@@ -98,7 +98,7 @@ def test_values_errors_and_chances_are_those_of_the_rows_themselves() -> None:
     X, y = regression(3, 0.3)
     found = best_change(blocks_of(X, y), (0,))
     assert found is not None
-    clear = int(np.ceil(STRADDLE * OVERLAP / SIZE)) * SIZE
+    clear = int(np.ceil(GUARD_SHARE * OVERLAP / SIZE)) * SIZE
     block = np.arange(len(y))
     kept = (block < found.at * SIZE - clear) | (block >= found.at * SIZE + clear)
     every = np.column_stack((X, X[:, 0] * (block >= found.at * SIZE)))
@@ -142,6 +142,6 @@ def test_a_side_on_which_nothing_moves_tells_nothing() -> None:
     X, y = regression(1, 0.4)
     still = blocks_of(X, y)
     still.tallies[: len(still.tallies) // 2, 1:] = 1.0
-    moving = best_change(still._replace(least_excitation=0.1), (0,))
+    moving = best_change(still._replace(min_excitation=0.1), (0,))
     assert moving is not None
     assert moving.at > len(still.tallies) // 2

@@ -4,8 +4,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from analysis.regression.changes import MOST_BLOCKS, Change, ChangeTest, ShipChangeTest
-from analysis.regression.first_model import BARE
+from analysis.regression.changes import MAX_BLOCKS, Change, ChangeTest, ShipChangeTest
+from analysis.regression.first_model import SPEED_PROPORTIONAL_RUDDER
 from analysis.regression.weak_form import (
     CHANNELS,
     Equation,
@@ -52,8 +52,10 @@ def test_a_fifth_more_or_less_is_found_in_time_with_its_size(
         changes = told(halfway(case, name, factor, seed), case)
         (found,) = [change for change in changes if change.name == name]
         assert abs(found.at_secs - 600) < 100
-        assert abs(found.share - (factor - 1)) < max(1.5 * found.share_half, 0.01)
-        assert abs(found.after / found.before - 1) == pytest.approx(abs(found.share))
+        assert abs(found.relative_change - (factor - 1)) < max(
+            1.5 * found.relative_change_half_width, 0.01
+        )
+        assert abs(found.after / found.before - 1) == pytest.approx(abs(found.relative_change))
         assert (found.from_secs, found.until_secs) == pytest.approx((30, 1170), abs=2)
 
 
@@ -83,16 +85,16 @@ def test_two_coefficients_that_change_together_are_both_told(vessel: Vessel) -> 
     )  # fmt: skip
     changes = {change.name: change for change in told(log, replace(ZIGZAG, noise="white"))}
     assert set(changes) == {"a", "d"}
-    assert changes["a"].share == pytest.approx(0.2, abs=0.02)
-    assert changes["d"].share == pytest.approx(-0.2, abs=0.02)
+    assert changes["a"].relative_change == pytest.approx(0.2, abs=0.02)
+    assert changes["d"].relative_change == pytest.approx(-0.2, abs=0.02)
 
 
 def test_where_several_could_have_changed_all_are_named() -> None:
     """In a 10/10 zig-zag the yaw rate is always as large: f does what h does."""
     case = replace(ZIGZAG, manoeuvre="zigzag-10-10")
     (found,) = told(halfway(case, "f", 0.8, seed=0), case)
-    assert "f" in (found.name, *found.instead)
-    assert found.instead
+    assert "f" in (found.name, *found.alternatives)
+    assert found.alternatives
     assert "in its place" in str(found)
 
 
@@ -119,7 +121,7 @@ def test_what_comes_and_goes_is_told_twice() -> None:
     found = watched(made({1000: 1.5, 2000: 1.0}))
     assert [change.name for change in found] == ["a", "a"]
     assert [change.at_secs for change in found] == pytest.approx([1005, 2005], abs=20)
-    assert [change.share for change in found] == pytest.approx([0.5, -1 / 3], abs=0.07)
+    assert [change.relative_change for change in found] == pytest.approx([0.5, -1 / 3], abs=0.07)
     assert found[0].until_secs < found[1].at_secs
     assert found[1].from_secs > found[0].at_secs
 
@@ -138,7 +140,7 @@ def test_rows_in_a_gap_belong_to_no_side() -> None:
     rows.target[1400:1600] = np.nan
     (found,) = watched(rows)
     assert abs(found.at_secs - 1505) < 130
-    assert found.share == pytest.approx(0.3, abs=0.06)
+    assert found.relative_change == pytest.approx(0.3, abs=0.06)
 
 
 def test_less_than_a_hundredth_is_not_worth_telling() -> None:
@@ -151,7 +153,7 @@ def test_less_than_a_hundredth_is_not_worth_telling() -> None:
 def test_of_a_month_no_more_is_kept_than_of_a_day() -> None:
     yaw = Equation(("a", "b1", "b2", "b3", "d", "e", "constant"), 1.0, 60.0)
     watch = ChangeTest(yaw, 31 * 86400)
-    assert len(watch._factors) <= MOST_BLOCKS
+    assert len(watch._factors) <= MAX_BLOCKS
     assert ChangeTest(yaw, 0).result() == ()
 
 
@@ -177,7 +179,7 @@ def test_a_replay_tells_of_it_in_words_in_a_table_and_in_numbers(changed: Analys
     assert section.title in replay_markdown(changed.findings)
     (summary,) = replay_json(changed.findings)["changes"]
     assert summary["at_secs"] == change.at_secs
-    assert summary["share"] == pytest.approx(-0.2, abs=0.01)
+    assert summary["relative_change"] == pytest.approx(-0.2, abs=0.01)
 
 
 def test_its_levels_are_drawn_and_meet_at_the_change(changed: Analysis) -> None:
@@ -209,5 +211,5 @@ def test_the_ship_is_watched_as_its_two_equations_are(vessel: Vessel) -> None:
     yaw, surge = weak_form(signals, vessel.coefficients)
     found = watched(with_constant(yaw)) + watched(surge)
     assert found == told(log, ZIGZAG)
-    equations = WeakForm(BARE, len(signals), signals.dt_secs, (1, 1, 1, 1))
+    equations = WeakForm(SPEED_PROPORTIONAL_RUDDER, len(signals), signals.dt_secs, (1, 1, 1, 1))
     assert ShipChangeTest(equations, guessed=True).result() == ()

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from analysis.regression.coefficients import WholeTrialRegression
-from analysis.regression.first_model import BARE, fit_first_model
+from analysis.regression.first_model import SPEED_PROPORTIONAL_RUDDER, fit_first_model
 from analysis.regression.weak_form import weak_form
 from analysis.signals.signal_stats import signal_stats
 from recorders.simulated.sensors import suite
@@ -19,14 +19,14 @@ def sailed(vessel: Vessel, manoeuvre: str, duration: float, **settings: float) -
 
 
 def fitted(signals: Signals, name: str) -> Vessel:
-    yaw_rows, surge_rows = weak_form(signals, BARE)
+    yaw_rows, surge_rows = weak_form(signals, SPEED_PROPORTIONAL_RUDDER)
     yaw, surge = (
         WholeTrialRegression(yaw_rows.equation, constant=True),
         WholeTrialRegression(surge_rows.equation),
     )
     yaw.add(yaw_rows)
     surge.add(surge_rows)
-    return fit_first_model(yaw, surge, signal_stats(signals, BARE), name)
+    return fit_first_model(yaw, surge, signal_stats(signals, SPEED_PROPORTIONAL_RUDDER), name)
 
 
 def test_a_ship_that_obeys_the_first_model_is_found(vessel: Vessel) -> None:

@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
 
-from analysis.regression.newey_west import add_runs, no_runs, variances, window_variances
+from analysis.regression.newey_west import (
+    add_rows,
+    empty_sums,
+    newey_west_variances,
+    window_variances,
+)
 from shiplog.types import FloatArray
 
 
@@ -27,9 +32,9 @@ def rows_of(seed: int, n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 def test_runs_and_windows_are_the_textbooks_sandwich(overlap: int) -> None:
     rows, values, inverse = rows_of(0, 60)
     expected = sandwich(rows, values, inverse, overlap)
-    runs = no_runs(overlap, 3)
-    add_runs(runs, rows, 0, values, inverse)
-    assert variances(runs, len(rows)) == pytest.approx(expected, rel=1e-10)
+    runs = empty_sums(overlap, 3)
+    add_rows(runs, rows, 0, values, inverse)
+    assert newey_west_variances(runs, len(rows)) == pytest.approx(expected, rel=1e-10)
     spans = np.array([[0, 60], [0, 60], [5, 30]])
     found = window_variances(
         rows.T.copy(),
@@ -46,11 +51,11 @@ def test_runs_and_windows_are_the_textbooks_sandwich(overlap: int) -> None:
 
 def test_how_the_rows_are_parted_changes_no_bit() -> None:
     rows, values, inverse = rows_of(1, 200)
-    whole, parted = no_runs(30, 3), no_runs(30, 3)
-    add_runs(whole, rows, 0, values, inverse)
+    whole, parted = empty_sums(30, 3), empty_sums(30, 3)
+    add_rows(whole, rows, 0, values, inverse)
     count = 0
     for part in np.split(rows, [0, 1, 17, 18, 99, 140]):
-        add_runs(parted, part, count, values, inverse)
+        add_rows(parted, part, count, values, inverse)
         count += len(part)
-        variances(parted, count)  # asked for between, it disturbs nothing
-    assert (variances(whole, 200) == variances(parted, 200)).all()
+        newey_west_variances(parted, count)  # asked for between, it disturbs nothing
+    assert (newey_west_variances(whole, 200) == newey_west_variances(parted, 200)).all()

@@ -3,14 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.regression.coefficients import Coefficient, identify
+from analysis.regression.coefficients import Coefficient, fit_coefficients
 from analysis.regression.sliding import (
-    WORST_CONDITION,
-    Errors,
-    History,
-    Regression,
-    Windows,
-    fit,
+    MAX_CONDITION,
+    CoefficientHistory,
+    RegressionAccumulator,
+    StandardErrorAccumulator,
+    WindowedRegression,
+    fit_regression,
 )
 from analysis.regression.weak_form import Equation, Rows, weak_form
 from analysis.signals.concat import concatenate
@@ -37,7 +37,7 @@ def off(vessel: Vessel, name: str, value: float) -> float:
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "zigzag-10-10", "pseudo-random"])
 def test_from_clean_data_the_coefficients_come_back(vessel: Vessel, manoeuvre: str) -> None:
     for rows in rows_of(vessel, manoeuvre):
-        for name, found in identify(rows)[0].coefficients.items():
+        for name, found in fit_coefficients(rows)[0].coefficients.items():
             assert off(vessel, name, found.value) < 1e-3, name
 
 
@@ -50,7 +50,7 @@ def test_under_the_papers_noise_the_errors_are_those_of_the_weak_form(
     vessel: Vessel, name: str, percent: float
 ) -> None:
     yaw, surge = rows_of(vessel, noise="paper")
-    found = identify(yaw)[0].coefficients | identify(surge)[0].coefficients
+    found = fit_coefficients(yaw)[0].coefficients | fit_coefficients(surge)[0].coefficients
     assert 100 * off(vessel, name, found[name].value) < percent
     assert abs(found[name].value - getattr(vessel.coefficients, name)) < 4 * found[name].std
 
@@ -64,12 +64,15 @@ def test_nothing_of_the_assumed_model_comes_back(vessel: Vessel) -> None:
     for right_rows, wrong_rows in zip(
         weak_form(signals, c), weak_form(signals, wrong), strict=True
     ):
-        assert identify(right_rows)[0].coefficients == identify(wrong_rows)[0].coefficients
+        assert (
+            fit_coefficients(right_rows)[0].coefficients
+            == fit_coefficients(wrong_rows)[0].coefficients
+        )
 
 
 def test_a_window_is_the_same_regression_as_numpys_on_its_rows(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, "pseudo-random", noise="paper")
-    history = identify(yaw)[1]
+    history = fit_coefficients(yaw)[1]
     k = 120
     inside = (yaw.centres_secs + 30 <= history.time_secs[k] + 1e-6) & (
         yaw.centres_secs - 30 >= history.time_secs[k] - 200 - 1e-6
@@ -82,21 +85,21 @@ def test_a_window_is_the_same_regression_as_numpys_on_its_rows(vessel: Vessel) -
 
 def test_histories_end_where_the_windows_do(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
-    history = identify(yaw, window_secs=150.0)[1]
+    history = fit_coefficients(yaw, window_secs=150.0)[1]
     assert history.time_secs[0] == pytest.approx(150.0)
     assert history.time_secs[-1] == pytest.approx(500.0, abs=1.0)
 
 
 def test_a_trial_shorter_than_the_window_is_one_window(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, duration=120.0)
-    assert identify(yaw)[1].values.shape == (1, 6)
+    assert fit_coefficients(yaw)[1].values.shape == (1, 6)
 
 
 def test_a_column_of_zeros_is_dropped_and_has_no_value(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
     regressors = yaw.regressors.copy()
     regressors[:, 5] = 0
-    found = fit(replace(yaw, regressors=regressors))
+    found = fit_regression(replace(yaw, regressors=regressors))
     assert np.isnan(found.values[5])
     assert np.isnan(found.stds[5])
     assert np.isfinite(found.values[:5]).all()
@@ -106,8 +109,8 @@ def test_windows_that_cannot_tell_are_blank(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
     twins = yaw.regressors.copy()
     twins[:, 3] = twins[:, 2] * (1 + 1e-9)
-    found, history = identify(replace(yaw, regressors=twins))
-    assert found.condition > WORST_CONDITION
+    found, history = fit_coefficients(replace(yaw, regressors=twins))
+    assert found.condition > MAX_CONDITION
     assert np.isnan(history.values).all()
     assert all(not c.determined for c in found.coefficients.values())
 
@@ -116,7 +119,7 @@ def test_missing_rows_are_left_out(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
     target = yaw.target.copy()
     target[100:140] = np.nan
-    for name, found in identify(replace(yaw, target=target))[0].coefficients.items():
+    for name, found in fit_coefficients(replace(yaw, target=target))[0].coefficients.items():
         assert off(vessel, name, found.value) < 1e-3
 
 
@@ -141,9 +144,9 @@ def test_windows_of_rows_in_chunks_are_those_of_the_whole_to_the_last_bit(
 ) -> None:
     for rows in rows_of(vessel, "pseudo-random", "paper"):
         holed = with_gaps(rows)
-        windows = Windows(holed.equation, len(holed.target))
+        windows = WindowedRegression(holed.equation, len(holed.target))
         found = concatenate([windows.step(chunk) for chunk in parted(holed, seed)])
-        expected = identify(holed)[1]
+        expected = fit_coefficients(holed)[1]
         assert np.isfinite(expected.stds).any()
         for name in ("time_secs", "values", "stds", "conditions"):
             np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
@@ -155,13 +158,13 @@ def test_a_fit_of_rows_in_chunks_is_that_of_the_whole_to_the_last_bit(
 ) -> None:
     for rows in rows_of(vessel, "pseudo-random", "paper"):
         holed = with_gaps(rows)
-        regression = Regression(holed.equation)
+        regression = RegressionAccumulator(holed.equation)
         for chunk in parted(holed, seed):
             regression.add(chunk)
-        errors = Errors(regression.solve())
+        errors = StandardErrorAccumulator(regression.solve())
         for chunk in parted(holed, seed + 10):
             errors.add(chunk)
-        found, expected = errors.result(), fit(holed)
+        found, expected = errors.result(), fit_regression(holed)
         assert (found.values == expected.values).all()
         assert (found.stds == expected.stds).all()
         assert found.condition == expected.condition
@@ -169,18 +172,20 @@ def test_a_fit_of_rows_in_chunks_is_that_of_the_whole_to_the_last_bit(
 
 def test_one_pass_gives_the_values_of_fewer_regressors_too(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, noise="paper")
-    regression = Regression(yaw.equation)
+    regression = RegressionAccumulator(yaw.equation)
     regression.add(yaw)
     kept = [0, 1, 4]
     found = regression.solve(tuple(yaw.equation.names[i] for i in kept))
     expected = np.linalg.lstsq(yaw.regressors[:, kept], yaw.target, rcond=1e-16)[0]
     assert found.values == pytest.approx(expected, rel=1e-9)
-    assert found.told.all()
+    assert found.determined.all()
 
 
 def test_windows_without_rows_are_none(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
-    history: History = Windows(yaw.equation, len(yaw.target)).step(yaw.part(0, 10))
+    history: CoefficientHistory = WindowedRegression(yaw.equation, len(yaw.target)).step(
+        yaw.part(0, 10)
+    )
     assert history.values.shape == history.stds.shape == (0, 6)
     assert history.time_secs.shape == history.conditions.shape == (0,)
 
@@ -196,7 +201,7 @@ def test_errors_allow_for_overlapping_rows() -> None:
         rows = Rows(
             Equation(("a", "d"), 1.0, float(overlap)), np.arange(float(n)), y, x, x[:, 0], 0.1
         )
-        found = fit(rows)
+        found = fit_regression(rows)
         slopes.append(found.values[0])
         claimed.append(found.stds[0])
         left = y - x @ found.values
@@ -217,7 +222,7 @@ def test_two_standard_deviations_hold_the_truth_as_often_as_they_say(
             trial = simulate(vessel, manoeuvre, duration_secs=500.0, seed=seed, sensors=sensors)
             signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
             yaw, surge = weak_form(signals, vessel.coefficients)
-            for found, history in (identify(yaw, constant=True), identify(surge)):
+            for found, history in (fit_coefficients(yaw, constant=True), fit_coefficients(surge)):
                 true = np.array([getattr(vessel.coefficients, n) for n in history.names])
                 for name, c in found.coefficients.items():
                     if np.isfinite(c.std):
@@ -232,7 +237,7 @@ def test_two_standard_deviations_hold_the_truth_as_often_as_they_say(
 
 def test_in_a_steady_turn_windows_are_blank_and_b1_b2_are_not_told(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, "turning-circle", "paper")
-    found, history = identify(yaw, constant=True)
+    found, history = fit_coefficients(yaw, constant=True)
     assert np.isnan(history.values).all()
     assert not found.coefficients["b1"].determined
     assert not found.coefficients["b2"].determined
@@ -243,7 +248,7 @@ def test_a_straight_run_tells_nothing_of_yaw(vessel: Vessel) -> None:
     still = simulate(vessel, "turning-circle", duration_secs=10.0, sensors=suite("paper"))
     signals = resample(TrialLog("still", still.channels), channels=NAMES)
     yaw, _ = weak_form(signals, vessel.coefficients)
-    assert not any(c.determined for c in identify(yaw)[0].coefficients.values())
+    assert not any(c.determined for c in fit_coefficients(yaw)[0].coefficients.values())
 
 
 def test_a_coefficient_is_determined_two_standard_deviations_from_zero() -> None:

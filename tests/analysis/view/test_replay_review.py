@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 import shiplog
 from analysis.disturbance.observer import Disturbance
 from analysis.filters.base import Estimates
-from analysis.regression.sliding import History
+from analysis.regression.sliding import CoefficientHistory
 from analysis.replay.replay import Analysis, ReplayChunk, analyse
 from analysis.replay.track import EMPTY_TRACK
 from analysis.view.decimation import Decimator
@@ -366,7 +366,7 @@ def test_wild_windows_do_not_squeeze_a_coefficient(analysis: Analysis) -> None:
 
 def test_a_single_window_is_drawn_as_a_line(analysis: Analysis) -> None:
     history = analysis.yaw_history
-    only = History(
+    only = CoefficientHistory(
         history.names,
         history.time_secs[:1],
         history.values[:1],
@@ -386,7 +386,7 @@ def test_a_coefficient_that_no_window_determines_is_not_drawn(
     history = analysis.yaw_history
     values = history.values.copy()
     values[:, 1] = np.nan
-    empty = History(("f", "g", "h"), *(np.empty(s) for s in (0, (0, 3), (0, 3), 0)))
+    empty = CoefficientHistory(("f", "g", "h"), *(np.empty(s) for s in (0, (0, 3), (0, 3), 0)))
     some = replace(analysis, yaw_history=replace(history, values=values), surge_history=empty)
     names = [panel.name for panel in history_panels(some.findings, drawn_of(some))]
     assert names == [f"coefficient_{name}" for name in ("a", "b2", "b3", "d", "e")]

@@ -14,7 +14,7 @@ from analysis.identification.comparison.paper_scheme import (
     window_coefficients,
 )
 from analysis.identification.comparison.windows import window_estimates
-from analysis.regression.coefficients import identify
+from analysis.regression.coefficients import fit_coefficients
 from analysis.regression.weak_form import weak_form
 from shiplog import load_vessel
 
@@ -72,7 +72,7 @@ def test_windows_in_weak_form_are_those_of_a_replay(model: str) -> None:
     fit, _ = fitted(model, runs=2)
     found = window_estimates(fit)
     assert found is not None
-    yaw = identify(weak_form(a_trial().signals, PRIOR)[0])[1]
+    yaw = fit_coefficients(weak_form(a_trial().signals, PRIOR)[0])[1]
     first = len(yaw.time_secs)
     np.testing.assert_allclose(
         found.values[0, :first, found.names.index("d")], yaw.values[:, yaw.names.index("d")]
