@@ -74,7 +74,8 @@ class Change:
         )
         return (
             f"{self.name}{alternatives} differs before and after {self.at_secs:.0f} s "
-            f"{self.description}: the ship, her loading, the depth, the weather, or a model that does not hold for both"
+            f"{self.description}: the ship, her loading, the depth, the "
+            "weather, or a model that does not hold for both"
         )
 
 
