@@ -14,7 +14,20 @@ from math import pi
 
 import matplotlib.pyplot as plt
 import numpy as np
-from printed import AMBER, BLUE, GREEN, GREY, RED, Row, grid, number, page, picture, say, table
+from markdown_page import (
+    AMBER,
+    BLUE,
+    GREEN,
+    GREY,
+    RED,
+    Row,
+    comparison,
+    number,
+    paragraph,
+    picture,
+    start_page,
+    table,
+)
 from scipy.integrate import solve_ivp
 
 from analysis.design.pseudo_input_system import (
@@ -212,14 +225,14 @@ def in_weak_form(signals: Signals, c: Coefficients) -> tuple[FloatArray, list[Co
 
 def main() -> None:
     """Print the page and draw its pictures."""
-    page("Continuous identification: printed against computed")
-    say(
+    start_page("Continuous identification: printed against computed")
+    paragraph(
         "Ya. V. Burylin, *Continuous identification of nonlinear vessel movement model with"
         " estimator*. This page is made by\n\n"
         "    python examples/papers/continuous_identification.py"
         " > docs/papers_continuous_identification.md"
     )
-    say(
+    paragraph(
         "The paper has two tables, a covariance and four figures. The covariance comes out to"
         " every printed digit; Table 2 in part, and only of a run nearly free of noise. Of the"
         " figures the scan has the captions but not the curves, and the text prints neither the"
@@ -253,8 +266,8 @@ def table1() -> None:
         for name, x in rad._asdict().items()
     ]
     head = ("coefficient", "printed", "read in degrees (SI)", "read in radians (SI)")
-    grid("Table 1, the model's parameters", head, rows)
-    say("The paper does not say in what its angles are. Its numbers make two ships of it:")
+    table("Table 1, the model's parameters", head, rows)
+    paragraph("The paper does not say in what its angles are. Its numbers make two ships of it:")
     circles = []
     for name, preset in READINGS.items():
         vessel = vessel_of(preset)
@@ -264,11 +277,11 @@ def table1() -> None:
         kept = 100 * v[1] / steady_speed(vessel.coefficients, 80.0)
         wide = 2 * v[1] / (w[1] * DEG)
         circles.append((name, f"{w[1]:.3f} °/s", f"{wide:.0f} m", f"{kept:.0f} %"))
-    grid("", ("read in", "yaw rate at 35°, 80 rpm", "diameter", "speed kept"), circles)
+    table("", ("read in", "yaw rate at 35°, 80 rpm", "diameter", "speed kept"), circles)
     speeds = ", ".join(
         f"{steady_speed(deg, n):.3f}" for n in (20.0, 40.0, 60.0, 80.0, 100.0, 150.0)
     )
-    say(
+    paragraph(
         f"Straight ahead at 20, 40, 60, 80, 100 and 150 rpm both make {speeds} m/s. Read in degrees"
         " it is a plausible ship of some 200 m; in radians the hull hardly feels the turn. Yet the"
         " size of the noise (A_ω = 5·10⁻⁵, nothing in degrees) and of Table 2 speak for radians."
@@ -278,10 +291,10 @@ def table1() -> None:
 
 def formulas() -> None:
     """The paper's formulas that are not right as printed."""
-    grid("The formulas", ("where", "printed", "right", "why"), FORMULAS)
-    say("E = exp(−v·α₃). The rest of (1) to (7) is right as printed, under δ̈ = n̈ = 0.")
-    grid("The matrix B", ("row", "printed, as column: entry", "right"), PRINTED_ROWS)
-    say(
+    table("The formulas", ("where", "printed", "right", "why"), FORMULAS)
+    paragraph("E = exp(−v·α₃). The rest of (1) to (7) is right as printed, under δ̈ = n̈ = 0.")
+    table("The matrix B", ("row", "printed, as column: entry", "right"), PRINTED_ROWS)
+    paragraph(
         "s = sign(x₁); row 1 is zero in both. With the twenty pseudo-inputs A x + B u is the"
         " derivative itself, as the next table shows at one point."
     )
@@ -321,10 +334,10 @@ def point() -> None:
         for name, *values in zip(("w''", "w'''", "v'", "v''"), *columns, strict=True)
     ]
     head = ("", "the derivative", "A x + B u, right", "equations as printed", "matrix as printed")
-    grid("At one point", head, rows)
+    table("At one point", head, rows)
     C = np.eye(5)[[0, 3]]
     seen = np.vstack([C @ np.linalg.matrix_power(A, k) for k in range(5)])
-    say(
+    paragraph(
         "At w = 0.3, w' = 0.01, v = 9, δ = 20, δ' = 2.5, n = 80, n' = 0.5, in the table's own"
         f" angles. The pair (A, C) shows {np.linalg.matrix_rank(seen)} states of 5, w, w' and v: no"
         " measurement corrects ω̈ and v̇, and the latter's error does not even decay. The algebraic"
@@ -356,8 +369,8 @@ def covariance() -> None:
         for (i, j), text in PRINTED_P.items()
     ]
     others = max(float(np.abs(P[:3, 3:]).max()), abs(float(P[3, 4])))
-    table("The covariance", [*rows, Row("its other entries", "0", others)])
-    say(
+    comparison("The covariance", [*rows, Row("its other entries", "0", others)])
+    paragraph(
         "The equation is P' = A P + P Aᵀ + Q − P Cᵀ R⁻¹ C P with R = 400·I and G = I as printed,"
         " Q = 0.01·I and P(0) = 10·I not printed, at t = 378 s: continuous time, and neither the"
         " discrete filter of (6) nor “settled”, with the true coefficients in A. Its gains P Cᵀ/R:"
@@ -367,8 +380,8 @@ def covariance() -> None:
         (name, *(number(float(k), 2) for k in K[:, i]))
         for i, name in enumerate(("from w", "from v"))
     ]
-    grid("", ("gain", "to w (1/s)", "w' (1/s²)", "w'' (1/s³)", "v (1/s)", "v' (1/s²)"), gains)
-    say(
+    table("", ("gain", "to w (1/s)", "w' (1/s²)", "w'' (1/s³)", "v (1/s)", "v' (1/s²)"), gains)
+    paragraph(
         f"v follows the log with a time constant of {1 / K[3, 1]:.0f} s, w the gyro with some"
         f" {1 / K[0, 0]:.0f} s, w'' and v' follow nothing: the filter is its model running by"
         " itself, a little drawn to the data."
@@ -394,8 +407,8 @@ def figures() -> None:
     c, true = vessel.coefficients, truth_of(vessel)
     _, signals = measured("table1", "paper")
     x = estimates(signals, c, jumps=False)
-    say("## The figures")
-    say(
+    paragraph("## The figures")
+    paragraph(
         "Of the run named above, read in degrees, under the paper's noise, with the true model in"
         " the filter, as the paper has it."
     )
@@ -417,8 +430,8 @@ def figures() -> None:
             spread.insert(1, noisy[: len(true)] - true[:, i])
         sizes = [number(float(np.sqrt(np.mean(s**2))) / per, 2) for s in spread]
         rows.append((label, *(sizes if noisy is not None else (sizes[0], "–", sizes[1]))))
-    grid("", ("rms of", "the state", "the sensor's error", "the filter's error"), rows)
-    say(
+    table("", ("rms of", "the state", "the sensor's error", "the filter's error"), rows)
+    paragraph(
         "“Insignificant for the derivatives, satisfactory for the signals”: so it is, for model and"
         " truth are one here. The filter's v̂ begins at the first noisy sample, and its error then"
         " decays with the time constant above. In figures 3 and 4 the blue line is the paper's; the"
@@ -507,12 +520,12 @@ def settling() -> None:
         said = [when(np.array(instants)[:, k]) for instants in (ended, right)]
         rows.append((name, f"{spikes[k]} %", "about 200 s", *said))
     head = ("", "worst error in the first 50 s", "printed: settled after")
-    grid(
+    table(
         "How fast the coefficients settle",
         (*head, "within 10 % of its end", "within 10 % of the truth"),
         rows,
     )
-    say(
+    paragraph(
         f"Of {len(SEEDS)} runs like that of the figures the median, and the latest where it"
         f" differs; N = 200 s, up to {TOLD_SECS:.0f} s: after that the window holds no moving"
         " rudder and e is lost whatever the method. That ω's coefficients come in jumps in the"
@@ -548,8 +561,8 @@ def jump() -> None:
             rows.append((f"{said}, {name}", *rounded(off)))
         off = percent(in_weak_form(signals, c)[0], nine(c))
         rows.append((f"weak form, {name}", *rounded(off)))
-    grid("The jump that saves e", ("error in %", *NAMES), rows)
-    say(
+    table("The jump that saves e", ("error in %", *NAMES), rows)
+    paragraph(
         "No noise, the true model in the filter, all 500 s in one window. Row 3 of the model takes"
         " the rudder's rate for constant; when the rudder starts or stops, ω̈ jumps by ks·e·Δδ̇,"
         " which the paper's filter never sees: e is lost, and what it should have explained is"
@@ -581,8 +594,8 @@ def circularity() -> None:
         rows.append((f"the paper's, {said}", *rounded(np.median(off, axis=0))))
         ours = np.abs(percent(in_weak_form(signals, c)[0], true))
         rows.append((f"weak form, {said}", *rounded(ours)))
-    grid("The circle: a prior off by 20 %", ("error in %", *NAMES), rows)
-    say(
+    table("The circle: a prior off by 20 %", ("error in %", *NAMES), rows)
+    paragraph(
         "Medians over eight priors, each coefficient 20 % too large or too small by the toss of a"
         " coin; the jump term added, all 500 s in one window; weak form has no prior. The"
         " filter's ω̈ and v̇ are what its model says, and the regression finds that model again:"
@@ -616,8 +629,8 @@ def radii() -> None:
             columns = (np.array(ends[0]) - np.array(ends[1])) / 2e-4 / base
             found.append(f"{np.abs(np.linalg.eigvals(columns)).max():.2f}")
         rows.append((name, *found))
-    grid("", ("run, clean", "spectral radius, degrees", "radians"), rows)
-    say(
+    table("", ("run, clean", "spectral radius, degrees", "radians"), rows)
+    paragraph(
         "The spectral radius is that of the Jacobian of what is found against the prior, both as"
         " shares of the truth: 0 were a method that learns all from the data, 1 a copy; above 1"
         " errors grow from round to round when what is found goes back into the filter, which is"
@@ -685,8 +698,8 @@ def table2() -> None:
             STATES, TABLE2, sizes[NEAREST].tolist(), UNITS2, strict=True
         )
     ]
-    table("Table 2, rms of the restored model off the original", rows)
-    say(
+    comparison("Table 2, rms of the restored model off the original", rows)
+    paragraph(
         "Computed in radians, clean, the filter as printed, all 500 s in one window. Others, in SI:"
     )
     cases = {
@@ -697,16 +710,16 @@ def table2() -> None:
         "degrees, noise, weak form": ("table1", "paper", "weak"),
     }
     others = [(case, *(number(float(v), 2) for v in sizes[key])) for case, key in cases.items()]
-    grid("", ("", *STATES), others)
+    table("", ("", *STATES), others)
     most = [float(TABLE2[k]) * DURATION / np.sqrt(2) for k in (1, 3)]
-    say(
+    paragraph(
         "The table contradicts itself. An error that begins at zero is, in rms over T, at most T/√2"
         f" times its rate's: beside the printed w' and v' at most {number(most[0], 2)} for w and"
         f" {number(most[1], 2)} for v. The printed ones are {0.05 / most[0]:.0f} and"
         f" {0.014 / most[1]:.0f} times that, and no unit common to a state and its rate mends it."
     )
     least = bound()
-    say(
+    paragraph(
         "Nor can it be of data with the printed noise: with ±0.2 m/s on the log, ten samples a"
         " second, the sine left out, the Cramér–Rao bound of the restored v' is"
         f" {number(least, 2)} m/s² (radians; f, g, h free), {least / float(TABLE2[3]):.0f} times"

@@ -12,14 +12,27 @@ from typing import Literal
 
 import matplotlib.pyplot as plt
 import numpy as np
-from printed import AMBER, BLUE, GREEN, GREY, RED, Row, grid, number, page, picture, say, table
+from markdown_page import (
+    AMBER,
+    BLUE,
+    GREEN,
+    GREY,
+    RED,
+    Row,
+    comparison,
+    number,
+    paragraph,
+    picture,
+    start_page,
+    table,
+)
 from scipy.integrate import solve_ivp
 from scipy.linalg import null_space
 from scipy.signal import place_poles
 
 from analysis.design.observability import ComplexArray
 from analysis.design.per_tick import Motion, TickObserver, block_gains, tick_observer
-from analysis.design.placement import named, place_multilevel, polynomial_error
+from analysis.design.placement import format_mode, place_multilevel, polynomial_error
 from shiplog.errors import UsageError
 from shiplog.ships.paper import surge_acceleration, yaw_acceleration_rate
 from shiplog.types import FloatArray
@@ -125,7 +138,7 @@ def printed_gain(A: FloatArray, B: FloatArray, Phi: list[FloatArray], sign: int)
 def said(poles: ComplexArray) -> str:
     """Poles as a table says them, each pair once."""
     upper = [pole for pole in np.sort_complex(poles)[::-1] if pole.imag >= 0]
-    return ", ".join(named(pole) for pole in upper).replace("-", "−").replace("j", " j")
+    return ", ".join(format_mode(pole) for pole in upper).replace("-", "−").replace("j", " j")
 
 
 def misprints() -> Iterator[Row]:
@@ -443,14 +456,14 @@ def exact() -> Iterator[tuple[str, ...]]:
 
 def main() -> None:
     """Print the page."""
-    page("Per-tick observer: printed against computed")
-    say(INTRODUCTION)
-    table("The formulas as printed", misprints())
-    table("The corrections of (1.12), (1.13)", corrections())
+    start_page("Per-tick observer: printed against computed")
+    paragraph(INTRODUCTION)
+    comparison("The formulas as printed", misprints())
+    comparison("The corrections of (1.12), (1.13)", corrections())
     head = ("spacecraft", "on roll", "on pitch", "on yaw")
-    grid("The gains of the spacecraft", head, gains())
+    table("The gains of the spacecraft", head, gains())
     same = number(two_ways(), 1)
-    say(
+    paragraph(
         f"Inertias {I1:g}, {I2:g} and {I3:g} kg·m², Euler angles 3-2-1, all poles at"
         f" {number(POLE)} 1/s,"
         " angles (0.1, −0.2, 0.3) rad and rates (0.05, −0.04, 0.06) rad/s. L is the full order's"
@@ -459,18 +472,18 @@ def main() -> None:
     )
     found = flights()
     columns = ("largest error of a rate, rad/s", *(f"{secs} s" for secs in (0, 5, 10, 20, 40)))
-    grid("The flight", columns, flight_errors(found))
+    table("The flight", columns, flight_errors(found))
     draw_flight(found)
-    say("## Where it fails, and where it is not needed")
+    paragraph("## Where it fails, and where it is not needed")
     draw_singular()
     apart = draw_ship()
-    say(
+    paragraph(
         "The two errors of the yaw rate's derivative, which is not measured, are never apart by"
         f" more than {apart} of the largest."
     )
     sizes = ("(n, m)", "median", "worst", "all poles equal, median")
-    grid('"Exact placement"', (*sizes, "SciPy, median", "SciPy, worst", "refused"), exact())
-    say(
+    table('"Exact placement"', (*sizes, "SciPy, median", "SciPy, worst", "refused"), exact())
+    paragraph(
         f"Relative errors of the characteristic polynomial, {SYSTEMS} random systems of each size,"
         " poles between −3 and −1 1/s. Exact means: to rounding, which grows with the number of"
         " levels; `place_multilevel` refuses where it leaves more than 1e−4."
