@@ -1,8 +1,8 @@
-"""The per-tick observer's paper: what it prints, and what shiplog computes.
+"""Comparison of the per-tick observer's paper with the values computed by shiplog.
 
-Zubov, Mikrin, Oleinik, Ryabchenko, "Algorithms for the synthesis of linear observers for nonlinear
-dynamic systems", 2014, no. 5, pages 3-16. Prints docs/papers_per_tick_observer.md and draws its
-pictures.
+The paper: Zubov, Mikrin, Oleinik, Ryabchenko, "Algorithms for the synthesis of linear observers for
+nonlinear dynamic systems", 2014, no. 5, pages 3-16. Prints docs/papers_per_tick_observer.md and
+draws its pictures.
 """
 
 import warnings
@@ -50,7 +50,7 @@ TABLE1 = load_vessel("table1-rad")[0].coefficients
 SHIP = np.array([0.01, 1e-4, 7.0])  # yaw rate in rad/s, its derivative, speed in m/s
 RATE_AND_SPEED = np.eye(3)[[0, 2]]
 SYSTEMS = 30
-RPM, RUDDER, PERIOD_SECS = 36.0, 0.35, 120.0  # a rudder that swings, rad
+RPM, RUDDER, PERIOD_SECS = 36.0, 0.35, 120.0  # a sinusoidal rudder, rad
 
 INTRODUCTION = """\
 N. E. Zubov, E. A. Mikrin, A. S. Oleinik, V. N. Ryabchenko, *Algorithms for the synthesis of linear
@@ -58,16 +58,19 @@ observers for nonlinear dynamic systems*, 2014, no. 5, pages 3-16. This page is 
 
     python examples/papers/per_tick_observer.py > docs/papers_per_tick_observer.md
 
-The text we have ends with (2.12), in the middle of section 2: no table, no figure and no number is
-in it. The analytical observers of a spacecraft and the results of simulation that the abstract
-promises stand in the part that is missing, so their figures cannot be had, nor the authors'
-inertias and angular rates. What can be done is done here: the formulas carried out as printed; the
-example rebuilt from the abstract (three angles measured, three angular rates estimated, full and
-reduced order) with numbers of ours; and the sentences that can be tested, tested."""
+Our copy of the text ends with (2.12), in the middle of section 2, and contains no table, figure or
+number. The analytical observers of a spacecraft and the simulation results that the abstract
+announces are in the missing part. Their figures, and the inertias and angular rates of the authors,
+are therefore unknown. This page computes what is possible: the formulas as printed; the example
+reconstructed from the abstract (three angles measured, three angular rates estimated, observers of
+full and reduced order) with numbers of our own; and the statements that can be tested."""
 
 
 def spacecraft(x: FloatArray, _: FloatArray) -> FloatArray:
-    """Euler angles 3-2-1 (roll, pitch, yaw) and body rates of a free rigid body."""
+    """Return the rates of change of a free rigid body's Euler angles 3-2-1 and body rates.
+
+    The state (6,) is roll, pitch, yaw (rad) and p, q, r (rad/s).
+    """
     phi, theta, _yaw, p, q, r = x
     turn = q * np.sin(phi) + r * np.cos(phi)
     return np.array(
@@ -83,7 +86,7 @@ def spacecraft(x: FloatArray, _: FloatArray) -> FloatArray:
 
 
 def spacecraft_jacobian(x: FloatArray, _: FloatArray) -> FloatArray:
-    """A of (1.3)."""
+    """Return the Jacobian (6, 6) of `spacecraft`, A of (1.3)."""
     phi, theta, _yaw, p, q, r = x
     s, c, tan, sec = np.sin(phi), np.cos(phi), np.tan(theta), 1 / np.cos(theta)
     turn, across = q * s + r * c, q * c - r * s
@@ -100,30 +103,42 @@ def spacecraft_jacobian(x: FloatArray, _: FloatArray) -> FloatArray:
 
 
 def ship(x: FloatArray, u: FloatArray) -> FloatArray:
-    """The ship of the identification paper: yaw rate, its derivative, speed."""
+    """Return the rates of change of the ship of the identification paper.
+
+    The state (3,) is yaw rate, its derivative and speed; the input (3,) is the rudder angle, its
+    rate and the shaft speed.
+    """
     (w, w_dot, v), (delta, delta_dot, n) = x, u
     w_ddot = yaw_acceleration_rate(TABLE1, w, w_dot, v, n, delta, delta_dot)
     return np.array([w_dot, w_ddot, surge_acceleration(TABLE1, w, v, n)])
 
 
 def ship_jacobian(x: FloatArray, u: FloatArray) -> FloatArray:
-    """A of (1.3)."""
+    """Return the Jacobian (3, 3) of `ship`, A of (1.3)."""
     c, (w, _, v), (delta, delta_dot, n) = TABLE1, x, u
-    works = c.alpha1 - c.alpha2 * c.alpha3 * n * np.exp(-c.alpha3 * v)
+    rudder_gain = c.alpha1 - c.alpha2 * c.alpha3 * n * np.exp(-c.alpha3 * v)
     stiffness = c.b1 + 2 * c.b2 * abs(w) + 3 * c.b3 * w * w
     return np.array(
         [
             [0, 1, 0],
-            [stiffness, c.a, works * (c.d * delta + c.e * delta_dot)],
+            [stiffness, c.a, rudder_gain * (c.d * delta + c.e * delta_dot)],
             [2 * c.f * w, 0, 2 * c.g * v],
         ]
     )
 
 
 def printed_gain(A: FloatArray, B: FloatArray, Phi: list[FloatArray], sign: int) -> FloatArray:
-    """The gain L (n, m) by the recursion as printed: (2.5), (2.6) for `sign` 1, (2.10) for -1.
+    """Compute the gain L (n, m) by the recursion as printed.
 
-    But a last Φ of n_J < m, which (2.5) has no room for, stands right of B⁺.
+    Parameters
+    ----------
+    A, B
+        The matrices of the recursion, (n, n) and (n, m): the transposes of A and C.
+    Phi
+        The matrices that define the poles of each level. A last one of n_J < m, for which (2.5) has
+        no place, is multiplied from the right of B⁺.
+    sign
+        1 for (2.5) and (2.6), -1 for (2.10).
     """
     plus = np.linalg.pinv(B)
     if len(Phi) == 1:
@@ -135,62 +150,69 @@ def printed_gain(A: FloatArray, B: FloatArray, Phi: list[FloatArray], sign: int)
     return sign * (minus @ A - Phi[0] @ minus).T
 
 
-def said(poles: ComplexArray) -> str:
-    """Poles as a table says them, each pair once."""
+def format_poles(poles: ComplexArray) -> str:
+    """Format poles for a table, each conjugate pair once."""
     upper = [pole for pole in np.sort_complex(poles)[::-1] if pole.imag >= 0]
     return ", ".join(format_mode(pole) for pole in upper).replace("-", "−").replace("j", " j")
 
 
 def misprints() -> Iterator[Row]:
-    """The recursion carried out as it stands, on the ship: n = 3, m = 2, levels of 2 and 1."""
+    """Apply the printed recursion to the ship: n = 3, m = 2, levels of 2 and 1."""
     A, C = ship_jacobian(SHIP, np.array([RUDDER, 0, RPM])), RATE_AND_SPEED
     Phi0, Phi1 = np.diag([-0.1, -0.2]), np.diag([-0.3])
     wanted = "−0.1, −0.2, −0.3"
-    right = printed_gain(A.T, C.T, [Phi0, Phi1], 1)
+    correct = printed_gain(A.T, C.T, [Phi0, Phi1], 1)
     yield Row(
         "(2.2) to (2.6): poles of A − L C",
         wanted,
-        poles(A - right @ C),
-        "right, with Φ_J of 1 × 1 to the right of B_J⁺",
+        poles(A - correct @ C),
+        "correct, with Φ_J of 1 × 1 to the right of B_J⁺",
     )
-    turned = printed_gain(A.T, C.T, [Phi0, Phi1], -1)
-    remark = "misprint of sign: unstable; L is the negative of that of (2.5), (2.6)"
-    yield Row("(2.10): poles of A − L C", wanted, poles(A - turned @ C), remark)
-    yield Row("(2.10): poles of A + L C", "–", poles(A + turned @ C), "this is what (2.10) places")
-    straight = printed_gain(A, C.T, [Phi0, Phi1], 1)
-    remark = "misprint: A_0 must be the transpose, as in (2.2)"
-    yield Row("(2.7), A_0 = A_L: poles of A − L C", wanted, poles(A - straight @ C), remark)
-    A = np.array([[0, 1, 0], [0, 0, 0], [0, 1.0, 0]])
-    wide = printed_gain(A.T, C.T, [Phi0, np.diag([-0.3, -0.6])], 1)
-    remark = "one state seen twice, Φ_J = diag(−0.3, −0.6): a mean of the two. Φ_J is n_J × n_J"
+    negated = printed_gain(A.T, C.T, [Phi0, Phi1], -1)
+    remark = "wrong sign, unstable: L is the negative of that of (2.5), (2.6)"
+    yield Row("(2.10): poles of A − L C", wanted, poles(A - negated @ C), remark)
     yield Row(
-        "Φ_J of m × m: poles of A − L C", "−0.1, −0.2, −0.3 or −0.6", poles(A - wide @ C), remark
+        "(2.10): poles of A + L C",
+        "–",
+        poles(A + negated @ C),
+        "(2.10) places the poles of this matrix",
+    )
+    untransposed = printed_gain(A, C.T, [Phi0, Phi1], 1)
+    remark = "misprint: A_0 must be the transpose, as in (2.2)"
+    yield Row("(2.7), A_0 = A_L: poles of A − L C", wanted, poles(A - untransposed @ C), remark)
+    A = np.array([[0, 1, 0], [0, 0, 0], [0, 1.0, 0]])
+    m_by_m = printed_gain(A.T, C.T, [Phi0, np.diag([-0.3, -0.6])], 1)
+    remark = (
+        "one state measured twice, Φ_J = diag(−0.3, −0.6): a mean of both. Φ_J must be n_J × n_J"
+    )
+    yield Row(
+        "Φ_J of m × m: poles of A − L C", "−0.1, −0.2, −0.3 or −0.6", poles(A - m_by_m @ C), remark
     )
     J = spacecraft_jacobian(FLIGHT, NO_INPUT)
     B1 = np.abs(J[3:, :3]).max()
-    remark = "of the spacecraft, from A_L untransposed: no level follows, no gain"
+    remark = "spacecraft, A_L not transposed: there is no further level and no gain"
     yield Row("(2.7): largest entry of B_1", "not zero", f"{B1:g}", remark)
     chains = np.diag([1.0, 1, 0], 1)
     count = levels(chains.T, np.eye(4)[[0, 3]].T)
-    remark = "n = 4, m = 2, ranks 2, 1, 1: holds for full ranks only, hence (2.11), (2.12)"
-    yield Row("(2.8): J of three integrators in a row and one alone", "1", count - 1, remark)
+    remark = "n = 4, m = 2, ranks 2, 1, 1: valid for full ranks only, hence (2.11), (2.12)"
+    yield Row("(2.8): J of a chain of three integrators and a single one", "1", count - 1, remark)
 
 
 def poles(F: FloatArray) -> str:
-    """The eigenvalues of F, 1/s."""
-    return said(np.linalg.eigvals(F).astype(complex))
+    """Format the eigenvalues of F, 1/s."""
+    return format_poles(np.linalg.eigvals(F).astype(complex))
 
 
 def levels(A: FloatArray, B: FloatArray) -> int:
-    """How many levels (2.9) has until nothing is left."""
+    """Count the levels of (2.9)."""
     N = null_space(B.T).T
     return 1 if not len(N) else 1 + levels(N @ A @ N.T, N @ A @ B)
 
 
 def corrections() -> Iterator[Row]:
-    """ΔA* + ΔG*: how A(x̂N) x̂ + G(x̂N) depends on where it was taken."""
+    """Evaluate ΔA* + ΔG*: how A(x̂N) x̂ + G(x̂N) depends on the point of linearisation."""
     x = FLIGHT
-    end = flown()[PER_SEC]
+    end = true_flight()[PER_SEC]
 
     def dependence(now: FloatArray) -> float:
         h = 1e-5
@@ -201,40 +223,41 @@ def corrections() -> Iterator[Row]:
         return float(np.abs(np.array(columns)).max())
 
     yield Row(
-        "largest entry of ΔA* + ΔG* where a tick starts",
+        "largest entry of ΔA* + ΔG* at the start of a tick",
         None,
         "0" if dependence(x) < 1e-9 else f"{dependence(x):.1g}",
-        "so that A_L of (1.13) is the Jacobian at x̂, and its gain is found there",
+        "hence A_L of (1.13) is the Jacobian at x̂, and the gain is computed from it",
     )
     yield Row(
         "the same at the end of a tick of 1 s",
         None,
         f"{dependence(end):.2g}",
-        f"1/s, beside entries of A of up to {np.abs(spacecraft_jacobian(x, NO_INPUT)).max():.2g}",
+        "1/s, compared with entries of A of up to"
+        f" {np.abs(spacecraft_jacobian(x, NO_INPUT)).max():.2g}",
     )
 
 
 def linearised(x: FloatArray) -> Motion:
-    """(1.2): A(x̂N) x + G(x̂N)."""
+    """Return the linearised model (1.2): A(x̂N) x + G(x̂N)."""
     f, A = spacecraft(x, NO_INPUT), spacecraft_jacobian(x, NO_INPUT)
     return lambda now, _: f + A @ (now - x)
 
 
 def observer_of_the_spacecraft(order: Order) -> TickObserver:
-    """All poles at one place."""
+    """Design the observer of the spacecraft, all poles at `POLE`."""
     count = 6 if order == "full" else 3
     return tick_observer(spacecraft, spacecraft_jacobian, ANGLES, [POLE] * count, order=order)
 
 
-def flown() -> FloatArray:
-    """The flight itself, (SECS · PER_SEC + 1, 6)."""
+def true_flight() -> FloatArray:
+    """Return the true states of the flight, (SECS · PER_SEC + 1, 6)."""
     return truth(spacecraft, FLIGHT, np.arange(SECS * PER_SEC + 1) / PER_SEC)
 
 
 def truth(rate: Motion, x: FloatArray, times: FloatArray) -> FloatArray:
-    """The motion itself at `times`, (len(times), n)."""
-    found: FloatArray = solve_ivp(
-        lambda t, x: rate(x, rudder(t) if len(x) == 3 else NO_INPUT),
+    """Integrate a motion from x; return its states at `times`, (len(times), n)."""
+    states: FloatArray = solve_ivp(
+        lambda t, x: rate(x, ship_inputs(t) if len(x) == 3 else NO_INPUT),
         (0.0, float(times[-1])),
         x,
         "DOP853",
@@ -242,30 +265,47 @@ def truth(rate: Motion, x: FloatArray, times: FloatArray) -> FloatArray:
         rtol=1e-13,
         atol=1e-15,
     ).y.T
-    return found
+    return states
 
 
 def estimated(
     observer: TickObserver, flight: FloatArray, per_tick: int, *, printed: bool = False
 ) -> FloatArray:
-    """The estimates at the ends of the ticks, (count + 1, 6), the rates starting from zero."""
+    """Run an observer over the flight, its rates starting from zero.
+
+    Parameters
+    ----------
+    observer
+        The observer.
+    flight
+        The true states, `PER_SEC` a second, of which the angles are measured.
+    per_tick
+        The number of samples in a tick.
+    printed
+        Whether the estimate moves by the linearised model, (1.5) as printed, instead of the model.
+
+    Returns
+    -------
+    FloatArray
+        The estimates at the ends of the ticks, (count + 1, 6).
+    """
     x = observer.init(np.r_[FLIGHT[:3], 0, 0, 0], flight[0, :3])
-    found = [x]
+    estimates = [x]
     for k in range(0, len(flight) - 1, per_tick):
         now = replace(observer, rate=linearised(x)) if printed else observer
         x = now.step(x, flight[k : k + per_tick + 1, :3], tick_secs=per_tick / PER_SEC)
-        found.append(x)
-    return np.array(found)
+        estimates.append(x)
+    return np.array(estimates)
 
 
-def rudder(t: float) -> FloatArray:
-    """The ship's inputs: the rudder, its rate, the revolutions."""
+def ship_inputs(t: float) -> FloatArray:
+    """Return the inputs of the ship (3,): rudder angle, its rate, shaft speed."""
     turn = 2 * np.pi / PERIOD_SECS
     return np.array([RUDDER * np.sin(turn * t), RUDDER * turn * np.cos(turn * t), RPM])
 
 
 def gains() -> Iterator[tuple[str, ...]]:
-    """The gains where the flight starts."""
+    """List the gains at the start of the flight."""
     reduced = observer_of_the_spacecraft("reduced").gain(FLIGHT)
     full = observer_of_the_spacecraft("full").gain(FLIGHT)
     names = ("roll", "pitch", "yaw", "p", "q", "r")
@@ -275,19 +315,21 @@ def gains() -> Iterator[tuple[str, ...]]:
         yield f"N: {names[3 + k]}", *(f"{value:.10f}".replace("-", "−") for value in row)
 
 
-def two_ways() -> float:
-    """How far the levels' gain is from the closed form's."""
+def closed_form_difference() -> float:
+    """Compute the largest difference between the gains by levels and those in closed form."""
     Phi = POLE * np.eye(3)
     N, L1, L2 = block_gains(spacecraft_jacobian(FLIGHT, NO_INPUT), Phi, Phi)
-    off = observer_of_the_spacecraft("full").gain(FLIGHT) - np.vstack((L1, L2))
+    full = observer_of_the_spacecraft("full").gain(FLIGHT) - np.vstack((L1, L2))
     return float(
-        max(np.abs(off).max(), np.abs(observer_of_the_spacecraft("reduced").gain(FLIGHT) - N).max())
+        max(
+            np.abs(full).max(), np.abs(observer_of_the_spacecraft("reduced").gain(FLIGHT) - N).max()
+        )
     )
 
 
 def flights() -> dict[str, tuple[int, FloatArray]]:
-    """By the observer's name how many samples a tick has, and its estimates."""
-    flight = flown()
+    """Run each observer; return by its name the samples per tick and the estimates."""
+    flight = true_flight()
     full, reduced = observer_of_the_spacecraft("full"), observer_of_the_spacecraft("reduced")
     return {
         "truth": (1, flight),
@@ -298,47 +340,48 @@ def flights() -> dict[str, tuple[int, FloatArray]]:
     }
 
 
-def off(found: dict[str, tuple[int, FloatArray]], name: str) -> FloatArray:
-    """The largest error of an angular rate at the ends of the ticks, rad/s."""
-    per_tick, x = found[name]
-    worst: FloatArray = np.abs(x - found["truth"][1][::per_tick])[:, 3:].max(axis=1)
-    return worst
+def rate_error(runs: dict[str, tuple[int, FloatArray]], name: str) -> FloatArray:
+    """Return the largest error of the three angular rates at the end of each tick, rad/s."""
+    per_tick, x = runs[name]
+    largest: FloatArray = np.abs(x - runs["truth"][1][::per_tick])[:, 3:].max(axis=1)
+    return largest
 
 
-def flight_errors(found: dict[str, tuple[int, FloatArray]]) -> Iterator[tuple[str, ...]]:
-    """The largest error of a rate, observer by observer."""
-    for name in list(found)[1:]:
-        e, per_sec = off(found, name), PER_SEC // found[name][0]
+def flight_errors(runs: dict[str, tuple[int, FloatArray]]) -> Iterator[tuple[str, ...]]:
+    """List the largest error of a rate for each observer."""
+    for name in list(runs)[1:]:
+        e, per_sec = rate_error(runs, name), PER_SEC // runs[name][0]
         yield name, *(number(e[secs * per_sec], 2) for secs in (0, 5, 10, 20, 40))
 
 
-def draw_flight(found: dict[str, tuple[int, FloatArray]]) -> None:
-    """The rates and their estimates, and the errors."""
-    drawn, axes = plt.subplots(3, 1, figsize=(6.4, 5.2), sharex=True)
+def draw_flight(runs: dict[str, tuple[int, FloatArray]]) -> None:
+    """Draw the angular rates with their estimates, and the errors."""
+    figure, axes = plt.subplots(3, 1, figsize=(6.4, 5.2), sharex=True)
     for k, (ax, name) in enumerate(zip(axes, ("p, roll", "q, pitch", "r, yaw"), strict=True)):
-        per_tick, x = found["truth"]
+        per_tick, x = runs["truth"]
         times = np.arange(len(x)) / PER_SEC
         ax.plot(times, np.degrees(x[:, 3 + k]), color=GREY, ls="--", label="truth")
         for which, colour in (("reduced order", BLUE), ("full order", RED)):
-            per_tick, x = found[f"{which}, tick 1 s"]
+            per_tick, x = runs[f"{which}, tick 1 s"]
             times = np.arange(len(x)) * per_tick / PER_SEC
             ax.plot(times, np.degrees(x[:, 3 + k]), color=colour, marker=".", ms=5, label=which)
         ax.set_ylabel(f"{name}, °/s")
     axes[-1].set_xlabel("time, s")
     axes[-1].set_xlim(0, 20)
     axes[-1].set_xticks(range(0, 21, 5))
-    drawn.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     picture(
         "per_tick_observer_1",
-        drawn,
-        "The spacecraft's angular rates found from its three angles, all poles at −0.5 1/s, the"
-        " gain new at every tick of 1 s. In place of the paper's figures, which our text lacks.",
+        figure,
+        "Angular rates of the spacecraft estimated from its three angles, all poles at −0.5 1/s,"
+        " the gain computed anew at each tick of 1 s. It replaces the figures that our copy"
+        " lacks.",
     )
-    plt.close(drawn)
-    drawn, errors = plt.subplots(figsize=(6.4, 3.8))
-    for name, colour in zip(list(found)[1:], (BLUE, RED, AMBER, GREEN), strict=True):
-        times = np.arange(len(found[name][1])) * found[name][0] / PER_SEC
-        errors.semilogy(times, off(found, name), color=colour, label=name)
+    plt.close(figure)
+    figure, errors = plt.subplots(figsize=(6.4, 3.8))
+    for name, colour in zip(list(runs)[1:], (BLUE, RED, AMBER, GREEN), strict=True):
+        times = np.arange(len(runs[name][1])) * runs[name][0] / PER_SEC
+        errors.semilogy(times, rate_error(runs, name), color=colour, label=name)
     errors.semilogy(times, 0.06 * np.exp(POLE * times), color=GREY, ls="--", label="e^(−0.5 t)")
     errors.set_xlabel("time, s")
     errors.set_ylabel("largest error of a rate, rad/s")
@@ -347,148 +390,158 @@ def draw_flight(found: dict[str, tuple[int, FloatArray]]) -> None:
     errors.legend(loc="lower left")
     picture(
         "per_tick_observer_2",
-        drawn,
-        "The same as errors. (1.5) as printed moves the estimate by the linearised model within a"
-        " tick, whose error stays; shiplog moves it by the model itself.",
+        figure,
+        "The errors of these estimates. (1.5) as printed moves the estimate by the linearised model"
+        " within a tick, and an error remains; shiplog moves it by the model itself.",
     )
-    plt.close(drawn)
+    plt.close(figure)
 
 
 def draw_singular() -> None:
-    """The gains as the pitch nears 90°."""
-    away = np.logspace(1.9, -7, 120)  # degrees from there
-    found: dict[str, list[float]] = {"full": [], "reduced": []}
+    """Draw the gains as the pitch approaches 90°."""
+    distances = np.logspace(1.9, -7, 120)  # degrees from a pitch of 90°
+    largest: dict[str, list[float]] = {"full": [], "reduced": []}
     for order in ("full", "reduced"):
         observer = observer_of_the_spacecraft("full" if order == "full" else "reduced")
-        for degrees in away:
+        for degrees in distances:
             x = FLIGHT.copy()
             x[1] = np.pi / 2 - np.radians(degrees)
             try:
-                found[order].append(float(np.abs(observer.gain(x)).max()))
+                largest[order].append(float(np.abs(observer.gain(x)).max()))
             except UsageError:
-                found[order].append(np.nan)
-    drawn, ax = plt.subplots(figsize=(6.4, 3.2))
-    for (order, sizes), colour in zip(found.items(), (RED, BLUE), strict=True):
+                largest[order].append(np.nan)
+    figure, ax = plt.subplots(figsize=(6.4, 3.2))
+    for (order, sizes), colour in zip(largest.items(), (RED, BLUE), strict=True):
         ax.loglog(
-            away, sizes, color=colour, label=f"{order} order, {'L' if order == 'full' else 'N'}"
+            distances,
+            sizes,
+            color=colour,
+            label=f"{order} order, {'L' if order == 'full' else 'N'}",
         )
     ax.invert_xaxis()
     ax.set_xlabel("90° − pitch, °")
     ax.set_ylabel("largest gain (1/s, 1/s²)")
     ax.legend()
     full, reduced = (
-        min(d for d, size in zip(away, found[order], strict=True) if np.isfinite(size))
+        min(d for d, size in zip(distances, largest[order], strict=True) if np.isfinite(size))
         for order in ("full", "reduced")
     )
     picture(
         "per_tick_observer_3",
-        drawn,
-        "Not said in the part of the paper we have: Euler angles have no rates where cos θ = 0. The"
-        " full order's gain grows as 1 / cos² θ, the reduced order's does not, but its model does;"
-        f" shiplog refuses nearer than {number(full, 1)}° (full) and {number(reduced, 1)}°"
-        " (reduced), and says why.",
+        figure,
+        "Not mentioned in our part of the paper: Euler angles have no rates where cos θ = 0. The"
+        " gain of the full order grows as 1 / cos² θ. That of the reduced order does not, but its"
+        f" model becomes singular. shiplog rejects angles nearer than {number(full, 1)}° (full"
+        f" order) and {number(reduced, 1)}° (reduced order) with a message.",
     )
-    plt.close(drawn)
+    plt.close(figure)
 
 
 def draw_ship() -> str:
-    """Per tick against frozen, on the ship; says how far they are apart."""
+    """Draw the errors on the ship, with the gain of each tick and with a constant gain.
+
+    Returns
+    -------
+    str
+        The largest difference of both errors, relative to the largest error.
+    """
     tick, count = 2.0, 100
     times = np.arange(4 * count + 1) * tick / 4
     run = truth(ship, SHIP, times)
-    u = np.array([rudder(t) for t in times])
+    u = np.array([ship_inputs(t) for t in times])
     observer = tick_observer(ship, ship_jacobian, RATE_AND_SPEED, [-0.1] * 3)
-    frozen_at = ship_jacobian(SHIP, rudder(0))
-    found = {}
-    for name, one in (
+    initial_jacobian = ship_jacobian(SHIP, ship_inputs(0))
+    errors_by_variant = {}
+    for name, variant in (
         ("relinearised at each tick", observer),
-        ("gain of the start, frozen", replace(observer, jacobian=lambda *_: frozen_at)),
+        ("constant gain of the start", replace(observer, jacobian=lambda *_: initial_jacobian)),
     ):
         x = SHIP + np.array([0.005, -5e-4, -1.0])
         errors = [np.abs(x - run[0])]
         for k in range(0, 4 * count, 4):
-            x = one.step(x, run[k : k + 5, [0, 2]], u[k : k + 5], tick_secs=tick)
+            x = variant.step(x, run[k : k + 5, [0, 2]], u[k : k + 5], tick_secs=tick)
             errors.append(np.abs(x - run[k + 4]))
-        found[name] = np.array(errors)
-    drawn, axes = plt.subplots(3, 1, figsize=(6.4, 5.2), sharex=True)
+        errors_by_variant[name] = np.array(errors)
+    figure, axes = plt.subplots(3, 1, figsize=(6.4, 5.2), sharex=True)
     labels = ("yaw rate, °/s", "its derivative, °/s²", "speed, m/s")
     for k, (ax, label) in enumerate(zip(axes, labels, strict=True)):
-        for (name, e), colour, ls in zip(found.items(), (BLUE, AMBER), ("-", "--"), strict=True):
+        for (name, e), colour, ls in zip(
+            errors_by_variant.items(), (BLUE, AMBER), ("-", "--"), strict=True
+        ):
             scale = np.degrees(1) if k < 2 else 1
             ax.semilogy(times[::4], e[:, k] * scale, color=colour, ls=ls, label=name)
         ax.set_ylabel(label)
     axes[-1].set_xlabel("time, s")
     axes[-1].set_xlim(0, times[-1])
-    drawn.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     picture(
         "per_tick_observer_4",
-        drawn,
-        "A ship, her rudder swinging by 20°, poles at −0.1 1/s, yaw rate and speed measured: errors"
-        " of the estimates. Relinearising at each tick gains nothing here; the floor is that of the"
-        " Runge-Kutta steps of 1 s.",
+        figure,
+        "Errors of the estimates for a ship with a sinusoidal rudder of 20°, poles at −0.1 1/s,"
+        " yaw rate and speed measured. Relinearising at each tick has no advantage here. The"
+        " lower limit is the error of the Runge-Kutta steps of 1 s.",
     )
-    plt.close(drawn)
-    each_tick, frozen = (e[:, 1] for e in found.values())
-    return number(np.abs(each_tick - frozen).max() / each_tick.max(), 1)
+    plt.close(figure)
+    each_tick, constant = (e[:, 1] for e in errors_by_variant.values())
+    return number(np.abs(each_tick - constant).max() / each_tick.max(), 1)
 
 
 def exact() -> Iterator[tuple[str, ...]]:
-    """Exact placement: errors of the characteristic polynomial, random systems of each size."""
-    warnings.filterwarnings("ignore", "Convergence was not reached")  # of SciPy
+    """List the errors of the characteristic polynomial, for random systems of each size."""
+    warnings.filterwarnings("ignore", "Convergence was not reached")  # a warning of SciPy
     for n, m in ((4, 2), (6, 3), (8, 3), (10, 2)):
         rng = np.random.default_rng(0)
-        ours, theirs, equal, refused = [], [], [], 0
+        ours, scipy, equal, rejected = [], [], [], 0
         for _ in range(SYSTEMS):
             A, C = rng.standard_normal((n, n)), rng.standard_normal((m, n))
             wanted = -rng.uniform(1, 3, n)
             gain = place_poles(A.T, C.T, wanted, maxiter=1).gain_matrix.T
-            theirs.append(polynomial_error(A - gain @ C, wanted.astype(complex)))
+            scipy.append(polynomial_error(A - gain @ C, wanted.astype(complex)))
             same = np.full(n, -1.0 + 0j)
             try:
                 ours.append(polynomial_error(A - place_multilevel(A, C, wanted) @ C, wanted + 0j))
                 equal.append(polynomial_error(A - place_multilevel(A, C, same) @ C, same))
             except UsageError:
-                refused += 1
-        sizes = (np.median(ours), max(ours), np.median(equal), np.median(theirs), max(theirs))
-        said = (number(size, 1) for size in sizes)
-        yield f"({n}, {m})", *said, str(refused)
+                rejected += 1
+        sizes = (np.median(ours), max(ours), np.median(equal), np.median(scipy), max(scipy))
+        cells = (number(size, 1) for size in sizes)
+        yield f"({n}, {m})", *cells, str(rejected)
 
 
 def main() -> None:
-    """Print the page."""
+    """Print the page and draw its pictures."""
     start_page("Per-tick observer: printed against computed")
     paragraph(INTRODUCTION)
     comparison("The formulas as printed", misprints())
     comparison("The corrections of (1.12), (1.13)", corrections())
     head = ("spacecraft", "on roll", "on pitch", "on yaw")
     table("The gains of the spacecraft", head, gains())
-    same = number(two_ways(), 1)
+    difference = number(closed_form_difference(), 1)
     paragraph(
         f"Inertias {I1:g}, {I2:g} and {I3:g} kg·m², Euler angles 3-2-1, all poles at"
-        f" {number(POLE)} 1/s,"
-        " angles (0.1, −0.2, 0.3) rad and rates (0.05, −0.04, 0.06) rad/s. L is the full order's"
-        " gain, N the reduced order's, ω̂ = z + N y; the levels and the closed form with A12"
-        f" invertible give the same to {same}."
+        f" {number(POLE)} 1/s, angles (0.1, −0.2, 0.3) rad and rates (0.05, −0.04, 0.06) rad/s. L"
+        " is the gain of the full order, N that of the reduced order, ω̂ = z + N y. The recursion"
+        f" and the closed form for an invertible A12 agree to {difference}."
     )
-    found = flights()
+    runs = flights()
     columns = ("largest error of a rate, rad/s", *(f"{secs} s" for secs in (0, 5, 10, 20, 40)))
-    table("The flight", columns, flight_errors(found))
-    draw_flight(found)
-    paragraph("## Where it fails, and where it is not needed")
+    table("The flight", columns, flight_errors(runs))
+    draw_flight(runs)
+    paragraph("## Where it fails, and where it has no advantage")
     draw_singular()
-    apart = draw_ship()
+    difference = draw_ship()
     paragraph(
-        "The two errors of the yaw rate's derivative, which is not measured, are never apart by"
-        f" more than {apart} of the largest."
+        "The errors of the derivative of the yaw rate, which is not measured, differ by at most"
+        f" {difference} of the largest error."
     )
     sizes = ("(n, m)", "median", "worst", "all poles equal, median")
-    table('"Exact placement"', (*sizes, "SciPy, median", "SciPy, worst", "refused"), exact())
+    table('"Exact placement"', (*sizes, "SciPy, median", "SciPy, worst", "rejected"), exact())
     paragraph(
         f"Relative errors of the characteristic polynomial, {SYSTEMS} random systems of each size,"
-        " poles between −3 and −1 1/s. Exact means: to rounding, which grows with the number of"
-        " levels; `place_multilevel` refuses where it leaves more than 1e−4."
-        " `scipy.signal.place_poles` refuses equal poles; it makes one iteration here instead of"
-        " its thirty, to save time: over 100 systems and with thirty its medians"
+        " poles between −3 and −1 1/s. The placement is exact up to rounding, which grows with the"
+        " number of levels; `place_multilevel` rejects a result with an error above 1e−4."
+        " `scipy.signal.place_poles` does not accept equal poles. It makes one iteration here"
+        " instead of its thirty, to save time: over 100 systems and with thirty its medians"
         " were between 3e−12 and 5e−9."
     )
 
