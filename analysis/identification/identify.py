@@ -25,6 +25,7 @@ from .fit_warnings import fit_warnings
 from .fixed_parameters import check_fixed, fixed_values
 from .identified_ship import IdentifiedShip, run_fits
 from .model_selection import Candidate, rank_models
+from .parallel import single_blas_thread
 from .prior_sensitivity import prior_sensitivity
 from .runs import Run, common_vessel, consistency_warnings, distinct_runs
 from .validation import validate
@@ -33,6 +34,7 @@ AUTO = "auto"
 LogSource = Log | str | os.PathLike[str]
 
 
+@single_blas_thread
 def identify(
     logs: LogSource | Sequence[LogSource],
     model: str | Model | None = None,

@@ -1,14 +1,28 @@
-"""A map over threads, for compiled work that releases the GIL."""
+"""Threads: a map for compiled work that releases the GIL, and one thread for linear algebra."""
 
 import os
 import threading
 from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
-from typing import TypeVar
+from typing import TypeVar, cast
+
+from threadpoolctl import threadpool_limits
 
 T = TypeVar("T")
 R = TypeVar("R")
 Event = tuple[int, list[R] | BaseException | None]  # item; its result in a list, error, or begun
+
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def single_blas_thread(function: F) -> F:
+    """Run a function with one thread of the linear algebra library, whatever it calls.
+
+    Its matrices are small: more threads would only wait for each other, many times longer than
+    the work takes. The results then do not depend on the number of cores.
+    """
+    return cast("F", threadpool_limits.wrap(limits=1, user_api="blas")(function))
 
 
 def usable_cores() -> int:

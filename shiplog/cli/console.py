@@ -41,19 +41,20 @@ def progress(compiles: str | None = None, *, lines: bool = False) -> Iterator[Pr
         note = "" if is_compiled(compiles) else " (first run: compiling the loops, once)"
     bar_columns = (SpinnerColumn(), BarColumn(bar_width=24), TimeElapsedColumn())
     columns = (*bar_columns, TextColumn("{task.description}"))
-    start, last, shown = time.monotonic(), "", console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
+    start, reported, on_terminal = time.monotonic(), set[str](), console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=not on_terminal) as bar:
         task = bar.add_task("", total=None)
 
         def on_progress(step: str, share: float | None = None, /) -> None:
-            nonlocal last
-            text = f"{step}{note}{_remaining(time.monotonic() - start, share)}"
-            if shown:
+            remaining = _remaining(time.monotonic() - start, share)
+            if on_terminal:
                 total = None if share is None else 1.0
+                text = f"{step}{note}{remaining}"
                 bar.update(task, description=text, total=total, completed=share or 0.0)
-            elif lines and share is not None and step != last:
+            elif lines and share is not None and step not in reported:
+                text = f"{step}{remaining}{'' if reported else note}"
                 print(text, file=sys.stderr, flush=True)
-            last = step
+                reported.add(step)
 
         yield on_progress
 
