@@ -180,8 +180,11 @@ def _fold(
     last = rows.shape[1] - 1
     for k in range(len(rows)):
         block = (first + k) // size
-        if np.isfinite(rows[k]).all():
-            rotate_row(factors[block], rows[:, :last], k)
+        is_known = True
+        for j in range(last + 1):
+            is_known = is_known and np.isfinite(rows[k, j])
+        if is_known:
+            rotate_row(factors[block], rows, k)
             tallies[block, 0] += 1
             tallies[block, 1] = min(tallies[block, 1], rows[k, last])
             tallies[block, 2] = max(tallies[block, 2], rows[k, last])

@@ -1,10 +1,18 @@
-"""Least squares over a window that slides row by row, at a cost that knows nothing of its length.
+"""Least squares over a sliding window, at a cost independent of its length.
 
-Nothing is ever subtracted, so nothing is left of what has gone. The rows come in blocks of the
-window's length. Of the block before, the triangular factor of every suffix is kept; of the block
-that fills, one factor grows by Givens' rotations. A window is a suffix and what has grown, and
-the two triangles are brought to one. (A queue of two stacks: Tangwongsan, Hirzel, Schneider and
-Wu, "General incremental sliding-window aggregation", 2015.)
+No row is ever subtracted (downdated), so no rounding error of rows outside the window remains. The
+rows are divided into blocks of the window's length. Of the previous block, the triangular factor of
+every suffix is kept; of the current block, one factor grows by Givens rotations. A window is a
+suffix of the previous block and the rows of the current block; their two factors are merged into
+one. This is a queue made of two stacks.
+
+A tally of a set of rows is its number of known rows and the smallest and the largest excitation.
+
+References
+----------
+K. Tangwongsan, M. Hirzel, S. Schneider and K.-L. Wu, "General incremental sliding-window
+aggregation", Proceedings of the VLDB Endowment 8, 2015. Givens rotations: G. H. Golub and C. F. Van
+Loan, "Matrix Computations", 4th edition, 2013, 5.1.
 """
 
 from math import sqrt
@@ -16,104 +24,199 @@ from numpy.typing import NDArray
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray
 
-from .batched_qr import TINY, BatchSolutions, allocate_solutions, merge_factors, solve
-
-BATCH_SIZE = (
-    56  # windows solved together; a power of two would have their rows in one line of cache
+from .batched_qr import (
+    MIN_SQUARE_SUM,
+    BatchSolutions,
+    allocate_solutions,
+    merge_factors,
+    solve_batch,
 )
-CHUNK_ROWS = 8192  # rows taken at a time where all are there
-EMPTY_TALLY = (0.0, np.inf, -np.inf)  # the tally of no rows
+
+BATCH_SIZE = 56  # windows solved together; a power of two would map them to the same cache lines
+CHUNK_ROWS = 8192  # rows processed at once where all are available
+EMPTY_TALLY = (0.0, np.inf, -np.inf)
 
 
 class WindowSolutions(NamedTuple):
-    """Least squares of each of k windows, the first of which ends with the `length`-th row."""
+    """Least squares of each of k windows with p regressors.
 
-    values: FloatArray  # (k, p), NaN for a column that is zero throughout, or if X is singular
-    conditions: FloatArray  # (k,) 2-norm, of the columns scaled to unit length; inf if singular
+    Attributes
+    ----------
+    values
+        (k, p) the coefficients; NaN for a regressor that is zero in all rows of the window, and in
+        a window whose X is singular or that has fewer known rows than coefficients.
+    conditions
+        (k,) 2-norm condition number of X with its columns scaled to unit length; infinite where
+        there are no values.
+    """
+
+    values: FloatArray
+    conditions: FloatArray
 
 
 class WindowState(NamedTuple):
-    """What is remembered of the rows so far; changed in place."""
+    """State of a sliding window of n rows with p regressors; changed in place by `push_rows`.
 
-    seen: NDArray[np.int64]  # (1,) rows so far
-    block: FloatArray  # (n, p + 1) [X y] of the block that fills
-    older: FloatArray  # (n, p, p + 1) [R Q'y] of every suffix of the block before
-    newer: FloatArray  # (p, p + 1) the same of the block that fills
-    block_tally: FloatArray  # (n, 3) 1 if it is known, its excitation, and that again; of a row
-    older_tally: FloatArray  # (n, 3) rows known, least and greatest excitation; of a suffix
-    newer_tally: FloatArray  # (1, 3)
+    Attributes
+    ----------
+    row_count
+        (1,) the number of rows so far.
+    rows
+        (n, p + 1) the rows ``[X y]`` of the current block.
+    suffixes
+        (n, p, p + 1) the factor ``[R Q'y]`` of each suffix of the previous block.
+    prefix
+        (p, p + 1) the factor of the rows of the current block.
+    row_tallies
+        (n, 3) the tally of each row of the current block.
+    suffix_tallies
+        (n, 3) the tally of each suffix of the previous block.
+    prefix_tally
+        (1, 3) the tally of the rows of the current block.
+    """
+
+    row_count: NDArray[np.int64]
+    rows: FloatArray
+    suffixes: FloatArray
+    prefix: FloatArray
+    row_tallies: FloatArray
+    suffix_tallies: FloatArray
+    prefix_tally: FloatArray
 
 
 class RawWindows(NamedTuple):
-    """Windows as they stand before anyone has judged them."""
+    """Least squares of k windows, whether or not their rows determine the coefficients.
+
+    Attributes
+    ----------
+    solutions
+        The solution of each window.
+    tallies
+        (k, 3) the number of known rows, the smallest and the largest excitation of each window.
+    """
 
     solutions: BatchSolutions
-    tallies: FloatArray  # (k, 3) rows known, least and greatest excitation
+    tallies: FloatArray
 
 
 def sliding_least_squares(X: FloatArray, y: FloatArray, length: int) -> WindowSolutions:
-    """Least squares over every `length` successive rows of X (m, p) and y (m,), p being small.
+    """Solve the least squares of every window of `length` successive rows.
 
-    Rows that are not finite take up room in a window and count for nothing; a column that is zero
-    throughout a window has no value there; nor has any, where fewer rows are known than columns
-    or X is singular to the arithmetic's precision. Raises `ValueError` unless `length` is one at
-    the least.
+    Parameters
+    ----------
+    X
+        (m, p) the regressors; p is small.
+    y
+        (m,) the target. A row that is not finite in X or y occupies a place in its windows and is
+        ignored.
+    length
+        The number of rows in a window.
+
+    Returns
+    -------
+    windows
+        The ``m - length + 1`` windows; the first ends with row ``length - 1``. None if there are
+        fewer rows.
+
+    Raises
+    ------
+    ValueError
+        `length` is less than one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> X = np.array([[1.0], [2.0], [3.0], [4.0]])
+    >>> sliding_least_squares(X, np.array([2.0, 4.0, 9.0, 12.0]), 2).values[:, 0].round(2).tolist()
+    [2.0, 2.69, 3.0]
     """
     p = X.shape[1]
-    state, still = empty_window(length, p), np.zeros(len(y))
+    state, excitation = empty_window(length, p), np.zeros(len(y))
     values: list[FloatArray] = [np.empty((0, p))]
     conditions: list[FloatArray] = [np.empty(0)]
     for start in range(0, len(y), CHUNK_ROWS):
         chunk = slice(start, start + CHUNK_ROWS)
-        found, tallies = push_rows(state, X[chunk], y[chunk], still[chunk])
-        kept = found.inflations > 0
-        enough = np.isfinite(found.conditions) & (tallies[:, 0] >= kept.sum(axis=0))
-        values.append(np.where(kept & enough, found.values, np.nan).T)
-        conditions.append(np.where(enough, found.conditions, np.inf))
+        solutions, tallies = push_rows(state, X[chunk], y[chunk], excitation[chunk])
+        is_used = solutions.inflations > 0
+        is_determined = np.isfinite(solutions.conditions) & (tallies[:, 0] >= is_used.sum(axis=0))
+        values.append(np.where(is_used & is_determined, solutions.values, np.nan).T)
+        conditions.append(np.where(is_determined, solutions.conditions, np.inf))
     return WindowSolutions(np.concatenate(values), np.concatenate(conditions))
 
 
 def empty_window(length: int, p: int) -> WindowState:
-    """For windows of `length` rows of `p` regressors; `ValueError` unless there is a row."""
+    """Return the state of a window of `length` rows with `p` regressors, before any row.
+
+    Raises
+    ------
+    ValueError
+        `length` is less than one.
+    """
     if length < 1:
-        raise ValueError(f"a window has one row at the least, not {length}")
-    nothing = np.array([EMPTY_TALLY])
+        raise ValueError(f"window of {length} rows; the length must be at least 1")
+    empty = np.array([EMPTY_TALLY])
     return WindowState(
         np.zeros(1, np.int64),
         np.zeros((length, p + 1)),
         np.zeros((length, p, p + 1)),
         np.zeros((p, p + 1)),
-        np.tile(nothing, (length, 1)),
-        np.tile(nothing, (length, 1)),
-        nothing.copy(),
+        np.tile(empty, (length, 1)),
+        np.tile(empty, (length, 1)),
+        empty.copy(),
     )
 
 
 def push_rows(
     state: WindowState, X: FloatArray, y: FloatArray, excitation: FloatArray
 ) -> RawWindows:
-    """The windows that end in the next rows X (m, p), y (m,) and excitation (m,).
+    """Add rows, and solve the windows that end in them.
 
-    However the rows are parted into chunks, the windows are the same.
+    The windows are the same to the last bit however the rows are divided into chunks.
+
+    Parameters
+    ----------
+    state
+        The window's state; changed in place.
+    X
+        (m, p) the regressors of the next rows.
+    y
+        (m,) their target.
+    excitation
+        (m,) the quantity whose range in a window is reported in the tallies.
+
+    Returns
+    -------
+    windows
+        One window for each row, except for the first ``length - 1`` rows of all.
     """
     rows = np.column_stack((X, y)).astype(np.float64, copy=False)
-    unknown = ~np.isfinite(rows).all(axis=1)
+    is_unknown = ~np.isfinite(rows).all(axis=1)
     tallies = np.column_stack((np.ones(len(y)), excitation, excitation))
-    rows[unknown], tallies[unknown] = 0.0, EMPTY_TALLY
-    length, before = len(state.block), int(state.seen[0])
-    k = max(0, before + len(y) - length + 1) - max(0, before - length + 1)
-    window = RawWindows(allocate_solutions(k, X.shape[1]), np.tile(EMPTY_TALLY, (k, 1)))
-    _push_rows(state, rows, tallies, window)
-    return window
+    rows[is_unknown], tallies[is_unknown] = 0.0, EMPTY_TALLY
+    length, row_count = len(state.rows), int(state.row_count[0])
+    k = max(0, row_count + len(y) - length + 1) - max(0, row_count - length + 1)
+    windows = RawWindows(allocate_solutions(k, X.shape[1]), np.tile(EMPTY_TALLY, (k, 1)))
+    _push_rows(state, rows, tallies, windows)
+    return windows
 
 
 @compiled
 def rotate_row(factor: FloatArray, rows: FloatArray, t: int) -> None:
-    """Row t of [X y] into a factor [R Q'y], by Givens' rotations; the row is used up."""
+    """Update a factor with one row, by Givens rotations.
+
+    Parameters
+    ----------
+    factor
+        (p, p + 1) the factor ``[R Q'y]`` to update.
+    rows
+        (m, p + 1) or wider: the rows ``[X y]``; further columns are ignored.
+    t
+        The row to add; overwritten.
+    """
     p = len(factor)
     for j in range(p):
         square = factor[j, j] ** 2 + rows[t, j] ** 2
-        if rows[t, j] == 0 or square < TINY:
+        if rows[t, j] == 0 or square < MIN_SQUARE_SUM:
             continue
         r = sqrt(square)
         c, s = factor[j, j] / r, rows[t, j] / r
@@ -126,69 +229,70 @@ def rotate_row(factor: FloatArray, rows: FloatArray, t: int) -> None:
 
 @compiled
 def rotate_rows(factor: FloatArray, rows: FloatArray) -> None:
-    """Rows [X y] (m, p + 1) into a factor [R Q'y] (p, p + 1); they are used up."""
+    """Update a factor ``[R Q'y]`` (p, p + 1) with rows ``[X y]`` (m, p + 1), overwritten."""
     for t in range(len(rows)):
         rotate_row(factor, rows, t)
 
 
 @compiled
 def _push_rows(
-    state: WindowState, rows: FloatArray, tallies: FloatArray, window: RawWindows
+    state: WindowState, rows: FloatArray, tallies: FloatArray, windows: RawWindows
 ) -> None:
-    """Rows (m, p + 1), used up, and their tallies (m, 3) onto the stacks."""
-    length, p, _ = state.older.shape
+    """Add rows (m, p + 1), overwritten, with tallies (m, 3); write the windows that end in them."""
+    length, p, _ = state.suffixes.shape
     factors, others = np.zeros((p, p + 1, BATCH_SIZE)), np.empty((p, p + 1, BATCH_SIZE))
     first = waiting = 0
     for t in range(len(rows)):
-        at = state.seen[0] % length
-        if at == 0 and state.seen[0] > 0:
-            _turn_over(state)
+        index = state.row_count[0] % length
+        if index == 0 and state.row_count[0] > 0:
+            _complete_block(state)
         for j in range(p + 1):
-            state.block[at, j] = rows[t, j]
-        _count_in(state.block_tally, at, tallies, t)
-        rotate_row(state.newer, rows, t)
-        _count_in(state.newer_tally, 0, tallies, t)
-        state.seen[0] += 1
-        if state.seen[0] < length:
+            state.rows[index, j] = rows[t, j]
+        _add_tally(state.row_tallies, index, tallies, t)
+        rotate_row(state.prefix, rows, t)
+        _add_tally(state.prefix_tally, 0, tallies, t)
+        state.row_count[0] += 1
+        if state.row_count[0] < length:
             continue
-        suffix = (at + 1) % length  # none is left of a whole block:
-        held = 1.0 if suffix else 0.0
+        suffix = (index + 1) % length  # zero: the window is the current block alone
+        weight = 1.0 if suffix else 0.0
         for i in range(p):
             for j in range(i, p + 1):
-                factors[i, j, waiting] = state.newer[i, j]
-                others[i, j, waiting] = held * state.older[suffix, i, j]
-        _count_in(window.tallies, first + waiting, state.newer_tally, 0)
+                factors[i, j, waiting] = state.prefix[i, j]
+                others[i, j, waiting] = weight * state.suffixes[suffix, i, j]
+        _add_tally(windows.tallies, first + waiting, state.prefix_tally, 0)
         if suffix:
-            _count_in(window.tallies, first + waiting, state.older_tally, suffix)
+            _add_tally(windows.tallies, first + waiting, state.suffix_tallies, suffix)
         waiting += 1
         if waiting == BATCH_SIZE or t + 1 == len(rows):
             merge_factors(factors, others, waiting)
-            solve(factors, waiting, first, window.solutions)
+            solve_batch(factors, waiting, first, windows.solutions)
             first, waiting = first + waiting, 0
 
 
 @compiled
-def _turn_over(state: WindowState) -> None:
-    """The block is full: its suffixes, and an empty one in its place."""
-    length, p, _ = state.older.shape
-    newer, tally = state.newer, state.newer_tally
-    newer[:] = 0.0
+def _complete_block(state: WindowState) -> None:
+    """Compute the suffixes of the block that is complete, and start an empty one."""
+    length, p, _ = state.suffixes.shape
+    factor, tally = state.prefix, state.prefix_tally
+    factor[:] = 0.0
     tally[0, 0], tally[0, 1], tally[0, 2] = EMPTY_TALLY
     for t in range(length - 1, -1, -1):
-        rotate_row(newer, state.block, t)
-        _count_in(tally, 0, state.block_tally, t)
+        rotate_row(factor, state.rows, t)
+        _add_tally(tally, 0, state.row_tallies, t)
         for i in range(p):
             for j in range(i, p + 1):
-                state.older[t, i, j] = newer[i, j]
+                state.suffixes[t, i, j] = factor[i, j]
         for j in range(3):
-            state.older_tally[t, j] = tally[0, j]
-            state.block_tally[t, j] = EMPTY_TALLY[j]
-    newer[:] = 0.0
+            state.suffix_tallies[t, j] = tally[0, j]
+            state.row_tallies[t, j] = EMPTY_TALLY[j]
+    factor[:] = 0.0
     tally[0, 0], tally[0, 1], tally[0, 2] = EMPTY_TALLY
 
 
 @compiled
-def _count_in(tallies: FloatArray, i: int, others: FloatArray, j: int) -> None:
+def _add_tally(tallies: FloatArray, i: int, others: FloatArray, j: int) -> None:
+    """Add tally j of `others` to tally i of `tallies`."""
     tallies[i, 0] += others[j, 0]
     tallies[i, 1] = min(tallies[i, 1], others[j, 1])
     tallies[i, 2] = max(tallies[i, 2], others[j, 2])
