@@ -1,8 +1,8 @@
-"""Burylin: continuous identification of a nonlinear vessel model, printed against computed.
+"""Comparison of Burylin's paper on continuous identification with values computed by shiplog.
 
-The paper's filter and its least squares over a sliding window as it has them
-(`analysis.identification.comparison.paper_scheme`), and what shiplog does, the equations in weak
-form.
+It compares the paper's filter and its least squares over a sliding window, as printed
+(`analysis.identification.comparison.paper_scheme`), with the method of shiplog, the equations in
+weak form.
 
     python examples/papers/continuous_identification.py > docs/papers_continuous_identification.md
 """
@@ -76,13 +76,13 @@ UNITS2 = (
     ("10⁻⁶ m/s²", 1e-6),
     ("m/s", 1.0),
 )
-NEAREST = ("table1-rad", "none", "whole")
+CLOSEST_CASE = ("table1-rad", "none", "whole")  # of Table 2: reading, noise, coefficients
 STATES = ("w''", "w'", "w", "v'", "v")
 POINT = (0.3, 0.01, 9.0, 20.0, 2.5, 80.0, 0.5)  # w, w', v, delta, delta', n, n'
-ROUNDS = 28  # of coefficients found and put back into the filter,
-STARTS = (0.2, 0.01, 0.001)  # from priors off by so much
-FAR = 1e6  # in any state: the model has run away
-TOLD_SECS = 400.0  # until then a window of 200 s sees the rudder move
+MAX_ROUNDS = 28  # of feeding the coefficients back into the filter
+INITIAL_ERRORS = (0.2, 0.01, 0.001)  # relative errors of the prior in the first round
+MAX_STATE = 1e6  # of any state; above it the model diverges
+EXCITED_SECS = 400.0  # until then the rudder moves within each window of 200 s
 READINGS = {"degrees": "table1", "radians": "table1-rad"}
 PRINTED = {
     "a": "T₁ = 150, T₂ = 50",
@@ -110,33 +110,48 @@ PRINTED_P = {
 }
 
 FORMULAS = (
-    ("(1)", "c₂ω/ω", "c₂ω·|ω|", "scanned: a stroke for a bar, as in (4)"),
-    ("(5)", "ẋ[k+1] = A x[k] + …", "x[k+1] = exp(A·dt) x[k] + …", "A is of the derivative"),
-    ("row 4", "v̇ = x₄ = …", "v̇ = ẋ₄ = …", "the dot is lost"),
+    ("(1)", "c₂ω/ω", "c₂ω·|ω|", "error of the scan: a stroke for a bar; see (4)"),
+    (
+        "(5)",
+        "ẋ[k+1] = A x[k] + …",
+        "x[k+1] = exp(A·dt) x[k] + …",
+        "A is the matrix of the differential equation",
+    ),
+    ("row 4", "v̇ = x₄ = …", "v̇ = ẋ₄ = …", "the dot is missing"),
     ("u₇", "v·δ̇, which is u₈", "**v·δ**", "row 2: b₄ u₇ is α₁vδ/(T₁T₂)"),
     (
         "u₉",
         "v̇·n·δ·E",
         "**n·δ·E**; v̇·n·δ·E is **u₂₀**",
-        "one symbol for two: row 2 needs the former, row 3 the latter",
+        "one symbol for both: row 2 needs the former, row 3 the latter",
     ),
     ("u₁₉", "v̇·δ̇·E", "**v̇·n·δ̇·E**", "d(n·E)/dt = ṅE − α₃·v̇·n·E"),
-    ("B, row 3", "b₂·sign(x₁) at u₁₄", "**2·**b₂·sign(x₁)", "the equation above it has the 2"),
+    (
+        "B, row 3",
+        "b₂·sign(x₁) at u₁₄",
+        "**2·**b₂·sign(x₁)",
+        "the equation above it has the factor 2",
+    ),
     (
         "B, rows",
         "17, 18, 17, 17, 17 entries",
         "20 each",
-        "19 inputs are defined; in row 5 h, 2f, 2g stand two columns too far left",
+        "19 inputs are defined; in row 5 h, 2f, 2g are two columns too far left",
     ),
-    ("(6)", "L = A P Cᵀ(…)⁻¹, of discrete time", "P is of continuous time", "see the covariance"),
+    ("(6)", "L = A P Cᵀ(…)⁻¹, for discrete time", "P is for continuous time", "see the covariance"),
     (
         "noise",
         "sin(τ⁻¹); v + 0.2v; Gaussian, uniform",
         "sin(t/τ); v + 0.2ν; uniform on [−1, 1]",
-        "ν is scanned as v",
+        "error of the scan: v for ν",
     ),
-    ("(7)", "Υ = [v² ω² n], A = [f g h]", "[ω² v² n]", "the order; by (4) f stands at ω²"),
-    ("(7)", "δ(αv + …)", "δ(α₁v + …)", "an index is lost"),
+    (
+        "(7)",
+        "Υ = [v² ω² n], A = [f g h]",
+        "[ω² v² n]",
+        "wrong order; in (4) f is the coefficient of ω²",
+    ),
+    ("(7)", "δ(αv + …)", "δ(α₁v + …)", "an index is missing"),
 )
 
 PRINTED_ROWS = (
@@ -152,12 +167,22 @@ PRINTED_ROWS = (
 
 
 def estimates(signals: Signals, prior: Coefficients, *, jumps: bool = True) -> FloatArray:
-    """The states by the paper's filter, (m, 5), the model in it being `prior`."""
+    """Estimate the states (m, 5) by the paper's filter.
+
+    Parameters
+    ----------
+    signals
+        The signals of a run.
+    prior
+        The coefficients of the model in the filter.
+    jumps
+        Whether the jump of w'' with the rudder's rate is added, which the paper omits.
+    """
     return paper_states(signals, prior, as_printed=not jumps)
 
 
-def identified(signals: Signals, c: Coefficients, x: FloatArray) -> FloatArray:
-    """The paper's nine coefficients from all of a run, (9,)."""
+def paper_coefficients(signals: Signals, c: Coefficients, x: FloatArray) -> FloatArray:
+    """Fit the nine coefficients (9,) to a whole run by the paper's least squares."""
     return np.concatenate([solve_window(rows) for rows in regression_rows(signals, c, x)])
 
 
@@ -166,14 +191,26 @@ def identified(signals: Signals, c: Coefficients, x: FloatArray) -> FloatArray:
 
 @cache
 def vessel_of(preset: str) -> Vessel:
-    """A reading of Table 1."""
+    """Load a reading of Table 1."""
     return load_vessel(preset)[0]
 
 
 def measured(
     preset: str, noise: str, seed: int = 0, name: str = "paper"
 ) -> tuple[SimulatedTrial, Signals]:
-    """A run of 500 s, and its signals on one clock."""
+    """Simulate a run of 500 s, and resample it.
+
+    Parameters
+    ----------
+    preset
+        The vessel: a reading of Table 1.
+    noise
+        The sensor noise, ``none`` or ``paper``.
+    seed
+        The seed of the noise.
+    name
+        The manoeuvre.
+    """
     sensors = suite(noise, angle_unit=vessel_of(preset).angle_unit)
     trial = simulate(vessel_of(preset), name, duration_secs=DURATION, seed=seed, sensors=sensors)
     channels = ("yaw_rate", "speed", "rudder", "rpm")
@@ -181,13 +218,13 @@ def measured(
 
 
 def truth_of(vessel: Vessel, name: str = "paper") -> FloatArray:
-    """w'', w', w, v', v of a ship on the paper's run, every 0.1 s, (m, 5)."""
+    """Compute w'', w', w, v', v (m, 5) of a ship on the paper's run, every 0.1 s."""
     c, times = vessel.coefficients, np.arange(int(DURATION / DT)) * DT
-    sailed = compute_trajectory(
+    trajectory = compute_trajectory(
         vessel, manoeuvre(name, DURATION, vessel.approach_rpm), DURATION
     ).at(times + 1e-9)
-    w, w_dot, v, n = (sailed[k] for k in ("yaw_rate", "yaw_acceleration", "speed", "rpm"))
-    delta = sailed["rudder"]
+    w, w_dot, v, n = (trajectory[k] for k in ("yaw_rate", "yaw_acceleration", "speed", "rpm"))
+    delta = trajectory["rudder"]
     rate = np.diff(delta, append=delta[-1]) / DT
     hull = c.a * w_dot + c.b1 * w + c.b2 * w * abs(w) + c.b3 * w**3
     w_ddot = hull + rudder_effects(c, v, n) * (c.d * delta + c.e * rate)
@@ -195,27 +232,29 @@ def truth_of(vessel: Vessel, name: str = "paper") -> FloatArray:
 
 
 def nine(c: Coefficients) -> FloatArray:
-    """The nine coefficients in the order of `NAMES`."""
+    """Return the nine coefficients in the order of `NAMES`."""
     return np.array(c[:9])
 
 
 def with_nine(c: Coefficients, values: FloatArray) -> Coefficients:
-    """The same alphas with other coefficients."""
+    """Replace the nine coefficients, and keep the alphas."""
     return c._replace(**dict(zip(NAMES, map(float, values), strict=True)))
 
 
-def percent(found: FloatArray, true: FloatArray) -> FloatArray:
-    """Errors in % of the true values."""
-    return 100 * (found / true - 1)
+def percent(values: FloatArray, true: FloatArray) -> FloatArray:
+    """Return the errors in % of the true values."""
+    return 100 * (values / true - 1)
 
 
-def in_weak_form(signals: Signals, c: Coefficients) -> tuple[FloatArray, list[CoefficientHistory]]:
-    """Shiplog's coefficients of the whole run, (9,), and their histories of yaw and surge."""
+def weak_form_coefficients(
+    signals: Signals, c: Coefficients
+) -> tuple[FloatArray, list[CoefficientHistory]]:
+    """Fit the coefficients (9,) to a whole run in weak form; return also the histories."""
     values: list[float] = []
     histories = []
     for rows in weak_form(signals, c):
-        found, history = fit_coefficients(rows)
-        values += [found.coefficients[name].value for name in rows.equation.names]
+        fit, history = fit_coefficients(rows)
+        values += [fit.coefficients[name].value for name in rows.equation.names]
         histories.append(history)
     return np.array(values), histories
 
@@ -233,13 +272,14 @@ def main() -> None:
         " > docs/papers_continuous_identification.md"
     )
     paragraph(
-        "The paper has two tables, a covariance and four figures. The covariance comes out to"
-        " every printed digit; Table 2 in part, and only of a run nearly free of noise. Of the"
-        " figures the scan has the captions but not the curves, and the text prints neither the"
-        " manoeuvre nor the step nor the window's length N: the run is that of our notes"
-        " (n = 100 rpm, v₀ = 2 m/s, rudder +20° at 0 s, −20° at 200 s, at 2.5 °/s), the step is"
-        " 0.1 s, N as said. “The paper's” below is its filter and its least squares as printed,"
-        " kept in shiplog for comparison; “weak form” is what shiplog does instead."
+        "The paper has two tables, a covariance and four figures. The covariance is reproduced to"
+        " every printed digit; Table 2 is reproduced in part, and only for a run nearly without"
+        " noise. Our copy is a scan that shows the captions of the figures but not their curves."
+        " The text prints neither the manoeuvre nor the time step nor the length N of the window."
+        " The run is therefore that of our notes (n = 100 rpm, v₀ = 2 m/s, rudder +20° at 0 s,"
+        " −20° at 200 s, at 2.5 °/s), the step is 0.1 s, and N is given below. “The paper's"
+        " method” is its filter and its least squares as printed, kept in shiplog for comparison;"
+        " “weak form” is the method of shiplog."
     )
     table1()
     formulas()
@@ -253,60 +293,64 @@ def main() -> None:
 
 
 def rounded(values: Iterable[float], form: str = ".2g") -> list[str]:
-    """Errors in few digits, without exponents below 10 000."""
+    """Format errors with few digits, without exponents below 10 000."""
     texts = (f"{v:.0f}" if 100 <= abs(v) < 1e4 else f"{v:{form}}" for v in values)
     return [text.replace("-", "−").replace("nan", "–") for text in texts]
 
 
 def table1() -> None:
-    """What the table means, read in degrees and in radians."""
+    """Print Table 1, and the ship that it defines in degrees and in radians."""
     deg, rad = (vessel_of(name).coefficients for name in READINGS.values())
     rows = [
         (name, PRINTED.get(name, ""), number(getattr(deg, name)), number(x))
         for name, x in rad._asdict().items()
     ]
-    head = ("coefficient", "printed", "read in degrees (SI)", "read in radians (SI)")
-    table("Table 1, the model's parameters", head, rows)
-    paragraph("The paper does not say in what its angles are. Its numbers make two ships of it:")
-    circles = []
+    header = ("coefficient", "printed", "read in degrees (SI)", "read in radians (SI)")
+    table("Table 1, the model's parameters", header, rows)
+    paragraph(
+        "The paper does not state the unit of its angles. The two readings are two different ships:"
+    )
+    turns = []
     for name, preset in READINGS.items():
         vessel = vessel_of(preset)
-        sailed = compute_trajectory(vessel, manoeuvre("turning-circle-35", 4000.0, 80.0), 4000.0)
-        end = sailed.at(np.array([500.0, 3999.0]))
+        trajectory = compute_trajectory(
+            vessel, manoeuvre("turning-circle-35", 4000.0, 80.0), 4000.0
+        )
+        end = trajectory.at(np.array([500.0, 3999.0]))
         w, v = end["yaw_rate"] / DEG, end["speed"]
-        kept = 100 * v[1] / steady_speed(vessel.coefficients, 80.0)
-        wide = 2 * v[1] / (w[1] * DEG)
-        circles.append((name, f"{w[1]:.3f} °/s", f"{wide:.0f} m", f"{kept:.0f} %"))
-    table("", ("read in", "yaw rate at 35°, 80 rpm", "diameter", "speed kept"), circles)
+        speed_ratio = 100 * v[1] / steady_speed(vessel.coefficients, 80.0)
+        diameter = 2 * v[1] / (w[1] * DEG)
+        turns.append((name, f"{w[1]:.3f} °/s", f"{diameter:.0f} m", f"{speed_ratio:.0f} %"))
+    table("", ("read in", "yaw rate at 35°, 80 rpm", "diameter", "speed kept"), turns)
     speeds = ", ".join(
         f"{steady_speed(deg, n):.3f}" for n in (20.0, 40.0, 60.0, 80.0, 100.0, 150.0)
     )
     paragraph(
         f"Straight ahead at 20, 40, 60, 80, 100 and 150 rpm both make {speeds} m/s. Read in degrees"
-        " it is a plausible ship of some 200 m; in radians the hull hardly feels the turn. Yet the"
-        " size of the noise (A_ω = 5·10⁻⁵, nothing in degrees) and of Table 2 speak for radians."
-        " shiplog has both, `table1` and `table1-rad`."
+        " it is a plausible ship of about 200 m; in radians the turn hardly reduces the speed."
+        " However, the size of the noise (A_ω = 5·10⁻⁵, negligible in degrees) and Table 2 indicate"
+        " radians. shiplog has both, `table1` and `table1-rad`."
     )
 
 
 def formulas() -> None:
-    """The paper's formulas that are not right as printed."""
-    table("The formulas", ("where", "printed", "right", "why"), FORMULAS)
-    paragraph("E = exp(−v·α₃). The rest of (1) to (7) is right as printed, under δ̈ = n̈ = 0.")
-    table("The matrix B", ("row", "printed, as column: entry", "right"), PRINTED_ROWS)
+    """Print the formulas that are wrong as printed, with their corrections."""
+    table("The formulas", ("where", "printed", "correct", "reason"), FORMULAS)
+    paragraph("E = exp(−v·α₃). The rest of (1) to (7) is correct as printed, for δ̈ = n̈ = 0.")
+    table("The matrix B", ("row", "printed, as column: entry", "correct"), PRINTED_ROWS)
     paragraph(
-        "s = sign(x₁); row 1 is zero in both. With the twenty pseudo-inputs A x + B u is the"
-        " derivative itself, as the next table shows at one point."
+        "s = sign(x₁); row 1 is zero in both. With the twenty pseudo-inputs A x + B u is equal"
+        " to the derivative, as the next table shows at one point."
     )
 
 
 def point() -> None:
-    """A x + B u at one point, right and as printed, beside the derivative itself."""
-    c = vessel_of("table1-rad").coefficients  # the numbers as printed, in whatever angles
+    """Print A x + B u at one point, corrected and as printed, beside the derivative."""
+    c = vessel_of("table1-rad").coefficients  # the numbers as printed, in any unit of angle
     w, w_dot, v, delta, rate, n, n_dot = POINT
 
     def accelerations(h: float) -> FloatArray:
-        """w'' and v' a moment later, along the motion."""
+        """Return w'' and v' at the time h, s, along the motion."""
         w_ddot = yaw_acceleration_rate(c, w, w_dot, v, n, delta, rate)
         at = (w + h * w_dot, w_dot + h * w_ddot, v + h * surge_acceleration(c, w, v, n))
         n_h, delta_h = n + h * n_dot, delta + h * rate
@@ -333,36 +377,37 @@ def point() -> None:
         (name, *(number(float(value), 8) for value in values))
         for name, *values in zip(("w''", "w'''", "v'", "v''"), *columns, strict=True)
     ]
-    head = ("", "the derivative", "A x + B u, right", "equations as printed", "matrix as printed")
-    table("At one point", head, rows)
+    header = (
+        "",
+        "the derivative",
+        "A x + B u, correct",
+        "equations as printed",
+        "matrix as printed",
+    )
+    table("At one point", header, rows)
     C = np.eye(5)[[0, 3]]
-    seen = np.vstack([C @ np.linalg.matrix_power(A, k) for k in range(5)])
+    observability = np.vstack([C @ np.linalg.matrix_power(A, k) for k in range(5)])
     paragraph(
-        "At w = 0.3, w' = 0.01, v = 9, δ = 20, δ' = 2.5, n = 80, n' = 0.5, in the table's own"
-        f" angles. The pair (A, C) shows {np.linalg.matrix_rank(seen)} states of 5, w, w' and v: no"
-        " measurement corrects ω̈ and v̇, and the latter's error does not even decay. The algebraic"
-        " Riccati equation that the paper names has no stabilising solution for such a pair."
+        "At w = 0.3, w' = 0.01, v = 9, δ = 20, δ' = 2.5, n = 80, n' = 0.5, in the unit of angle"
+        f" of the table. The pair (A, C) observes {np.linalg.matrix_rank(observability)} states of"
+        " 5, w, w' and v: no measurement corrects ω̈ and v̇, and the error of the latter does not"
+        " even decay. For such a pair the algebraic Riccati equation, which the paper names, has"
+        " no stabilising solution."
     )
 
 
 def covariance() -> None:
-    """The printed P, from the continuous Riccati equation."""
+    """Compare the printed P with the solution of the continuous Riccati equation."""
     A, _ = pseudo_input_matrices(vessel_of("table1").coefficients, 1.0)
-    C = np.eye(5)[[0, 3]]
-
-    def rate(_: float, flat: FloatArray) -> FloatArray:
-        P = flat.reshape(5, 5)
-        return np.asarray(A @ P + P @ A.T + Q * np.eye(5) - P @ C.T @ C @ P / R).ravel()
-
-    times = np.linspace(1.0, 1000.0, 1000)
-    start, span = P0 * np.eye(5).ravel(), (0.0, 1000.0)
-    run = solve_ivp(rate, span, start, "LSODA", times, rtol=1e-10, atol=1e-12)
-    history = run.y.T.reshape(-1, 5, 5)
+    times, history = covariance_history(A)
     P = history[round(P_SECS) - 1]
     remarks = {
-        (3, 3): f"Q/(2·abs(a)) = {Q / 2 / -A[1, 1]:.4f}: no measurement takes part",
-        (4, 4): "√(QR) = 2 when settled, 2.005 in discrete time at 1 s: neither is printed",
-        (5, 5): "P(0) + Q·t, without end: so t = 378 s",
+        (3, 3): f"Q/(2·abs(a)) = {Q / 2 / -A[1, 1]:.4f}: independent of the measurements",
+        (
+            4,
+            4,
+        ): "the steady state is √(QR) = 2, or 2.005 in discrete time at 1 s; neither is printed",
+        (5, 5): "P(0) + Q·t, unbounded: hence t = 378 s",
     }
     rows = [
         Row(f"P({i},{j})", text, float(P[i - 1, j - 1]), remarks.get((i, j), ""))
@@ -372,8 +417,9 @@ def covariance() -> None:
     comparison("The covariance", [*rows, Row("its other entries", "0", others)])
     paragraph(
         "The equation is P' = A P + P Aᵀ + Q − P Cᵀ R⁻¹ C P with R = 400·I and G = I as printed,"
-        " Q = 0.01·I and P(0) = 10·I not printed, at t = 378 s: continuous time, and neither the"
-        " discrete filter of (6) nor “settled”, with the true coefficients in A. Its gains P Cᵀ/R:"
+        " and Q = 0.01·I and P(0) = 10·I, which are not printed, at t = 378 s, with the true"
+        " coefficients in A. It is of continuous time and neither the discrete filter of (6) nor"
+        " “settled”. Its gains P Cᵀ/R:"
     )
     K = P[:, [0, 3]] / R
     gains = [
@@ -382,35 +428,55 @@ def covariance() -> None:
     ]
     table("", ("gain", "to w (1/s)", "w' (1/s²)", "w'' (1/s³)", "v (1/s)", "v' (1/s²)"), gains)
     paragraph(
-        f"v follows the log with a time constant of {1 / K[3, 1]:.0f} s, w the gyro with some"
-        f" {1 / K[0, 0]:.0f} s, w'' and v' follow nothing: the filter is its model running by"
-        " itself, a little drawn to the data."
+        f"v follows the log with a time constant of {1 / K[3, 1]:.0f} s, w follows the gyro with"
+        f" about {1 / K[0, 0]:.0f} s, and w'' and v' follow no measurement: the filter is mainly a"
+        " simulation of its model, with a small correction by the data."
     )
-    drawn, axes = plt.subplots(figsize=(6.8, 3.2))
+    draw_covariance(times, history)
+
+
+def covariance_history(A: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Integrate the Riccati equation; return the times (1000,), s, and P (1000, 5, 5)."""
+    C = np.eye(5)[[0, 3]]
+
+    def rate(_: float, flat: FloatArray) -> FloatArray:
+        P = flat.reshape(5, 5)
+        return np.asarray(A @ P + P @ A.T + Q * np.eye(5) - P @ C.T @ C @ P / R).ravel()
+
+    times = np.linspace(1.0, 1000.0, 1000)
+    start, span = P0 * np.eye(5).ravel(), (0.0, 1000.0)
+    solution = solve_ivp(rate, span, start, "LSODA", times, rtol=1e-10, atol=1e-12)
+    return times, solution.y.T.reshape(-1, 5, 5)
+
+
+def draw_covariance(times: FloatArray, history: FloatArray) -> None:
+    """Draw the diagonal of P over time, with the printed values."""
+    figure, axes = plt.subplots(figsize=(6.8, 3.2))
     for k, name in enumerate(("w", "w'", "w''", "v", "v'")):
         (line,) = axes.semilogy(times, history[:, k, k], label=name)
         axes.plot([P_SECS], [float(PRINTED_P[k + 1, k + 1])], "o", color=line.get_color(), ms=6)
     axes.axvline(P_SECS, color="black", lw=0.8, ls=":")
-    axes.set(xlabel="t (s)", ylabel="variance: P's diagonal", xlim=(0, 1000))
+    axes.set(xlabel="t (s)", ylabel="variance: diagonal of P", xlim=(0, 1000))
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     picture(
         "continuous_identification_covariance",
-        drawn,
-        "P's diagonal, and as dots what the paper prints as settled, at 378 s: v' only grows.",
+        figure,
+        "Diagonal of P. Dots: the values that the paper prints as settled, at 378 s. The variance"
+        " of v' only grows.",
     )
-    plt.close(drawn)
+    plt.close(figure)
 
 
 def figures() -> None:
-    """The four figures, for a run under the paper's noise, read in degrees."""
+    """Draw the four figures, for a run with the paper's noise, read in degrees."""
     vessel = vessel_of("table1")
     c, true = vessel.coefficients, truth_of(vessel)
     _, signals = measured("table1", "paper")
     x = estimates(signals, c, jumps=False)
     paragraph("## The figures")
     paragraph(
-        "Of the run named above, read in degrees, under the paper's noise, with the true model in"
-        " the filter, as the paper has it."
+        "The run is the one described above, read in degrees, with the noise of the paper and, as"
+        " in the paper, with the true model in the filter."
     )
     panels = (
         ("v (m/s)", 1.0, 4, 3, signals["speed"]),
@@ -421,21 +487,26 @@ def figures() -> None:
     )
     states_figure(1, "speed and its rate", panels[:2], true, x)
     states_figure(
-        2, "yaw rate (its noise is thinner than the line) and its derivatives", panels[2:], true, x
+        2,
+        "yaw rate (with noise smaller than the width of the line) and its derivatives",
+        panels[2:],
+        true,
+        x,
     )
     rows = []
-    for label, per, i, k, noisy in panels:
-        spread = [true[:, i], x[: len(true), k] - true[:, i]]
+    for label, unit, i, k, noisy in panels:
+        errors = [true[:, i], x[: len(true), k] - true[:, i]]
         if noisy is not None:
-            spread.insert(1, noisy[: len(true)] - true[:, i])
-        sizes = [number(float(np.sqrt(np.mean(s**2))) / per, 2) for s in spread]
+            errors.insert(1, noisy[: len(true)] - true[:, i])
+        sizes = [number(float(np.sqrt(np.mean(s**2))) / unit, 2) for s in errors]
         rows.append((label, *(sizes if noisy is not None else (sizes[0], "–", sizes[1]))))
     table("", ("rms of", "the state", "the sensor's error", "the filter's error"), rows)
     paragraph(
-        "“Insignificant for the derivatives, satisfactory for the signals”: so it is, for model and"
-        " truth are one here. The filter's v̂ begins at the first noisy sample, and its error then"
-        " decays with the time constant above. In figures 3 and 4 the blue line is the paper's; the"
-        " red one is the same from a prior a fifth off, as any prior of a real ship is."
+        "The paper calls the errors “insignificant for the derivatives, satisfactory for the"
+        " signals”. This is true, because the model in the filter is the true one. The estimate"
+        " v̂ starts at the first noisy sample; its error then decays with the time constant"
+        " above. In figures 3 and 4 the blue line is the paper's method; the red line is the same"
+        " from a prior with errors of 20 %, as a prior of a real ship has."
     )
     coefficient_figures(signals, c, x)
 
@@ -446,301 +517,359 @@ Panel = tuple[str, float, int, int, FloatArray | None]
 def states_figure(
     which: int, what: str, panels: tuple[Panel, ...], true: FloatArray, x: FloatArray
 ) -> None:
-    """Figure 1 or 2: truth, measurement and estimate."""
+    """Draw figure 1 or 2: truth, measurement and estimate."""
     t = np.arange(len(true)) * DT
     size = (6.8, 1.7 * len(panels) + 0.7)
-    drawn, plots = plt.subplots(len(panels), 1, figsize=size, sharex=True)
-    for axes, (label, per, i, k, noisy) in zip(plots, panels, strict=True):
+    figure, plots = plt.subplots(len(panels), 1, figsize=size, sharex=True)
+    for axes, (label, unit, i, k, noisy) in zip(plots, panels, strict=True):
         if noisy is not None:
-            axes.plot(t, noisy[: len(t)] / per, color=GREY, lw=0.5, alpha=0.7, label="measured")
-        axes.plot(t, true[:, i] / per, color=AMBER, lw=3, label="truth")
-        axes.plot(t, x[: len(t), k] / per, color=BLUE, lw=1.2, label="the paper's filter")
+            axes.plot(t, noisy[: len(t)] / unit, color=GREY, lw=0.5, alpha=0.7, label="measured")
+        axes.plot(t, true[:, i] / unit, color=AMBER, lw=3, label="truth")
+        axes.plot(t, x[: len(t), k] / unit, color=BLUE, lw=1.2, label="the paper's filter")
         axes.set(ylabel=label, xlim=(0, DURATION))
     plots[-1].set_xlabel("t (s)")
-    drawn.legend(*plots[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    drawn.align_ylabels()
-    caption = f"The paper's figure {which}: {what}, estimated by its filter."
-    picture(f"continuous_identification_{which}", drawn, caption)
-    plt.close(drawn)
+    figure.legend(*plots[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    figure.align_ylabels()
+    caption = f"Figure {which} of the paper: {what}, estimated by its filter."
+    picture(f"continuous_identification_{which}", figure, caption)
+    plt.close(figure)
 
 
 def coefficient_figures(signals: Signals, c: Coefficients, x: FloatArray) -> None:
-    """Figures 3 and 4: the coefficients window by window, the paper's beside weak form."""
-    ends, found = window_coefficients(signals, c, x)
+    """Draw figures 3 and 4: the coefficients of each window, by the paper and in weak form."""
+    ends, values = window_coefficients(signals, c, x)
     signs = np.where(np.arange(9) % 2, -1.0, 1.0)
-    wrong = with_nine(c, nine(c) * (1 + 0.2 * signs))
-    _, misled = window_coefficients(signals, c, estimates(signals, wrong, jumps=False))
-    yaw, surge = in_weak_form(signals, c)[1]
+    wrong_prior = with_nine(c, nine(c) * (1 + 0.2 * signs))
+    _, with_wrong_prior = window_coefficients(
+        signals, c, estimates(signals, wrong_prior, jumps=False)
+    )
+    yaw, surge = weak_form_coefficients(signals, c)[1]
     for which, history, height in ((3, surge, 2.6), (4, yaw, 4.4)):
         names = history.names
         size = (7.4, height)
-        drawn, plots = plt.subplots(len(names) // 3, 3, figsize=size, sharex=True, sharey=True)
+        figure, plots = plt.subplots(len(names) // 3, 3, figsize=size, sharex=True, sharey=True)
         for axes, name in zip(plots.flat, names, strict=True):
             true = getattr(c, name)
             axes.axhline(1, color="black", lw=0.8)
             axes.plot(
                 ends,
-                found[:, NAMES.index(name)] / true,
+                values[:, NAMES.index(name)] / true,
                 color=BLUE,
-                label="the paper's, true prior",
+                label="paper, true prior",
             )
-            off = misled[:, NAMES.index(name)] / true
-            axes.plot(ends, off, color=RED, lw=1.1, label="the paper's, prior off by 20 %")
-            ours = history.values[:, names.index(name)] / true
-            axes.plot(history.time_secs, ours, color=GREEN, label="weak form")
+            wrong = with_wrong_prior[:, NAMES.index(name)] / true
+            axes.plot(ends, wrong, color=RED, lw=1.1, label="paper, prior with errors of 20 %")
+            weak = history.values[:, names.index(name)] / true
+            axes.plot(history.time_secs, weak, color=GREEN, label="weak form")
             axes.set(title=name, xlim=(0, DURATION), ylim=(-0.2, 2.2))
-        drawn.supxlabel("t, end of the window (s)", fontsize=9.5)
-        drawn.supylabel("value / truth", fontsize=9.5)
-        drawn.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+        figure.supxlabel("t, end of the window (s)", fontsize=9.5)
+        figure.supylabel("value / truth", fontsize=9.5)
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3)
         velocity = "linear" if which == 3 else "angular"
         picture(
             f"continuous_identification_{which}",
-            drawn,
-            f"The paper's figure {which}: coefficients of the {velocity} velocity's equation,"
-            " N = 200 s. The wrong prior is 20 % too large and too small by turns; weak form has"
-            " none, and is blank where a window cannot tell.",
+            figure,
+            f"Figure {which} of the paper: coefficients of the equation of {velocity} velocity, N"
+            " = 200 s. The wrong prior is alternately 20 % too large and 20 % too small; weak"
+            " form has no prior, and no line where a coefficient is unidentifiable in the window.",
         )
-        plt.close(drawn)
+        plt.close(figure)
 
 
 def settling() -> None:
-    """From when on each coefficient is within a tenth, of where it ends and of the truth."""
+    """Print after which time each coefficient stays within 10 % of its end and of the truth."""
     c = vessel_of("table1").coefficients
-    worst, ended, right = [], [], []
+    early_errors, to_end, to_truth = [], [], []
     for seed in SEEDS:
         _, signals = measured("table1", "paper", seed)
-        ends, found = window_coefficients(signals, c, estimates(signals, c, jumps=False))
-        worst.append(np.abs(percent(found[ends <= 50], nine(c))).max(axis=0))
-        told = ends <= TOLD_SECS  # beyond, no window has a moving rudder, and e is zero
-        ended.append(within(ends[told], found[told], found[told][-1]))
-        right.append(within(ends[told], found[told], nine(c)))
-    spikes = rounded(np.median(worst, axis=0))
+        ends, values = window_coefficients(signals, c, estimates(signals, c, jumps=False))
+        early_errors.append(np.abs(percent(values[ends <= 50], nine(c))).max(axis=0))
+        excited = ends <= EXCITED_SECS  # later windows have no moving rudder, and e is zero
+        to_end.append(settling_times(ends[excited], values[excited], values[excited][-1]))
+        to_truth.append(settling_times(ends[excited], values[excited], nine(c)))
+    early = rounded(np.median(early_errors, axis=0))
     rows = []
     for k, name in enumerate(NAMES):
-        said = [when(np.array(instants)[:, k]) for instants in (ended, right)]
-        rows.append((name, f"{spikes[k]} %", "about 200 s", *said))
-    head = ("", "worst error in the first 50 s", "printed: settled after")
+        texts = [median_and_latest(np.array(times)[:, k]) for times in (to_end, to_truth)]
+        rows.append((name, f"{early[k]} %", "about 200 s", *texts))
+    header = ("", "worst error in the first 50 s", "printed: settled after")
     table(
         "How fast the coefficients settle",
-        (*head, "within 10 % of its end", "within 10 % of the truth"),
+        (*header, "within 10 % of its end", "within 10 % of the truth"),
         rows,
     )
     paragraph(
-        f"Of {len(SEEDS)} runs like that of the figures the median, and the latest where it"
-        f" differs; N = 200 s, up to {TOLD_SECS:.0f} s: after that the window holds no moving"
-        " rudder and e is lost whatever the method. That ω's coefficients come in jumps in the"
-        " first 50 s holds, that v's come smoothly does too, but for f's first 10 s, when nothing"
-        " turns; “all by about 200 s” does not: b₁ takes longer, e never comes. That a, d, g and h"
-        " are there at once is no merit: they are the filter's own, as the circle below shows."
+        f"Median over {len(SEEDS)} runs like that of the figures, and the latest where it differs;"
+        f" N = 200 s, up to {EXCITED_SECS:.0f} s. Later windows contain no moving rudder, and e is"
+        " unidentifiable by any method. The paper states that the coefficients of ω change in steps"
+        " during the first 50 s; this is confirmed. It states that those of v change smoothly; this"
+        " is true except for f during its first 10 s, when the ship does not turn. “All by about"
+        " 200 s” is wrong: b₁ takes longer, and e never settles. That a, d, g and h are correct at"
+        " once is no evidence for the method: they are those of the filter's model, see the section"
+        " on the prior."
     )
 
 
-def when(instants: FloatArray) -> str:
-    """Median and latest of some instants, in words."""
-    said = [
-        "never" if at > TOLD_SECS - 5 * STRIDE_SECS else f"{at:.0f} s" if at else "at once"
-        for at in (float(np.median(instants)), float(instants.max()))
-    ]
-    return said[0] if said[0] == said[1] else f"{said[0]}; {said[1]}"
+def median_and_latest(times: FloatArray) -> str:
+    """Format the median and the latest of some settling times, s."""
+    median, latest = (
+        "never" if at > EXCITED_SECS - 5 * STRIDE_SECS else f"{at:.0f} s" if at else "at once"
+        for at in (float(np.median(times)), float(times.max()))
+    )
+    return median if median == latest else f"{median}; {latest}"
 
 
-def within(ends: FloatArray, found: FloatArray, aim: FloatArray) -> FloatArray:
-    """The last instant at which each coefficient is more than a tenth off its aim, (9,)."""
-    away = np.abs(found - aim) > 0.1 * np.abs(aim)
-    return np.asarray(np.where(away, ends[:, None], 0.0).max(axis=0))
+def settling_times(ends: FloatArray, values: FloatArray, target: FloatArray) -> FloatArray:
+    """Return the last time at which each coefficient deviates by over 10 % from its target, (9,).
+
+    Parameters
+    ----------
+    ends
+        The ends of the windows, (k,), s.
+    values
+        The coefficients of each window, (k, 9).
+    target
+        The values to compare with, (9,).
+    """
+    outside = np.abs(values - target) > 0.1 * np.abs(target)
+    return np.asarray(np.where(outside, ends[:, None], 0.0).max(axis=0))
 
 
 def jump() -> None:
-    """What the rudder's start does to e, with clean data and the true prior."""
+    """Print the effect of the jump of w'' on the coefficients, with clean data and true prior."""
     rows = []
     for name, preset in READINGS.items():
         c = vessel_of(preset).coefficients
         _, signals = measured(preset, "none")
-        for said, jumps in (("as printed", False), ("with the jump", True)):
-            off = percent(identified(signals, c, estimates(signals, c, jumps=jumps)), nine(c))
-            rows.append((f"{said}, {name}", *rounded(off)))
-        off = percent(in_weak_form(signals, c)[0], nine(c))
-        rows.append((f"weak form, {name}", *rounded(off)))
-    table("The jump that saves e", ("error in %", *NAMES), rows)
+        for label, jumps in (("as printed", False), ("with the jump", True)):
+            errors = percent(
+                paper_coefficients(signals, c, estimates(signals, c, jumps=jumps)), nine(c)
+            )
+            rows.append((f"{label}, {name}", *rounded(errors)))
+        errors = percent(weak_form_coefficients(signals, c)[0], nine(c))
+        rows.append((f"weak form, {name}", *rounded(errors)))
+    table("The jump needed to identify e", ("error in %", *NAMES), rows)
     paragraph(
-        "No noise, the true model in the filter, all 500 s in one window. Row 3 of the model takes"
-        " the rudder's rate for constant; when the rudder starts or stops, ω̈ jumps by ks·e·Δδ̇,"
-        " which the paper's filter never sees: e is lost, and what it should have explained is"
-        " laid on the others. That one term added to x₃, and the model propagated by Runge-Kutta,"
-        " mend it. Weak form knows no ω̈ and needs no such term."
+        "No noise, the true model in the filter, all 500 s in one window. Row 3 of the model"
+        " assumes a constant rate of the rudder. When the rudder starts or stops, ω̈ jumps by"
+        " ks·e·Δδ̇, which the paper's filter does not include: e is not identified, and its"
+        " effect is attributed to the other coefficients. Adding this term to x₃ and propagating"
+        " the model by Runge-Kutta corrects it. Weak form does not use ω̈ and needs no such term."
     )
 
 
 def circularity() -> None:
-    """A prior off by 20 %: found again, or made worse."""
+    """Print how the errors of a wrong prior return in the coefficients."""
     c = vessel_of("table1").coefficients
-    true = nine(c)
     signs = np.random.default_rng(1).choice((-1.0, 1.0), (8, 9))
-    draws = true * (1 + 0.2 * signs)
-    rows, copied = [("the prior", *["20"] * 9)], 0.0
-    for noise, said in (("none", "clean"), ("paper", "noise")):
+    priors = nine(c) * (1 + 0.2 * signs)
+    rows, largest_difference = [("the prior", *["20"] * 9)], 0.0
+    for noise, label in (("none", "no noise"), ("paper", "with noise")):
         _, signals = measured("table1", noise)
-        off = []
-        for draw in draws:
-            x = estimates(signals, with_nine(c, draw))
-            off.append(np.abs(percent(identified(signals, c, x), true)))
-            for values, equation in zip(
-                (draw[:6], draw[6:]), regression_rows(signals, c, x), strict=True
-            ):
-                equation[:, -1] = (
-                    equation[:, :-1] @ values
-                )  # w'' and v' as the prior's (4) has them
-                copied = max(copied, float(np.abs(percent(solve_window(equation), values)).max()))
-        rows.append((f"the paper's, {said}", *rounded(np.median(off, axis=0))))
-        ours = np.abs(percent(in_weak_form(signals, c)[0], true))
-        rows.append((f"weak form, {said}", *rounded(ours)))
-    table("The circle: a prior off by 20 %", ("error in %", *NAMES), rows)
+        errors, difference = errors_with_priors(signals, c, priors)
+        largest_difference = max(largest_difference, difference)
+        rows.append((f"the paper's method, {label}", *rounded(np.median(errors, axis=0))))
+        weak = np.abs(percent(weak_form_coefficients(signals, c)[0], nine(c)))
+        rows.append((f"weak form, {label}", *rounded(weak)))
+    table("A prior with errors of 20 %", ("error in %", *NAMES), rows)
     paragraph(
-        "Medians over eight priors, each coefficient 20 % too large or too small by the toss of a"
-        " coin; the jump term added, all 500 s in one window; weak form has no prior. The"
-        " filter's ω̈ and v̇ are what its model says, and the regression finds that model again:"
-        " where they are computed from its w, w' and v by (4) outright, the result *is* the prior,"
-        f" here to {number(copied, 1)} % whatever the data. Propagated as in (6), they make it"
-        " worse."
+        "Medians over eight priors, each coefficient at random 20 % too large or too small; the"
+        " jump term is added, all 500 s are in one window; weak form has no prior. The ω̈ and v̇"
+        " of the filter are those of its model, and the regression returns that model: where they"
+        " are computed directly from the filter's w, w' and v by (4), the result *is* the prior,"
+        f" here to {number(largest_difference, 1)} % for any data. Where they are propagated as in"
+        " (6), the errors become larger."
     )
-    radii()
-    feedback(signs[0])
+    spectral_radii()
+    draw_feedback(signs[0])
 
 
-def again(signals: Signals, c: Coefficients, prior: FloatArray) -> FloatArray:
-    """The nine coefficients that the paper's method finds with `prior` in its filter, (9,).
+def errors_with_priors(
+    signals: Signals, c: Coefficients, priors: FloatArray
+) -> tuple[list[FloatArray], float]:
+    """Fit the coefficients by the paper's method with each of several priors.
 
-    NaN where the model in the filter runs away.
+    Returns
+    -------
+    tuple
+        The absolute errors (9,) of each fit, in %; and the largest difference, in %, of the fit
+        from the prior where w'' and v' are computed by the prior's (4).
+    """
+    errors, difference = [], 0.0
+    for prior in priors:
+        x = estimates(signals, with_nine(c, prior))
+        errors.append(np.abs(percent(paper_coefficients(signals, c, x), nine(c))))
+        for values, equation in zip(
+            (prior[:6], prior[6:]), regression_rows(signals, c, x), strict=True
+        ):
+            equation[:, -1] = equation[:, :-1] @ values  # w'' and v' by the prior's (4)
+            returned = np.abs(percent(solve_window(equation), values))
+            difference = max(difference, float(returned.max()))
+    return errors, difference
+
+
+def refitted(signals: Signals, c: Coefficients, prior: FloatArray) -> FloatArray:
+    """Fit the nine coefficients (9,) by the paper's method with `prior` in its filter.
+
+    The result is NaN where the model in the filter diverges.
     """
     x = estimates(signals, with_nine(c, prior))
-    return identified(signals, c, x) if np.abs(x).max() < FAR else np.full(9, np.nan)
+    return paper_coefficients(signals, c, x) if np.abs(x).max() < MAX_STATE else np.full(9, np.nan)
 
 
-def radii() -> None:
-    """How an error of the prior is passed on."""
+def spectral_radii() -> None:
+    """Print by how much an error of the prior is amplified."""
     rows = []
     for name in ("paper", "turning-circle", "zigzag-20-20"):
-        found = []
+        radii = []
         for preset in READINGS.values():
             c = vessel_of(preset).coefficients
             _, signals = measured(preset, "none", name=name)
-            base, moves = nine(c), 1e-4 * np.eye(9)
-            ends = [[again(signals, c, base * (1 + s * m)) for m in moves] for s in (1, -1)]
-            columns = (np.array(ends[0]) - np.array(ends[1])) / 2e-4 / base
-            found.append(f"{np.abs(np.linalg.eigvals(columns)).max():.2f}")
-        rows.append((name, *found))
-    table("", ("run, clean", "spectral radius, degrees", "radians"), rows)
+            base, steps = nine(c), 1e-4 * np.eye(9)
+            shifted = [[refitted(signals, c, base * (1 + s * m)) for m in steps] for s in (1, -1)]
+            jacobian = (np.array(shifted[0]) - np.array(shifted[1])) / 2e-4 / base
+            radii.append(f"{np.abs(np.linalg.eigvals(jacobian)).max():.2f}")
+        rows.append((name, *radii))
+    table("", ("run, without noise", "spectral radius, degrees", "radians"), rows)
     paragraph(
-        "The spectral radius is that of the Jacobian of what is found against the prior, both as"
-        " shares of the truth: 0 were a method that learns all from the data, 1 a copy; above 1"
-        " errors grow from round to round when what is found goes back into the filter, which is"
-        " what the paper's observer “with current adjustment by identification” asks for."
+        "The spectral radius is that of the Jacobian of the fitted coefficients with respect to"
+        " the prior, both relative to the truth. It is 0 for a method that uses the data alone,"
+        " and 1 for one that returns its prior. Above 1 errors grow from round to round when the"
+        " fitted coefficients are fed back into the filter, as in the paper's observer “with"
+        " current adjustment by identification”."
     )
 
 
-def feedback(signs: FloatArray) -> None:
-    """What becomes of the prior's error when coefficients go back into the filter."""
+def draw_feedback(signs: FloatArray) -> None:
+    """Draw the error of the coefficients when they are fed back into the filter."""
     c = vessel_of("table1").coefficients
     _, signals = measured("table1", "none")
-    drawn, axes = plt.subplots(figsize=(6.8, 3.2))
-    for off in STARTS:
-        prior = nine(c) * (1 + off * signs)
-        worst = [100 * off]
-        while len(worst) <= ROUNDS:
-            prior = again(signals, c, prior)
+    figure, axes = plt.subplots(figsize=(6.8, 3.2))
+    for error in INITIAL_ERRORS:
+        prior = nine(c) * (1 + error * signs)
+        worst = [100 * error]
+        while len(worst) <= MAX_ROUNDS:
+            prior = refitted(signals, c, prior)
             if not np.isfinite(prior).all():
                 axes.plot(len(worst) - 1, worst[-1], "x", color="black", ms=9)
                 break
             worst.append(float(np.abs(percent(prior, nine(c))).max()))
-        axes.semilogy(worst, marker="o", ms=3, label=f"{100 * off:g} %")
-    axes.set(xlabel="round", ylabel="worst coefficient's error (%)")
-    axes.legend(title="prior off by", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes.semilogy(worst, marker="o", ms=3, label=f"{100 * error:g} %")
+    axes.set(xlabel="round", ylabel="largest error of a coefficient (%)")
+    axes.legend(title="error of the prior", loc="center left", bbox_to_anchor=(1.0, 0.5))
     picture(
         "continuous_identification_feedback",
-        drawn,
-        "Coefficients found, put into the filter again and again, clean data. The errors swing"
-        " as they grow, for the leading eigenvalues are a complex pair. A cross: with these the"
-        " model in the filter runs away, and there is no next round.",
+        figure,
+        "Coefficients fitted and fed back into the filter repeatedly, data without noise. The"
+        " errors oscillate as they grow, because the leading eigenvalues are a complex pair. A"
+        " cross marks the coefficients with which the model in the filter diverges.",
     )
-    plt.close(drawn)
+    plt.close(figure)
 
 
 def table2() -> None:
-    """The restored model against the original."""
-    sizes, still = {}, np.abs(np.diff(measured("table1-rad", "none")[1]["rudder"])) < 1e-12
-    for preset, noise in (
-        ("table1-rad", "none"),
-        ("table1-rad", "paper"),
-        ("table1", "none"),
-        ("table1", "paper"),
-    ):
-        vessel = vessel_of(preset)
-        c, true = vessel.coefficients, truth_of(vessel)
-        _, signals = measured(preset, noise)
-        x = estimates(signals, c, jumps=False)
-        for name, values in (
-            ("whole", identified(signals, c, x)),
-            ("last", window_coefficients(signals, c, x)[1][-1]),
-            ("weak", in_weak_form(signals, c)[0]),
-        ):
-            off = truth_of(replace(vessel, coefficients=with_nine(c, values))) - true
-            sizes[preset, noise, name] = np.sqrt(np.mean(off**2, axis=0))
-            if (preset, noise, name) == NEAREST:
-                quiet = float(np.sqrt(np.mean(off[still[: len(off)], 0] ** 2)))
-    remarks = {
-        "w''": f"while the rudder stands still {quiet / 1e-9:.2g}: e is lost while it moves",
-        "w": "cannot stand beside the printed w'",
-        "v": "cannot stand beside the printed v'",
-    }
+    """Compare Table 2 with the rms differences between restored and original model."""
+    sizes = restored_errors()
     rows = [
-        Row(f"{name} ({unit})", f"{float(printed) / per:.2g}", value / per, remarks.get(name, ""))
-        for name, printed, value, (unit, per) in zip(
-            STATES, TABLE2, sizes[NEAREST].tolist(), UNITS2, strict=True
+        Row(f"{name} ({unit})", f"{float(printed) / size:.2g}", value / size, remark)
+        for name, printed, value, (unit, size), remark in zip(
+            STATES, TABLE2, sizes[CLOSEST_CASE].tolist(), UNITS2, table2_remarks(), strict=True
         )
     ]
-    comparison("Table 2, rms of the restored model off the original", rows)
+    comparison("Table 2, rms difference between the restored and the original model", rows)
     paragraph(
-        "Computed in radians, clean, the filter as printed, all 500 s in one window. Others, in SI:"
+        "Computed in radians, without noise, with the filter as printed, all 500 s in one window."
+        " Other cases, in SI units:"
     )
     cases = {
-        "radians, clean, last 200 s": ("table1-rad", "none", "last"),
+        "radians, no noise, last 200 s": ("table1-rad", "none", "last"),
         "radians, noise": ("table1-rad", "paper", "whole"),
-        "degrees, clean": ("table1", "none", "whole"),
+        "degrees, no noise": ("table1", "none", "whole"),
         "degrees, noise": ("table1", "paper", "whole"),
         "degrees, noise, weak form": ("table1", "paper", "weak"),
     }
     others = [(case, *(number(float(v), 2) for v in sizes[key])) for case, key in cases.items()]
     table("", ("", *STATES), others)
-    most = [float(TABLE2[k]) * DURATION / np.sqrt(2) for k in (1, 3)]
+    limits = [float(TABLE2[k]) * DURATION / np.sqrt(2) for k in (1, 3)]
     paragraph(
-        "The table contradicts itself. An error that begins at zero is, in rms over T, at most T/√2"
-        f" times its rate's: beside the printed w' and v' at most {number(most[0], 2)} for w and"
-        f" {number(most[1], 2)} for v. The printed ones are {0.05 / most[0]:.0f} and"
-        f" {0.014 / most[1]:.0f} times that, and no unit common to a state and its rate mends it."
+        "The table contradicts itself. The rms over T of an error that starts at zero is at most"
+        " T/√2 times that of its rate: with the printed w' and v' at most"
+        f" {number(limits[0], 2)} for w and {number(limits[1], 2)} for v. The printed values are"
+        f" {0.05 / limits[0]:.0f} and {0.014 / limits[1]:.0f} times as large. No unit common to a"
+        " state and its rate explains it."
     )
-    least = bound()
+    lower_bound = cramer_rao_bound()
     paragraph(
-        "Nor can it be of data with the printed noise: with ±0.2 m/s on the log, ten samples a"
-        " second, the sine left out, the Cramér–Rao bound of the restored v' is"
-        f" {number(least, 2)} m/s² (radians; f, g, h free), {least / float(TABLE2[3]):.0f} times"
-        " the printed. In size its w' and v' are those of a nearly clean run in radians, as above;"
-        " its w'', twenty times less than ours, would need an e that this filter cannot find."
+        "The table cannot result from data with the printed noise either: with ±0.2 m/s on the log,"
+        " ten samples a second, without the sine, the Cramér–Rao bound of the restored v' is"
+        f" {number(lower_bound, 2)} m/s² (radians; f, g, h free),"
+        f" {lower_bound / float(TABLE2[3]):.0f} times the printed value. The printed w' and v' are"
+        " of the size of those of a run nearly without noise in radians, as above. The printed w'',"
+        " twenty times smaller than ours, would need an e that this filter cannot identify."
     )
 
 
-def bound() -> float:
-    """The Cramér-Rao bound of the rms of the restored v', m/s^2."""
+def restored_errors() -> dict[tuple[str, str, str], FloatArray]:
+    """Compute the rms differences between the restored models and the original.
+
+    Returns
+    -------
+    dict
+        The rms (5,) of each of `STATES`, SI, by the reading of Table 1, the noise, and the
+        coefficients: of the whole run, of the last window, or in weak form.
+    """
+    sizes = {}
+    for preset in ("table1-rad", "table1"):
+        vessel = vessel_of(preset)
+        for noise in ("none", "paper"):
+            _, signals = measured(preset, noise)
+            x = estimates(signals, vessel.coefficients, jumps=False)
+            for name, values in (
+                ("whole", paper_coefficients(signals, vessel.coefficients, x)),
+                ("last", window_coefficients(signals, vessel.coefficients, x)[1][-1]),
+                ("weak", weak_form_coefficients(signals, vessel.coefficients)[0]),
+            ):
+                error = restored_error(vessel, values)
+                sizes[preset, noise, name] = np.sqrt(np.mean(error**2, axis=0))
+    return sizes
+
+
+def restored_error(vessel: Vessel, values: FloatArray) -> FloatArray:
+    """Return the states (m, 5) of a ship with other coefficients (9,), minus the true states."""
+    restored = replace(vessel, coefficients=with_nine(vessel.coefficients, values))
+    return truth_of(restored) - truth_of(vessel)
+
+
+def table2_remarks() -> tuple[str, ...]:
+    """Return a remark on each row of Table 2."""
+    vessel = vessel_of("table1-rad")
+    _, signals = measured("table1-rad", "none")
+    x = estimates(signals, vessel.coefficients, jumps=False)
+    error = restored_error(vessel, paper_coefficients(signals, vessel.coefficients, x))
+    constant = np.abs(np.diff(signals["rudder"])) < 1e-12
+    quiet = float(np.sqrt(np.mean(error[constant[: len(error)], 0] ** 2)))
+    return (
+        f"{quiet / 1e-9:.2g} while the rudder is constant; while it moves, e is wrong",
+        "",
+        "impossible with the printed w'",
+        "",
+        "impossible with the printed v'",
+    )
+
+
+def cramer_rao_bound() -> float:
+    """Compute the Cramér-Rao bound of the rms of the restored v', m/s²."""
     vessel = vessel_of("table1-rad")
     c, sigma = vessel.coefficients, 0.2 / np.sqrt(3)
     slopes = []
     for name in SURGE_COEFFICIENTS:
         value = getattr(c, name)
-        moved = (c._replace(**{name: value * (1 + side)}) for side in (1e-4, -1e-4))
-        above, below = (truth_of(replace(vessel, coefficients=m)) for m in moved)
+        shifted = (c._replace(**{name: value * (1 + side)}) for side in (1e-4, -1e-4))
+        above, below = (truth_of(replace(vessel, coefficients=m)) for m in shifted)
         slopes.append((above - below) / (2e-4 * value))
     rates, speeds = (np.column_stack([slope[:, k] for slope in slopes]) for k in (3, 4))
-    spread = np.linalg.inv(speeds.T @ speeds) * sigma**2
-    return float(np.sqrt(np.mean(np.einsum("ki,ij,kj->k", rates, spread, rates))))
+    covariance = np.linalg.inv(speeds.T @ speeds) * sigma**2
+    return float(np.sqrt(np.mean(np.einsum("ki,ij,kj->k", rates, covariance, rates))))
 
 
 if __name__ == "__main__":
