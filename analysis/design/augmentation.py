@@ -15,7 +15,7 @@ from scipy.linalg import block_diag
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .matrices import finite, matrix, number, square
+from .matrices import as_finite_array, as_matrix, as_number, as_square_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Exosystem:
     @classmethod
     def harmonic(cls, omega: float) -> Self:
         """A sinusoid of any amplitude and phase, `omega` in rad/s; its state turns, k = 2."""
-        return cls.exponential(1j * number("omega", omega, least=np.finfo(float).tiny))
+        return cls.exponential(1j * as_number("omega", omega, least=np.finfo(float).tiny))
 
     @classmethod
     def exponential(cls, rate: complex, degree: int = 0) -> Self:
@@ -45,7 +45,7 @@ class Exosystem:
         if degree != int(degree) or degree < 0:
             raise UsageError(f"degree is {degree}; expected a whole number from 0")
         rate = complex(rate)
-        sigma, omega = finite("rate", [rate.real, rate.imag])
+        sigma, omega = as_finite_array("rate", [rate.real, rate.imag])
         block = np.array([[sigma, omega], [-omega, sigma]]) if omega else np.array([[sigma]])
         count, size = int(degree) + 1, len(block)
         Ac = np.kron(np.eye(count), block) + np.kron(np.eye(count, k=1), np.eye(size))
@@ -64,7 +64,7 @@ class Plant:
 
 
 @dataclass(frozen=True, eq=False)
-class Influence:
+class DisturbanceInput:
     """A disturbance by name, and where it acts: on states' rates of change, on sensors, or both.
 
     A factor of one on a state makes the disturbance specific (a moment over the inertia), in the
@@ -78,7 +78,7 @@ class Influence:
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class AugmentedPlant:
     """Plant and exosystems as one: eq (3)."""
 
     A: FloatArray  # [A, Cf; 0, Ac]
@@ -87,33 +87,35 @@ class System:
     D: FloatArray  # [0, Cc]
     names: tuple[str, ...]
     states: tuple[str, ...]
-    owners: tuple[int, ...]  # of each state the influence, -1 being the plant
+    disturbance_index: tuple[int, ...]  # of each state the influence, -1 being the plant
 
 
-def augmented(plant: Plant, influences: Sequence[Influence]) -> System:
+def augment_with_disturbances(
+    plant: Plant, disturbances: Sequence[DisturbanceInput]
+) -> AugmentedPlant:
     """Plant, n states, and exosystems as one system; raises `UsageError` for what does not fit."""
-    A = square("A", plant.A)
+    A = as_square_matrix("A", plant.A)
     n = len(A)
-    B, C = matrix("B", plant.B, rows=n), matrix("C", plant.C, columns=n)
-    states, names = list(plant.states), tuple(influence.name for influence in influences)
+    B, C = as_matrix("B", plant.B, rows=n), as_matrix("C", plant.C, columns=n)
+    states, names = list(plant.states), tuple(disturbance.name for disturbance in disturbances)
     for what, given, count in (("states", plant.states, n), ("sensors", plant.sensors, len(C))):
         if len(given) != count or len(set(given)) != count:
             raise UsageError(f"{what} are {', '.join(given)}; expected {count} different names")
     if len(set(names)) != len(names):
         raise UsageError(f"disturbances are {', '.join(names)}; expected different names")
-    D, owners = np.zeros((0, n)), [-1] * n
-    for k, influence in enumerate(influences):
-        Ac = square(f"Ac of {influence.name!r}", influence.exosystem.Ac)
-        Cc = matrix(f"Cc of {influence.name!r}", influence.exosystem.Cc, 1, len(Ac))
-        Cf = _column(influence.name, influence.on_state, "state", plant.states) @ Cc
-        Cv = _column(influence.name, influence.on_sensor, "sensor", plant.sensors) @ Cc
+    D, disturbance_index = np.zeros((0, n)), [-1] * n
+    for k, disturbance in enumerate(disturbances):
+        Ac = as_square_matrix(f"Ac of {disturbance.name!r}", disturbance.exosystem.Ac)
+        Cc = as_matrix(f"Cc of {disturbance.name!r}", disturbance.exosystem.Cc, 1, len(Ac))
+        Cf = _column(disturbance.name, disturbance.on_state, "state", plant.states) @ Cc
+        Cv = _column(disturbance.name, disturbance.on_sensor, "sensor", plant.sensors) @ Cc
         below = np.zeros((len(A) - n, len(Ac)))
         A = np.block([[A, np.vstack((Cf, below))], [np.zeros((len(Ac), len(A))), Ac]])
         C, D = np.hstack((C, Cv)), block_diag(D, Cc)
-        states += [f"{influence.name}[{i}]" for i in range(len(Ac))]
-        owners += [k] * len(Ac)
+        states += [f"{disturbance.name}[{i}]" for i in range(len(Ac))]
+        disturbance_index += [k] * len(Ac)
     B = np.vstack((B, np.zeros((len(A) - n, B.shape[1]))))
-    return System(A, B, C, D, names, tuple(states), tuple(owners))
+    return AugmentedPlant(A, B, C, D, names, tuple(states), tuple(disturbance_index))
 
 
 def _column(name: str, factors: Mapping[str, float], kind: str, names: Sequence[str]) -> FloatArray:
@@ -124,5 +126,7 @@ def _column(name: str, factors: Mapping[str, float], kind: str, names: Sequence[
             raise UsageError(
                 f"{name!r} acts on the {kind} {target!r}; the plant has {', '.join(names)}"
             )
-        column[names.index(target)] = float(finite(f"factor of {name!r} on {target!r}", factor))
+        column[names.index(target)] = float(
+            as_finite_array(f"factor of {name!r} on {target!r}", factor)
+        )
     return column

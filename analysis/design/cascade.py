@@ -9,7 +9,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .matrices import count, matrix, number, square, symmetric
+from .matrices import as_count, as_matrix, as_number, as_square_matrix, as_symmetric_matrix
 from .riccati import error_covariance, kalman_gain
 
 
@@ -55,17 +55,17 @@ def cascade(
     Raises `UsageError` for matrices that do not fit, a first filter that is not stable, fewer
     stages than one. Source: Antonov, (12), whose claim of accuracy without bound does not hold.
     """
-    A = square("A", A)
+    A = as_square_matrix("A", A)
     n = len(A)
-    S = matrix("S", S, columns=n)
+    S = as_matrix("S", S, columns=n)
     m = len(S)
-    R1, R2 = symmetric("R1", R1, n), symmetric("R2", R2, m, definite="positive")
-    first = matrix("first", first, n, m)
-    stages = count("stages", stages)
-    if number("correlation_secs", correlation_secs) == 0:
+    R1, R2 = as_symmetric_matrix("R1", R1, n), as_symmetric_matrix("R2", R2, m, definite="positive")
+    first = as_matrix("first", first, n, m)
+    stages = as_count("stages", stages)
+    if as_number("correlation_secs", correlation_secs) == 0:
         raise UsageError("correlation_secs is 0; expected a positive number")
     errors = error_covariance(A, first, S, R1, R2)
-    errors = symmetric("the covariance of first's error", errors, n, definite="positive")
+    errors = as_symmetric_matrix("the covariance of first's error", errors, n, definite="positive")
     K = kalman_gain(A, np.eye(n), np.eye(n), R1, errors * correlation_secs).gain
     optimum = kalman_gain(A, np.eye(n), S, R1, R2).covariance
 

@@ -8,7 +8,7 @@ from scipy.linalg import block_diag
 
 from shiplog.types import FloatArray
 
-from .augmentation import Influence, Plant, System, augmented
+from .augmentation import AugmentedPlant, DisturbanceInput, Plant, augment_with_disturbances
 from .placement import UnobservableMode, format_mode, unobservable_modes
 
 MODE_RTOL = 1e-6  # relative: what counts as one mode before and after a sensor is added
@@ -36,23 +36,23 @@ class Ambiguity:
         return f"at the mode {format_mode(self.mode)} {who} {verb}; {remedy}"
 
 
-def ambiguities(plant: Plant, influences: Sequence[Influence]) -> tuple[Ambiguity, ...]:
+def ambiguities(plant: Plant, disturbances: Sequence[DisturbanceInput]) -> tuple[Ambiguity, ...]:
     """What the plant's sensors cannot distinguish; empty where `disturbance_observer` has a gain.
 
     Hautus's test of plant and exosystems together. Raises `UsageError` for what does not fit.
     """
-    return system_ambiguities(augmented(plant, influences))
+    return system_ambiguities(augment_with_disturbances(plant, disturbances))
 
 
-def system_ambiguities(system: System) -> tuple[Ambiguity, ...]:
+def system_ambiguities(system: AugmentedPlant) -> tuple[Ambiguity, ...]:
     """Return `ambiguities` of plant and exosystems that are one system already."""
     return tuple(_ambiguity(system, mode) for mode in unobservable_modes(system.A, system.C))
 
 
-def _ambiguity(system: System, mode: UnobservableMode) -> Ambiguity:
+def _ambiguity(system: AugmentedPlant, mode: UnobservableMode) -> Ambiguity:
     """Who is in a hidden mode, and what shows it: a state, a state's integral, a disturbance."""
-    owners = sorted({system.owners[i] for i in mode.states} - {-1})
-    plant = [i for i in mode.states if system.owners[i] == -1]
+    involved = sorted({system.disturbance_index[i] for i in mode.states} - {-1})
+    plant = [i for i in mode.states if system.disturbance_index[i] == -1]
     remedies = []
     for i in plant:
         if _shows(system, np.eye(1, len(system.A), i), mode.value):
@@ -60,22 +60,22 @@ def _ambiguity(system: System, mode: UnobservableMode) -> Ambiguity:
         if _is_rate(system, i) and _shows_integral(system, i, mode.value):
             remedies.append(f"the integral of {system.states[i]!r}")
     if not remedies:
-        itself = [k for k in owners if _shows(system, system.D[[k]], mode.value)]
+        itself = [k for k in involved if _shows(system, system.D[[k]], mode.value)]
         remedies = [f"{system.names[k]!r} itself" for k in itself]
     return Ambiguity(
         mode.value,
-        tuple(system.names[k] for k in owners),
+        tuple(system.names[k] for k in involved),
         tuple(system.states[i] for i in plant),
         tuple(remedies),
     )
 
 
-def _shows(system: System, row: FloatArray, mode: complex) -> bool:
+def _shows(system: AugmentedPlant, row: FloatArray, mode: complex) -> bool:
     """Whether a mode is hidden no longer once `row` (1, N) is measured too."""
     return not _hides(system.A, np.vstack((system.C, row)), mode)
 
 
-def _shows_integral(system: System, i: int, mode: complex) -> bool:
+def _shows_integral(system: AugmentedPlant, i: int, mode: complex) -> bool:
     """Whether a mode is hidden no longer once the integral of state i is measured too."""
     A = np.block([[system.A, np.zeros((len(system.A), 1))], [np.eye(1, len(system.A), i), 0.0]])
     return not _hides(A, block_diag(system.C, np.eye(1)), mode)
@@ -87,7 +87,7 @@ def _hides(A: FloatArray, C: FloatArray, mode: complex) -> bool:
     )
 
 
-def _is_rate(system: System, i: int) -> bool:
+def _is_rate(system: AugmentedPlant, i: int) -> bool:
     """Whether a state of the plant is no integral of others: nobody measures that of a heading."""
-    row = system.A[i, : system.owners.count(-1)]
+    row = system.A[i, : system.disturbance_index.count(-1)]
     return bool(row[i]) or not row.any()

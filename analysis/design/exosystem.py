@@ -14,19 +14,25 @@ from scipy.sparse.csgraph import connected_components
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .augmentation import Exosystem, Influence, Plant, System, augmented
+from .augmentation import (
+    AugmentedPlant,
+    DisturbanceInput,
+    Exosystem,
+    Plant,
+    augment_with_disturbances,
+)
 from .distinguishability import Ambiguity, ambiguities, system_ambiguities
 from .luenberger import POLE_PATTERNS
-from .matrices import finite
+from .matrices import as_finite_array
 from .observability import ComplexArray
 from .placement import checked_poles, place_multilevel
 from .riccati import kalman_gain
 
 __all__ = [
     "Ambiguity",
+    "DisturbanceInput",
     "DisturbanceObserver",
     "Exosystem",
-    "Influence",
     "Plant",
     "ambiguities",
     "disturbance_observer",
@@ -50,7 +56,7 @@ class DisturbanceObserver:
 
 def disturbance_observer(
     plant: Plant,
-    influences: Sequence[Influence],
+    disturbances: Sequence[DisturbanceInput],
     spectrum: ArrayLike = "butterworth",
     *,
     frequency: float | Sequence[float] | None = None,
@@ -69,7 +75,7 @@ def disturbance_observer(
     sensors cannot distinguish, naming them, their mode and a measurement that would: constant
     moment and constant gyro bias, say. Source: the disturbance observer's paper, (3) and (4).
     """
-    system = augmented(plant, influences)
+    system = augment_with_disturbances(plant, disturbances)
     hidden = system_ambiguities(system)
     if hidden:
         raise UsageError("; ".join(str(ambiguity) for ambiguity in hidden))
@@ -101,7 +107,7 @@ def disturbance_observer(
     )
 
 
-def _channels(system: System) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+def _channels(system: AugmentedPlant) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """The states and sensors of each part that nothing connects to another."""
     N = len(system.A)
     linked = np.vstack((system.A, system.C)) != 0
@@ -137,7 +143,7 @@ def _wanted(
         return None
     if frequency is None:
         raise UsageError(f"frequency is missing; {spectrum} poles need one in rad/s")
-    each = finite("frequency", frequency)
+    each = as_finite_array("frequency", frequency)
     if each.shape not in ((), (len(sizes),)) or np.any(each <= 0):
         raise UsageError(
             f"frequency is {frequency}; expected a positive one, or one for each of the"
@@ -153,7 +159,7 @@ def _intensities(name: str, values: ArrayLike | None, count: int) -> FloatArray:
     """Intensities of white noise, (count,), none of them negative."""
     if values is None:
         raise UsageError(f"{name} is missing; kalman needs its intensities, ({count},)")
-    found = finite(name, values)
+    found = as_finite_array(name, values)
     if found.shape != (count,) or np.any(found < 0):
         raise UsageError(f"{name} is of shape {found.shape}; expected ({count},), none negative")
     return found

@@ -32,14 +32,16 @@ POLE_PATTERNS = {"butterworth": butterworth_poles, "binomial": binomial_poles}
 
 
 @dataclass(frozen=True, eq=False)
-class Observer:
+class DiscreteObserver:
     """A discrete observer x+ = F x, corrected by M (y - C x+), and the error noise leaves in it."""
 
     correction: FloatArray  # M, (n,)
     noise_gain: FloatArray  # (n,) standard deviation of each state per unit of y's
 
 
-def discrete_observer(A: FloatArray, C: FloatArray, poles: ComplexArray, dt: float) -> Observer:
+def discrete_observer(
+    A: FloatArray, C: FloatArray, poles: ComplexArray, dt: float
+) -> DiscreteObserver:
     """The observer of continuous poles for measurements every `dt` seconds, one output.
 
     Raises `UsageError` for poles that rounding cannot tell from standing still, and what
@@ -47,7 +49,7 @@ def discrete_observer(A: FloatArray, C: FloatArray, poles: ComplexArray, dt: flo
     """
     F, M = expm(A * dt), discrete_correction(A, C, poles, dt)[:, None]
     kept = (np.eye(len(A)) - M @ C) @ F
-    return Observer(M[:, 0], _noise_gain(kept, M))
+    return DiscreteObserver(M[:, 0], _noise_gain(kept, M))
 
 
 def discrete_correction(A: FloatArray, C: FloatArray, poles: ComplexArray, dt: float) -> FloatArray:

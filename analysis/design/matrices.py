@@ -13,7 +13,7 @@ Definite = Literal["semi", "positive"]
 ROUNDING = 1e-10  # what symmetry and definiteness are judged to, every unit being one
 
 
-def finite(name: str, values: ArrayLike) -> FloatArray:
+def as_finite_array(name: str, values: ArrayLike) -> FloatArray:
     """`values` as an array of real, finite numbers, of any shape.
 
     Raises `UsageError` for what is no array of real numbers, and for NaN and infinities.
@@ -29,14 +29,14 @@ def finite(name: str, values: ArrayLike) -> FloatArray:
     return array.astype(np.float64)
 
 
-def matrix(
+def as_matrix(
     name: str, values: ArrayLike, rows: int | None = None, columns: int | None = None
 ) -> FloatArray:
     """`values` as a matrix (rows, columns) of finite numbers; `None` is any number but none.
 
-    Raises `UsageError` where it is of another shape, and what `finite` raises.
+    Raises `UsageError` where it is of another shape, and what `as_finite_array` raises.
     """
-    array = finite(name, values)
+    array = as_finite_array(name, values)
     expected = f"({'any' if rows is None else rows}, {'any' if columns is None else columns})"
     fits = array.ndim == 2 and array.size > 0
     fits = fits and all(
@@ -47,12 +47,12 @@ def matrix(
     return array
 
 
-def square(name: str, values: ArrayLike, n: int | None = None) -> FloatArray:
+def as_square_matrix(name: str, values: ArrayLike, n: int | None = None) -> FloatArray:
     """`values` as a matrix (n, n) of finite numbers; `None` is any n.
 
-    Raises `UsageError` where it is not square or not of that n, and what `finite` raises.
+    Raises `UsageError` where it is not square or not of that n, and what `as_finite_array` raises.
     """
-    array = finite(name, values)
+    array = as_finite_array(name, values)
     size = n if n is not None else max(array.shape, default=0)
     if array.shape != (size, size) or not size:
         expected = f"({n}, {n})" if n else "a square matrix"
@@ -60,17 +60,17 @@ def square(name: str, values: ArrayLike, n: int | None = None) -> FloatArray:
     return array
 
 
-def symmetric(
+def as_symmetric_matrix(
     name: str, values: ArrayLike, n: int | None = None, *, definite: Definite = "semi"
 ) -> FloatArray:
     """`values` as a symmetric matrix (n, n), positive semidefinite or positive definite.
 
     A scalar stands for a matrix (1, 1). Each entry is judged in the units of its own row and
     column, to a relative 1e-10; what is given back is symmetric to the bit. Raises `UsageError`
-    for any other, and what `square` raises.
+    for any other, and what `as_square_matrix` raises.
     """
-    array = finite(name, values)
-    array = square(name, array.reshape(1, 1) if array.ndim == 0 else array, n)
+    array = as_finite_array(name, values)
+    array = as_square_matrix(name, array.reshape(1, 1) if array.ndim == 0 else array, n)
     largest = float(np.abs(array).max()) or 1.0
     units = np.sqrt(np.maximum(np.diag(array), ROUNDING**2 * largest))
     scaled = array / np.outer(units, units)
@@ -90,16 +90,16 @@ def symmetric(
     return (array + array.T) / 2
 
 
-def number(name: str, value: float, *, least: float = 0.0) -> float:
+def as_number(name: str, value: float, *, least: float = 0.0) -> float:
     """`value` as a finite number not below `least`; raises `UsageError` for any other."""
-    array = finite(name, value)
+    array = as_finite_array(name, value)
     if array.ndim != 0 or array < least:
         raise UsageError(f"{name} is {value}; expected one number not below {least:g}")
     return float(array)
 
 
-def count(name: str, value: int) -> int:
+def as_count(name: str, value: int) -> int:
     """`value` as a whole number not below one; raises `UsageError` for any other."""
-    if number(name, value, least=1) % 1:
+    if as_number(name, value, least=1) % 1:
         raise UsageError(f"{name} is {value}; expected a whole number")
     return int(value)

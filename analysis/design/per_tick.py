@@ -16,12 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .matrices import finite, matrix, number, square
+from .matrices import as_finite_array, as_matrix, as_number, as_square_matrix
 from .observability import ComplexArray
 from .placement import checked_poles, place_multilevel
 
 Indices = NDArray[np.intp]
-Motion = Callable[[FloatArray, FloatArray], FloatArray]  # of the state (n,) and the inputs (r,)
+# a function of the state (n,) and the inputs (r,)
+StateFunction = Callable[[FloatArray, FloatArray], FloatArray]
 
 MAX_RATE_RATIO = 1e6  # a Jacobian that much faster than the poles asked for is at a singular point
 MAX_JACOBIAN_ENTRY = 1e10  # an entry of a Jacobian that without a gain speaks of a singular point
@@ -37,8 +38,8 @@ class TickObserver:
     x̂ = observer.init(guess, y), then x̂ = observer.step(x̂, y, u, tick_secs) for every tick.
     """
 
-    rate: Motion  # f of x' = f(x, u), (n,)
-    jacobian: Motion  # df/dx, (n, n)
+    rate: StateFunction  # f of x' = f(x, u), (n,)
+    jacobian: StateFunction  # df/dx, (n, n)
     C: FloatArray  # (m, n): y = C x
     poles: ComplexArray  # 1/s: (n,) of full order, (n - m,) of reduced order
     reduced: bool
@@ -76,13 +77,13 @@ class TickObserver:
 
         Raises `UsageError` for measurements and inputs that do not fit, and what `gain` raises.
         """
-        y = matrix("y", y, columns=len(self.C))
+        y = as_matrix("y", y, columns=len(self.C))
         count = len(y)
         if count < 3 or count % 2 == 0:
             raise UsageError(f"y is of shape {y.shape}; expected an odd number of rows, at least 3")
-        u = finite("u", u)
-        u = np.outer(np.ones(count), u) if u.ndim == 1 else matrix("u", u, rows=count)
-        h = 2 * number("tick_secs", tick_secs) / (count - 1)
+        u = as_finite_array("u", u)
+        u = np.outer(np.ones(count), u) if u.ndim == 1 else as_matrix("u", u, rows=count)
+        h = 2 * as_number("tick_secs", tick_secs) / (count - 1)
         gain = self.gain(x, u[0])
         motion = self._reduced_motion(gain) if self.reduced else self._full_motion(gain)
         with np.errstate(all="ignore"):
@@ -108,7 +109,7 @@ class TickObserver:
             raise UsageError(
                 f"the Jacobian is not finite at x̂ = {_format_vector(x)}; {SINGULAR_HINT}"
             )
-        A = square("jacobian", found, n)
+        A = as_square_matrix("jacobian", found, n)
         fastest = np.abs(np.linalg.eigvals(np.abs(A))).max()
         if fastest > MAX_RATE_RATIO * np.abs(self.poles).max():
             raise UsageError(
@@ -152,8 +153,8 @@ class _Motion(NamedTuple):
 
 
 def tick_observer(
-    rate: Motion,
-    jacobian: Motion,
+    rate: StateFunction,
+    jacobian: StateFunction,
     C: ArrayLike,
     poles: ArrayLike,
     *,
@@ -166,7 +167,7 @@ def tick_observer(
     Where a frozen gain does, as on a ship, relinearising gains nothing. Raises `UsageError` for
     what does not fit. Source: Zubov et al., sections 1 and 2.
     """
-    C = matrix("C", C)
+    C = as_matrix("C", C)
     m, n = C.shape
     if order not in ("full", "reduced"):
         raise UsageError(f"order is {order!r}; expected full or reduced")
@@ -194,9 +195,9 @@ def block_gains(A: ArrayLike, Phi0: ArrayLike, Phi1: ArrayLike) -> BlockGains:
     changes. Raises `UsageError` for matrices that do not fit and where A12 is singular. Source:
     the levels of `place_multilevel`, there being two.
     """
-    A, Phi0 = square("A", A), square("Phi0", Phi0)
+    A, Phi0 = as_square_matrix("A", A), as_square_matrix("Phi0", Phi0)
     m = len(Phi0)
-    A, Phi1 = square("A", A, 2 * m), square("Phi1", Phi1, m)
+    A, Phi1 = as_square_matrix("A", A, 2 * m), as_square_matrix("Phi1", Phi1, m)
     A11, A12, A21, A22 = A[:m, :m], A[:m, m:], A[m:, :m], A[m:, m:]
     if np.linalg.cond(A12) > 1 / np.finfo(float).eps:
         raise UsageError(f"A12, {A12.shape}, of A {A.shape} is singular; {SINGULAR_HINT}")
@@ -221,7 +222,7 @@ def _runge_kutta(
 
 
 def _vector(name: str, values: ArrayLike, count: int | None = None) -> FloatArray:
-    found = finite(name, values)
+    found = as_finite_array(name, values)
     if found.ndim != 1 or count not in (None, len(found)):
         expected = "a vector" if count is None else f"({count},)"
         raise UsageError(f"{name} is of shape {found.shape}; expected {expected}")

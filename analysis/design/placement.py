@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .matrices import matrix, square
+from .matrices import as_matrix, as_square_matrix
 from .observability import ComplexArray
 
 OBSERVABILITY_TOLERANCE = 1e-10  # smallest singular value of an observable direction
@@ -50,8 +50,8 @@ def place_multilevel(A: ArrayLike, C: ArrayLike, poles: ArrayLike) -> FloatArray
     pair (A, C) that is not observable, naming the mode, and where rounding leaves the poles
     somewhere else. Source: Zubov et al., (2.2) to (2.6), after the transposition of (2.7).
     """
-    A = square("A", A)
-    C = matrix("C", C, columns=len(A))
+    A = as_square_matrix("A", A)
+    C = as_matrix("C", C, columns=len(A))
     wanted = checked_poles("poles", poles, len(A))
     hidden = unobservable_modes(A, C)
     if hidden:
@@ -78,8 +78,8 @@ def unobservable_modes(A: ArrayLike, C: ArrayLike) -> tuple[UnobservableMode, ..
     below 1e-10, A and C being scaled to natural units: an inertia of 1e12 hides nothing. Raises
     `UsageError` for matrices that do not fit. Source: Hautus's test, at every eigenvalue.
     """
-    A = square("A", A)
-    C = matrix("C", C, columns=len(A))
+    A = as_square_matrix("A", A)
+    C = as_matrix("C", C, columns=len(A))
     pair = _natural_units(A, C)
     found: list[UnobservableMode] = []
     for mode, shown, directions in _least_visible(pair.A, pair.C):

@@ -14,7 +14,7 @@ from scipy.linalg import schur, solve_sylvester
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .matrices import count, finite, matrix, square, symmetric
+from .matrices import as_count, as_finite_array, as_matrix, as_square_matrix, as_symmetric_matrix
 from .observability import ComplexArray, format_eigenvalue
 from .riccati import Gain, MatrixNames, optimal_gain, sorted_eigenvalues
 
@@ -46,19 +46,19 @@ def quality_regulator(
 
     A, P and G (n, n), B (n, inputs), R (inputs, inputs). `shift` is c in 1/s: every pole is left
     of -c / 2. For (c1, c2) `projectors` are those on the fast and the slow motions
-    (`fast_and_slow`), each (n, n), and every pole must be left of -min(c1, c2) / 2.
+    (`decay_projectors`), each (n, n), and every pole must be left of -min(c1, c2) / 2.
     With Ec = c1 E1 + c2 E2 and R~ = R + B'GB the equation is that of A + Ec / 2, P + A'GA, R~ and
     the cross term A'GB, which the shift does not enter; L = -R~⁻¹ (B'GA + B'Q).
 
     Raises `UsageError` for matrices that do not fit, P or G not semidefinite, R not definite, no
     stabilising solution, and a pole that breaks the bound. Source: Antonov, (2) to (5).
     """
-    A = square("A", A)
+    A = as_square_matrix("A", A)
     n = len(A)
-    B = matrix("B", B, rows=n)
-    P = symmetric("P", P, n)
-    R = symmetric("R", R, B.shape[1], definite="positive")
-    G = np.zeros((n, n)) if G is None else symmetric("G", G, n)
+    B = as_matrix("B", B, rows=n)
+    P = as_symmetric_matrix("P", P, n)
+    R = as_symmetric_matrix("R", R, B.shape[1], definite="positive")
+    G = np.zeros((n, n)) if G is None else as_symmetric_matrix("G", G, n)
     shifted, bound = _shifted(A, shift, projectors)
     words = MatrixNames(
         _name(bound, "A"), "B", "P", "cannot be moved by B; add an input", "P does not weigh it"
@@ -89,12 +89,12 @@ def quality_filter(
     Raises `UsageError` as `quality_regulator` does. Source: Antonov, (6) to (9), (6) with its
     quadratic term.
     """
-    A = square("A", A)
+    A = as_square_matrix("A", A)
     n = len(A)
-    S = matrix("S", S, columns=n)
-    R1 = symmetric("R1", R1, n)
-    R2 = symmetric("R2", R2, len(S), definite="positive")
-    G = np.zeros((n, n)) if G is None else symmetric("G", G, n)
+    S = as_matrix("S", S, columns=n)
+    R1 = as_symmetric_matrix("R1", R1, n)
+    R2 = as_symmetric_matrix("R2", R2, len(S), definite="positive")
+    G = np.zeros((n, n)) if G is None else as_symmetric_matrix("G", G, n)
     shifted, bound = _shifted(A, shift, projectors)
     found = optimal_gain(
         shifted,
@@ -129,9 +129,9 @@ def cycle_regulator(
     Raises `UsageError` for fewer cycles than one, and as `quality_regulator` does. Source:
     Antonov, (10) and (11).
     """
-    cycles = count("cycles", cycles)
-    A = square("A", A)
-    B = matrix("B", B, rows=len(A))
+    cycles = as_count("cycles", cycles)
+    A = as_square_matrix("A", A)
+    B = as_matrix("B", B, rows=len(A))
     total = np.zeros(B.T.shape)
     done = []
     for _ in range(cycles):
@@ -141,13 +141,13 @@ def cycle_regulator(
     return tuple(done)
 
 
-def fast_and_slow(A: ArrayLike, border: float) -> tuple[FloatArray, FloatArray]:
+def decay_projectors(A: ArrayLike, border: float) -> tuple[FloatArray, FloatArray]:
     """The projectors E1 and E2 (n, n) on the motions of A (n, n) that decay faster, and the rest.
 
     `border` is a decay in 1/s: E1 is that of the eigenvalues with Re λ < -border. E1 + E2 = I, and
     both commute with A. Raises `UsageError` for A not square.
     """
-    A = square("A", A)
+    A = as_square_matrix("A", A)
     n = len(A)
     T, Z, fast = schur(A, output="real", sort=lambda real, _: real < -border)
     above, beside, below = T[:fast, :fast], T[:fast, fast:], T[fast:, fast:]
@@ -161,14 +161,14 @@ def _shifted(
 ) -> tuple[FloatArray, float]:
     """A + Ec / 2 and the real part that every pole must be left of."""
     n = len(A)
-    speeds = finite("shift", shift)
+    speeds = as_finite_array("shift", shift)
     if speeds.shape not in {(), (2,)} or speeds.min() < 0:
         raise UsageError(f"shift is {shift}; expected one number, or two, not below 0")
     c1, c2 = np.broadcast_to(speeds, 2)
     if projectors is None and c1 != c2:
         raise UsageError(f"shift is {shift}; expected projectors with two different ones")
     one, other = projectors or (np.eye(n), np.zeros((n, n)))
-    E1, E2 = square("projectors[0]", one, n), square("projectors[1]", other, n)
+    E1, E2 = as_square_matrix("projectors[0]", one, n), as_square_matrix("projectors[1]", other, n)
     if not (np.allclose(E1 + E2, np.eye(n)) and np.allclose(E1 @ E1, E1)):
         raise UsageError(f"projectors, {E1.shape}: expected E1 + E2 = I and E1 E1 = E1")
     return A + (c1 * E1 + c2 * E2) / 2, -float(min(c1, c2)) / 2

@@ -10,7 +10,7 @@ from scipy.linalg import LinAlgError, solve_continuous_are, solve_continuous_lya
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .matrices import matrix, square, symmetric
+from .matrices import as_matrix, as_square_matrix, as_symmetric_matrix
 from .observability import AXIS_TOLERANCE, ComplexArray, format_eigenvalue, unobservable_eigenvalues
 
 MAX_RICCATI_RESIDUAL = 1e-9  # a scaled residual beyond it is no solution
@@ -82,15 +82,15 @@ def kalman_gain(
     >>> kalman_gain(A, G, C, Q=1.0, R=1.0).gain.round(3).tolist()
     [[1.414], [1.0]]
     """
-    A = square("A", A)
+    A = as_square_matrix("A", A)
     n = len(A)
-    G = matrix("G", G, rows=n)
-    C = matrix("C", C, columns=n)
+    G = as_matrix("G", G, rows=n)
+    C = as_matrix("C", C, columns=n)
     q, m = G.shape[1], len(C)
-    Q = symmetric("Q", Q, q)
-    R = symmetric("R", R, m, definite="positive")
-    N = np.zeros((q, m)) if N is None else matrix("N", N, q, m)
-    symmetric("[Q N; N' R]", np.block([[Q, N], [N.T, R]]), q + m)
+    Q = as_symmetric_matrix("Q", Q, q)
+    R = as_symmetric_matrix("R", R, m, definite="positive")
+    N = np.zeros((q, m)) if N is None else as_matrix("N", N, q, m)
+    as_symmetric_matrix("[Q N; N' R]", np.block([[Q, N], [N.T, R]]), q + m)
     return optimal_gain(A, C, G @ Q @ G.T, R, G @ N)
 
 
@@ -227,11 +227,11 @@ def error_covariance(
     (A - L C) P + P (A - L C)' + W + L R L' = 0. Raises `UsageError` for matrices that do not fit
     and where A - L C is not stable.
     """
-    A = square("A", A)
+    A = as_square_matrix("A", A)
     n = len(A)
-    C = matrix("C", C, columns=n)
-    L = matrix("L", L, n, len(C))
-    W, R = symmetric("W", W, n), symmetric("R", R, len(C))
+    C = as_matrix("C", C, columns=n)
+    L = as_matrix("L", L, n, len(C))
+    W, R = as_symmetric_matrix("W", W, n), as_symmetric_matrix("R", R, len(C))
     F = A - L @ C
     worst = sorted_eigenvalues(F)[-1]
     if worst.real >= 0:

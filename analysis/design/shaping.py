@@ -10,7 +10,7 @@ from scipy.linalg import block_diag, solve_continuous_lyapunov
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .matrices import finite, matrix, number, square
+from .matrices import as_finite_array, as_matrix, as_number, as_square_matrix
 from .observability import ComplexArray
 
 DOUBLE_ROOT_TOLERANCE = 1e-6  # relative distance of the two computed parts of a double root
@@ -68,7 +68,7 @@ def spectral_factor(numerator: ArrayLike, denominator: ArrayLike) -> TransferFun
 
 def _even(name: str, coefficients: ArrayLike) -> FloatArray:
     """The coefficients in ω² of an even polynomial in ω."""
-    found = np.trim_zeros(np.atleast_1d(finite(name, coefficients)), "f")
+    found = np.trim_zeros(np.atleast_1d(as_finite_array(name, coefficients)), "f")
     if found.ndim != 1 or not len(found):
         raise UsageError(f"{name} is of shape {found.shape}; expected coefficients, not all zero")
     if len(found) % 2 == 0 or np.any(found[1::2]):
@@ -98,9 +98,9 @@ def wave_filter(variance: float, frequency: float, damping: float = 0.1) -> Tran
     `variance` is that of what comes out, `frequency` ω0 in rad/s. Raises `UsageError` unless
     frequency and damping are positive and the variance is not negative.
     """
-    variance = number("variance", variance)
-    frequency = number("frequency", frequency, least=np.finfo(float).tiny)
-    damping = number("damping", damping, least=np.finfo(float).tiny)
+    variance = as_number("variance", variance)
+    frequency = as_number("frequency", frequency, least=np.finfo(float).tiny)
+    damping = as_number("damping", damping, least=np.finfo(float).tiny)
     kw = np.sqrt(4 * damping * frequency * variance)
     return TransferFunction(
         np.array([kw, 0.0]), np.array([1.0, 2 * damping * frequency, frequency**2])
@@ -139,13 +139,13 @@ def augment_with_shaping(
     zeros than poles, and at the output one that passes white noise itself: that belongs to R.
     Source: Sakharov, Shergina, Chertkov, (17) to (19), with G0 Dw in the noise's block.
     """
-    A = square("A", A)
+    A = as_square_matrix("A", A)
     n = len(A)
-    B, C = matrix("B", B, rows=n), matrix("C", C, columns=n)
+    B, C = as_matrix("B", B, rows=n), as_matrix("C", C, columns=n)
     rows = n if at == "state" else len(C)
-    G = finite("G", G)
-    G = matrix("G", G[:, None] if G.ndim == 1 else G, rows, 1)
-    white = np.zeros((n, 0)) if noise is None else matrix("noise", noise, rows=n)
+    G = as_finite_array("G", G)
+    G = as_matrix("G", G[:, None] if G.ndim == 1 else G, rows, 1)
+    white = np.zeros((n, 0)) if noise is None else as_matrix("noise", noise, rows=n)
     Aw, Bw, Cw, Dw = _realised(shaping)
     if at == "output" and Dw.any():
         raise UsageError("the shaping filter passes white noise to the output; give that to R")
@@ -161,8 +161,10 @@ def augment_with_shaping(
 
 def _realised(shaping: TransferFunction) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Aw (k, k), Bw (k, 1), Cw (1, k), Dw (1, 1) in controller form."""
-    numerator = np.trim_zeros(np.atleast_1d(finite("numerator", shaping.numerator)), "f")
-    denominator = np.trim_zeros(np.atleast_1d(finite("denominator", shaping.denominator)), "f")
+    numerator = np.trim_zeros(np.atleast_1d(as_finite_array("numerator", shaping.numerator)), "f")
+    denominator = np.trim_zeros(
+        np.atleast_1d(as_finite_array("denominator", shaping.denominator)), "f"
+    )
     if len(denominator) < 2 or len(numerator) > len(denominator):
         raise UsageError(
             f"the shaping filter has the degrees {len(numerator) - 1} over {len(denominator) - 1};"

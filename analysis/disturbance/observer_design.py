@@ -11,7 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from analysis.design.augmentation import Exosystem, Influence, Plant, System, augmented
+from analysis.design.augmentation import (
+    AugmentedPlant,
+    DisturbanceInput,
+    Exosystem,
+    Plant,
+    augment_with_disturbances,
+)
 from analysis.design.luenberger import POLE_PATTERNS, discrete_observer
 from analysis.design.observability import ComplexArray
 from shiplog.types import FloatArray
@@ -85,7 +91,7 @@ def force_observer(plant: FloatArray, model: ForceModel, sampling: Sampling) -> 
     for name, row in zip(system.names, system.D, strict=True):
         parts[int(name == "wave")] = row[p:]
     moving = system.A[p:, p:]
-    held = moving * [[system.names[owner] == "wave"] for owner in system.owners[p:]]
+    held = moving * [[system.names[owner] == "wave"] for owner in system.disturbance_index[p:]]
     both = [_carried(Ac, parts.sum(axis=0), sampling.dt_secs) for Ac in (moving, held)]
     patience = max(1 / model.frequency, sampling.longest_secs) / sampling.dt_secs
     stds = parts @ observer.noise_gain[p:]
@@ -102,7 +108,7 @@ def force_observer(plant: FloatArray, model: ForceModel, sampling: Sampling) -> 
     )
 
 
-def _with_force(plant: FloatArray, model: ForceModel) -> System:
+def _with_force(plant: FloatArray, model: ForceModel) -> AugmentedPlant:
     """Plant and exosystems as one, the slow part before the wave."""
     states = tuple(f"x{i}" for i in range(len(plant)))
     exosystems = {}
@@ -111,8 +117,10 @@ def _with_force(plant: FloatArray, model: ForceModel) -> System:
     if model.wave is not None:
         exosystems["wave"] = Exosystem.harmonic(model.wave)
     measured = Plant(plant, np.zeros((len(plant), 1)), np.eye(1, len(plant)), states, ("y",))
-    influences = [Influence(name, own, {states[-1]: 1.0}) for name, own in exosystems.items()]
-    return augmented(measured, influences)
+    disturbances = [
+        DisturbanceInput(name, own, {states[-1]: 1.0}) for name, own in exosystems.items()
+    ]
+    return augment_with_disturbances(measured, disturbances)
 
 
 def _poles(order: int, model: ForceModel) -> ComplexArray:

@@ -18,7 +18,7 @@ from math import exp, inf, log, nan, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.design.matrices import number
+from analysis.design.matrices import as_number
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
@@ -131,7 +131,7 @@ def fit_wave(
 def _half_rate(dt_secs: float, interval: float, frequency: float | None) -> float:
     """The frequency beyond which the sensor shows nothing, rad/s."""
     _positive("dt_secs", dt_secs)
-    half_rate = pi / (number("interval", interval, least=1.0) * dt_secs)
+    half_rate = pi / (as_number("interval", interval, least=1.0) * dt_secs)
     if frequency is not None and frequency >= half_rate:
         raise UsageError(
             f"the wave's frequency is {frequency:g} rad/s, and a sample every"
@@ -142,7 +142,7 @@ def _half_rate(dt_secs: float, interval: float, frequency: float | None) -> floa
 
 def _positive(name: str, value: float | None) -> None:
     if value is not None:
-        number(name, value, least=np.finfo(float).tiny)
+        as_number(name, value, least=np.finfo(float).tiny)
 
 
 def _logarithms(

@@ -25,9 +25,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, null_space, solve_continuous_lyapunov
 
 from analysis.design.exosystem import (
+    DisturbanceInput,
     DisturbanceObserver,
     Exosystem,
-    Influence,
     Plant,
     ambiguities,
     disturbance_observer,
@@ -81,14 +81,14 @@ BOTH = plant([[0.0, 1.0], [0.0, -0.05]], [[1.0, 0.0], [0.0, 1.0]], "ψ ω", "com
 HEADING = plant([[0.0, 1.0], [0.0, -0.05]], [[1.0, 0.0]], "ψ ω", "compass")
 
 
-def moment(exosystem: Exosystem, name: str = "moment", inertia: float = 1.0) -> Influence:
+def moment(exosystem: Exosystem, name: str = "moment", inertia: float = 1.0) -> DisturbanceInput:
     """Return a moment with the given exosystem that acts on the rate ω."""
-    return Influence(name, exosystem, on_state={"ω": 1 / inertia})
+    return DisturbanceInput(name, exosystem, on_state={"ω": 1 / inertia})
 
 
-def error(sensor: str, exosystem: Exosystem = CONSTANT) -> Influence:
+def error(sensor: str, exosystem: Exosystem = CONSTANT) -> DisturbanceInput:
     """Return an additive error of a sensor with the given exosystem."""
-    return Influence(f"{sensor} error", exosystem, on_sensor={sensor: 1.0})
+    return DisturbanceInput(f"{sensor} error", exosystem, on_sensor={sensor: 1.0})
 
 
 def roll(spectrum: str) -> DisturbanceObserver:

@@ -31,7 +31,7 @@ from scipy.linalg import null_space
 from scipy.signal import place_poles
 
 from analysis.design.observability import ComplexArray
-from analysis.design.per_tick import Motion, TickObserver, block_gains, tick_observer
+from analysis.design.per_tick import StateFunction, TickObserver, block_gains, tick_observer
 from analysis.design.placement import format_mode, place_multilevel, polynomial_error
 from shiplog.errors import UsageError
 from shiplog.ships.paper import surge_acceleration, yaw_acceleration_rate
@@ -237,7 +237,7 @@ def corrections() -> Iterator[Row]:
     )
 
 
-def linearised(x: FloatArray) -> Motion:
+def linearised(x: FloatArray) -> StateFunction:
     """Return the linearised model (1.2): A(x̂N) x + G(x̂N)."""
     f, A = spacecraft(x, NO_INPUT), spacecraft_jacobian(x, NO_INPUT)
     return lambda now, _: f + A @ (now - x)
@@ -254,7 +254,7 @@ def true_flight() -> FloatArray:
     return truth(spacecraft, FLIGHT, np.arange(SECS * PER_SEC + 1) / PER_SEC)
 
 
-def truth(rate: Motion, x: FloatArray, times: FloatArray) -> FloatArray:
+def truth(rate: StateFunction, x: FloatArray, times: FloatArray) -> FloatArray:
     """Integrate a motion from x; return its states at `times`, (len(times), n)."""
     states: FloatArray = solve_ivp(
         lambda t, x: rate(x, ship_inputs(t) if len(x) == 3 else NO_INPUT),

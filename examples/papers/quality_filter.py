@@ -15,7 +15,7 @@ from analysis.design.cascade import Cascade, cascade
 from analysis.design.quality import (
     Regulator,
     cycle_regulator,
-    fast_and_slow,
+    decay_projectors,
     quality_filter,
     quality_regulator,
 )
@@ -243,7 +243,7 @@ def speed_and_damping() -> None:
 
 def two_shifts() -> None:
     """Show that two different shifts can make a stable plant unstable."""
-    E1, E2 = fast_and_slow(TWO_DECAYS, 1.0)
+    E1, E2 = decay_projectors(TWO_DECAYS, 1.0)
 
     def poles_and_gain(c1: float, c2: float) -> tuple[FloatArray, FloatArray]:
         shifted = TWO_DECAYS + (c1 * E1 + c2 * E2) / 2

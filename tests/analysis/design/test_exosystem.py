@@ -5,7 +5,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from analysis.design.exosystem import Exosystem, Influence, Plant, ambiguities, disturbance_observer
+from analysis.design.exosystem import (
+    DisturbanceInput,
+    Exosystem,
+    Plant,
+    ambiguities,
+    disturbance_observer,
+)
 from analysis.design.luenberger import butterworth_poles
 from analysis.design.placement import polynomial_error
 from shiplog import UsageError
@@ -27,15 +33,15 @@ HEADING = plant([[0, 1], [0, -1 / 20]], [[1, 0]], "psi w", "compass")
 YAW_AND_SURGE = plant([[-1 / 20, 0], [0, -0.004]], [[1, 0], [0, 1]], "w v", "gyro log")
 
 
-def moment(exosystem: Exosystem, name: str = "moment") -> Influence:
-    return Influence(name, exosystem, on_state={"w": 1.0})
+def moment(exosystem: Exosystem, name: str = "moment") -> DisturbanceInput:
+    return DisturbanceInput(name, exosystem, on_state={"w": 1.0})
 
 
-def bias(sensor: str = "gyro", exosystem: Exosystem = CONSTANT) -> Influence:
-    return Influence(f"{sensor} error", exosystem, on_sensor={sensor: 1.0})
+def bias(sensor: str = "gyro", exosystem: Exosystem = CONSTANT) -> DisturbanceInput:
+    return DisturbanceInput(f"{sensor} error", exosystem, on_sensor={sensor: 1.0})
 
 
-FORCE = Influence("force", CONSTANT, on_state={"v": 1.0})
+FORCE = DisturbanceInput("force", CONSTANT, on_state={"v": 1.0})
 
 
 # methods, section 4; where it says no: what is ambiguous, at which mode, and the remedies
@@ -105,9 +111,9 @@ def test_a_disturbance_that_none_of_the_states_shows_is_named_too() -> None:
         disturbance_observer(blind, [moment(CONSTANT)], frequency=0.1)
 
 
-def roll(inertia: float) -> tuple[Plant, list[Influence]]:
+def roll(inertia: float) -> tuple[Plant, list[DisturbanceInput]]:
     ship = plant([[0]], [[1]], "w", "gyro")
-    return ship, [Influence("moment", RAMP, on_state={"w": 1 / inertia})]
+    return ship, [DisturbanceInput("moment", RAMP, on_state={"w": 1 / inertia})]
 
 
 @pytest.mark.parametrize(
@@ -214,7 +220,7 @@ def test_a_constant_that_no_noise_moves_has_no_kalman_gain() -> None:
 
 
 def test_a_disturbance_may_act_on_state_and_sensor_at_once() -> None:
-    sea = Influence("sea", WAVE, on_state={"w": 0.5}, on_sensor={"gyro": 2.0})
+    sea = DisturbanceInput("sea", WAVE, on_state={"w": 0.5}, on_sensor={"gyro": 2.0})
     observer = disturbance_observer(NOMOTO, [sea], frequency=0.3)
     assert observer.A[0].tolist() == [-1 / 20, 0.5, 0]
     assert observer.C.tolist() == [[1, 2, 0]]
@@ -250,10 +256,13 @@ def test_an_exosystem_puts_out_an_exponential_times_a_polynomial(
         ({"A": [[np.nan]]}, r"A, \(1, 1\), has NaN or infinities"),
         ({"states": ("a", "b")}, "states are a, b; expected 1 different names"),
         ({"sensors": ()}, "sensors are ; expected 1 different names"),
-        ({"influences": [bias("compass")]}, "'compass error' acts on the sensor 'compass'; the pl"),
-        ({"influences": [moment(RAMP)] * 2}, "disturbances are moment, moment; expected differ"),
-        ({"influences": [moment(Exosystem(np.eye(2), np.ones((1, 3))))]}, "Cc of 'moment' is of"),
-        ({"influences": [moment(Exosystem(np.ones((2, 3)), np.ones((1, 3))))]}, "Ac of 'moment'"),
+        (
+            {"disturbances": [bias("compass")]},
+            "'compass error' acts on the sensor 'compass'; the",
+        ),
+        ({"disturbances": [moment(RAMP)] * 2}, "disturbances are moment, moment; expected differ"),
+        ({"disturbances": [moment(Exosystem(np.eye(2), np.ones((1, 3))))]}, "Cc of 'moment' is of"),
+        ({"disturbances": [moment(Exosystem(np.ones((2, 3)), np.ones((1, 3))))]}, "Ac of 'moment'"),
         ({"spectrum": "bessel"}, "spectrum is 'bessel'; expected butterworth, binomial, kalman"),
         ({"spectrum": [-1, -2, -3]}, r"spectrum is of shape \(3,\); expected \(2,\)"),
         (
@@ -274,7 +283,7 @@ def test_an_exosystem_puts_out_an_exponential_times_a_polynomial(
 def test_what_does_not_fit_is_refused_in_one_line(change: dict, said: str) -> None:
     fields = {name: getattr(NOMOTO, name) for name in ("A", "B", "C", "states", "sensors")}
     ship = Plant(**{name: change.get(name, value) for name, value in fields.items()})
-    request = {"influences": [moment(CONSTANT)], "frequency": 0.1}
+    request = {"disturbances": [moment(CONSTANT)], "frequency": 0.1}
     request |= {name: value for name, value in change.items() if name not in fields}
     with pytest.raises(UsageError, match=said) as raised:
         disturbance_observer(ship, **request)
@@ -313,12 +322,12 @@ def test_the_gains_of_the_roll_example_are_the_pages_formulas(I: float, omega: f
 def test_of_an_inertia_of_1e12_a_rank_test_in_its_units_fails_and_ours_does_not() -> None:
     """Of 1e16 even one to the last bit."""
     for inertia, tolerance in ((1e12, 1e-10), (1e16, None)):
-        ship, influences = roll(inertia)
-        observer = disturbance_observer(ship, influences, frequency=0.05)
+        ship, disturbances = roll(inertia)
+        observer = disturbance_observer(ship, disturbances, frequency=0.05)
         powers = [np.linalg.matrix_power(observer.A, k) for k in range(3)]
         shown = np.vstack([observer.C @ power for power in powers])
         assert np.linalg.matrix_rank(shown, tolerance) < 3
-        assert ambiguities(ship, influences) == ()
+        assert ambiguities(ship, disturbances) == ()
 
 
 def test_a_complex_rate_turns_in_two_by_two_blocks() -> None:

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag
 
-from analysis.design.per_tick import Motion, TickObserver, block_gains, tick_observer
+from analysis.design.per_tick import StateFunction, TickObserver, block_gains, tick_observer
 from analysis.design.placement import polynomial_error
 from shiplog import UsageError
 from shiplog.ships.paper import Coefficients, surge_acceleration, yaw_acceleration_rate
@@ -58,7 +58,7 @@ N = [
 ]
 
 
-def truth(rate: Motion, x: np.ndarray, u: np.ndarray, times: np.ndarray) -> np.ndarray:
+def truth(rate: StateFunction, x: np.ndarray, u: np.ndarray, times: np.ndarray) -> np.ndarray:
     """The motion itself at `times`, (len(times), n)."""
     return solve_ivp(
         lambda _, x: rate(x, u), times[[0, -1]], x, "DOP853", times, rtol=1e-13, atol=1e-15

@@ -12,7 +12,7 @@ from scipy.linalg import solve_continuous_are
 from analysis.design.cascade import cascade
 from analysis.design.quality import (
     cycle_regulator,
-    fast_and_slow,
+    decay_projectors,
     quality_filter,
     quality_regulator,
 )
@@ -97,7 +97,7 @@ def test_the_knob_of_damping(G: float, noise: float, slowest: float) -> None:
 
 
 def test_different_shifts_that_destabilise_are_refused_by_the_poles_name() -> None:
-    projectors = fast_and_slow(TWO_DECAYS, 1.0)
+    projectors = decay_projectors(TWO_DECAYS, 1.0)
     assert_allclose(projectors, [np.diag([1, 0]), np.diag([0, 1])])
     with pytest.raises(UsageError, match=r"poles left of -0\.5, and one is at 0\.2164316;"):
         quality_regulator(
@@ -256,7 +256,7 @@ def test_the_projectors_split_the_motions(seed: int, border: float) -> None:
     A = random_regulator(seed)[0]
     values = np.linalg.eigvals(A)
     assume(np.abs(values.real + border).min() > 0.02)
-    E1, E2 = fast_and_slow(A, border)
+    E1, E2 = decay_projectors(A, border)
     for E in (E1, E2):
         assert_allclose(E @ E, E, atol=1e-7 * (1 + np.linalg.norm(E)) ** 2)
         assert_allclose(E @ A, A @ E, atol=1e-7 * (1 + np.linalg.norm(E)) * np.linalg.norm(A))

@@ -12,7 +12,7 @@ from analysis.design.per_tick import block_gains
 from analysis.design.placement import place_multilevel, unobservable_modes
 from analysis.design.quality import (
     cycle_regulator,
-    fast_and_slow,
+    decay_projectors,
     quality_filter,
     quality_regulator,
 )
@@ -51,7 +51,7 @@ FITTING: dict[Callable[..., object], dict[str, Any]] = {
     },
     place_multilevel: {"A": A, "C": ROW, "poles": np.array([-1.0, -2])},
     unobservable_modes: {"A": A, "C": ROW},
-    fast_and_slow: {"A": A, "border": 0.5},
+    decay_projectors: {"A": A, "border": 0.5},
     block_gains: {"A": A, "Phi0": [[-1.0]], "Phi1": [[-1.0]]},
     observed: {"A": A, "B": COLUMN, "C": ROW},
 }  # fmt: skip
