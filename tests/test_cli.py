@@ -1,4 +1,4 @@
-"""The command line: each verb end to end, each bad input one line and its exit code."""
+"""The command line: each verb end to end; each invalid input gives one line and its exit code."""
 
 import json
 import subprocess
@@ -15,13 +15,13 @@ from shiplog import Channel, LogWriter, TrialLog, load_vessel, read, write
 from shiplog.cli.main import main
 from shiplog.cli.verb import ExitCode
 
-FINE, FAILURE, USAGE, DATA_LOST = ExitCode
+OK, FAILURE, USAGE, DATA_LOST = ExitCode
 
 
 @pytest.fixture(autouse=True)
 def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("CI", raising=False)  # there references are not updated
+    monkeypatch.delenv("CI", raising=False)  # in CI, references are not updated
 
 
 @pytest.fixture(scope="module")
@@ -32,15 +32,15 @@ def recorded(zigzag: SimulatedTrial, tmp_path_factory: pytest.TempPathFactory) -
 
 
 def refusal(capsys: pytest.CaptureFixture[str], code: int, *arguments: object) -> str:
-    """The one line on stderr with which a verb refuses."""
+    """Run a verb that rejects its input, and return its one line on stderr."""
     before = set(Path.cwd().rglob("*"))
     assert main([str(a) for a in arguments]) == code
-    said = capsys.readouterr()
-    assert said.out == ""
-    lines = said.err.strip().split("\n")
-    assert len(lines) == 1, said.err
+    output = capsys.readouterr()
+    assert output.out == ""
+    lines = output.err.strip().split("\n")
+    assert len(lines) == 1, output.err
     assert lines[0].startswith("shiplog: ")
-    assert set(Path.cwd().rglob("*")) == before, "something half-written was left"
+    assert set(Path.cwd().rglob("*")) == before, "a partly written file remains"
     return lines[0]
 
 
@@ -49,9 +49,9 @@ def refusal(capsys: pytest.CaptureFixture[str], code: int, *arguments: object) -
 
 def test_simulate_replay_check_and_convert_end_to_end(capsys: pytest.CaptureFixture[str]) -> None:
     simulate = "record simulate zigzag-10-10 --seed 5 --duration 200 -o trial.mcap --truth t.mcap"
-    assert main(simulate.split()) == FINE
+    assert main(simulate.split()) == OK
     assert "samples of 6 channels" in capsys.readouterr().out
-    assert main(["replay", "trial.mcap", "--json", "trial.json"]) == FINE
+    assert main(["replay", "trial.mcap", "--json", "trial.json"]) == OK
     out = capsys.readouterr().out
     assert "whiteness" in out
     assert "Disturbances" in out
@@ -59,10 +59,10 @@ def test_simulate_replay_check_and_convert_end_to_end(capsys: pytest.CaptureFixt
     assert Path("trial.rrd").stat().st_size > 10_000
     assert "coefficients" in json.loads(Path("trial.json").read_text())
     assert main(["check", "trial.mcap"]) == FAILURE
-    assert main(["check", "trial.mcap", "--update"]) == FINE
-    assert main(["check", "trial.mcap"]) == FINE
-    assert main(["convert", "trial.mcap", "trial.csv"]) == FINE
-    assert main(["convert", "trial.csv", "again.mcap"]) == FINE
+    assert main(["check", "trial.mcap", "--update"]) == OK
+    assert main(["check", "trial.mcap"]) == OK
+    assert main(["convert", "trial.mcap", "trial.csv"]) == OK
+    assert main(["convert", "trial.csv", "again.mcap"]) == OK
     first, again = read("trial.mcap"), read("again.mcap")
     for one, other in zip(first, again, strict=True):
         assert np.array_equal(one.values, other.values)
@@ -71,19 +71,21 @@ def test_simulate_replay_check_and_convert_end_to_end(capsys: pytest.CaptureFixt
     assert first.vessel_toml == again.vessel_toml
 
 
-def test_json_on_stdout_is_alone_there(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", str(recorded), "--json", "-", "-o", "z.rrd"]) == FINE
-    said = capsys.readouterr()
-    assert json.loads(said.out)["filter"]["speed"]["white"] is False
-    assert "NOT white" in said.err
+def test_json_on_stdout_is_the_only_output_there(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", str(recorded), "--json", "-", "-o", "z.rrd"]) == OK
+    output = capsys.readouterr()
+    assert json.loads(output.out)["residuals"]["speed"]["white"] is False
+    assert "NOT white" in output.err
 
 
-def test_a_changed_replay_is_red_and_laid_over_its_reference(
+def test_a_changed_replay_fails_the_check_and_is_overlaid_on_its_reference(
     recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = read(recorded)
     write(log, "z.mcap")
-    assert main(["check", "z.mcap", "--update"]) == FINE
+    assert main(["check", "z.mcap", "--update"]) == OK
     changed = tuple(
         Channel(c.name, c.source, c.unit, c.measured_ns, c.received_ns, c.values + 1e-6)
         if c.name == "speed"
@@ -93,69 +95,71 @@ def test_a_changed_replay_is_red_and_laid_over_its_reference(
     write(TrialLog("z", changed, {}, log.vessel_toml), "z.mcap")
     capsys.readouterr()
     assert main(["check", "z.mcap", "--json", "z.json"]) == FAILURE
-    said = capsys.readouterr().out.split("\n")
-    assert said[1].startswith("  /speed/measured: largest 1e-06")
+    lines = capsys.readouterr().out.split("\n")
+    assert lines[1].startswith("  /speed/measured: largest difference 1e-06")
     assert Path("z.check.rrd").exists()
     assert json.loads(Path("z.json").read_text())[0]["ok"] is False
 
 
-def test_ci_never_updates(
+def test_references_are_not_updated_in_ci(
     recorded: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("CI", "true")
     assert "not updated in CI" in refusal(capsys, USAGE, "check", recorded, "--update")
 
 
-def test_info_says_what_is_in_a_log(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["info", str(recorded)]) == FINE
+def test_info_lists_the_contents_of_a_log(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["info", str(recorded)]) == OK
     out = capsys.readouterr().out
     assert "/rudder/simulated" in out
     assert "turns the bow to starboard" in out
     assert "vessel.toml: attached" in out
 
 
-def test_a_gust_and_a_wave_are_put_into_the_simulation() -> None:
+def test_a_gust_and_a_wave_are_simulated() -> None:
     simulate = "record simulate turning-circle --duration 60 --noise none -o g.mcap --truth t.mcap"
-    assert main([*simulate.split(), "--gust=-2@20+10", "--wave=0.5@8"]) == FINE
+    assert main([*simulate.split(), "--gust=-2@20+10", "--wave=0.5@8"]) == OK
     moment = read("t.mcap")["yaw_disturbance"].values
     assert moment[:160].mean() == pytest.approx(0, abs=2e-9)
     assert moment[200:300].mean() < -1e-6
     assert np.ptp(moment[400:]) > 2e-7
 
 
-def test_an_unrest_is_put_into_the_simulation_in_degrees_and_millimetres() -> None:
+def test_random_forcing_is_given_in_degrees_and_millimetres() -> None:
     simulate = "record simulate pull-out --duration 900 --noise none -o u.mcap --truth t.mcap"
-    assert main([*simulate.split(), "--random-forcing", "0.5,8"]) == FINE
+    assert main([*simulate.split(), "--random-forcing", "0.5,8"]) == OK
     force = read("t.mcap")["surge_disturbance"].values[:9000].reshape(-1, 10).mean(axis=1)
     assert force.std() == pytest.approx(8e-3, rel=0.1)
     both = read("t.mcap")["yaw_disturbance"].values
-    assert main([*simulate.split(), "--random-forcing=0.5"]) == FINE
+    assert main([*simulate.split(), "--random-forcing=0.5"]) == OK
     assert np.array_equal(read("t.mcap")["yaw_disturbance"].values, both)
     assert not read("t.mcap")["surge_disturbance"].values.any()
 
 
-def test_a_sensor_is_given_spikes() -> None:
+def test_sensor_spikes_are_simulated() -> None:
     simulate = "record simulate spiral --duration 900 --noise none -o {} {}"
     spikes = "--sensor yaw_rate.spikes=0.01 --sensor yaw_rate.spike_size=0.05"
-    assert main(simulate.format("a.mcap", "").split()) == FINE
-    assert main(simulate.format("b.mcap", spikes).split()) == FINE
-    away = read("b.mcap")["yaw_rate"].values - read("a.mcap")["yaw_rate"].values
-    assert np.count_nonzero(away) == pytest.approx(90, abs=40)
-    assert np.abs(away[away != 0]) == pytest.approx(0.05)
+    assert main(simulate.format("a.mcap", "").split()) == OK
+    assert main(simulate.format("b.mcap", spikes).split()) == OK
+    difference = read("b.mcap")["yaw_rate"].values - read("a.mcap")["yaw_rate"].values
+    assert np.count_nonzero(difference) == pytest.approx(90, abs=40)
+    assert np.abs(difference[difference != 0]) == pytest.approx(0.05)
 
 
-def test_an_unfinished_log_replays_with_a_warning(
+def test_an_unfinished_log_is_replayed_with_a_warning(
     zigzag: SimulatedTrial, capsys: pytest.CaptureFixture[str]
 ) -> None:
     writer = LogWriter("cut.mcap", vessel_toml=zigzag.vessel_toml)
     writer.write(*zigzag.channels)
     writer.flush()
-    assert main(["replay", "cut.mcap"]) == FINE
+    assert main(["replay", "cut.mcap"]) == OK
     assert "not finished" in capsys.readouterr().err
     writer.close()
 
 
-def test_a_damaged_log_replays_but_says_that_data_were_lost(
+def test_a_damaged_log_is_replayed_and_lost_data_are_reported(
     zigzag: SimulatedTrial, capsys: pytest.CaptureFixture[str]
 ) -> None:
     writer = LogWriter("bad.mcap", vessel_toml=zigzag.vessel_toml)
@@ -185,12 +189,12 @@ RUNS = sorted(KVLCC2.glob("*/*.dat"))
 
 @pytest.mark.skipif(not RUNS, reason="the SIMMAN data are not in ../shared/data/kvlcc2")
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
-def test_every_kvlcc2_run_is_converted_and_replayed_to_files_rerun_is_content_with(
+def test_every_kvlcc2_run_is_converted_and_replayed_to_files_that_rerun_accepts(
     run: Path,
 ) -> None:
     layout = LAYOUTS / f"simman_{run.parent.name}.toml"
-    assert main(["convert", str(run), "run.mcap", "--layout", str(layout)]) == FINE
-    assert main(["replay", "run.mcap", "-o", "run.rrd", "--json", "run.json"]) == FINE
+    assert main(["convert", str(run), "run.mcap", "--layout", str(layout)]) == OK
+    assert main(["replay", "run.mcap", "-o", "run.rrd", "--json", "run.json"]) == OK
     rerun = Path(sys.executable).with_name("rerun")
     for check in (["rrd", "verify", "run.rrd"], ["mcap", "check", "run.mcap"]):
         done = subprocess.run([rerun, *check], capture_output=True, text=True, check=False)
@@ -198,26 +202,26 @@ def test_every_kvlcc2_run_is_converted_and_replayed_to_files_rerun_is_content_wi
     assert json.loads(Path("run.json").read_text())["model"]["origin"].startswith("first model")
 
 
-# ---- bad input
+# ---- invalid input
 
 
 @pytest.mark.parametrize("verb", ["replay", "info", "check"])
-def test_what_is_no_log_is_refused_in_one_line(
+def test_a_file_that_is_not_a_log_is_rejected_in_one_line(
     verb: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("text.mcap").write_text("t,r\n0,1\n")
     Path("empty.mcap").touch()
     Path("folder.mcap").mkdir()
-    for name, said in (
+    for name, message in (
         ("text.mcap", "not an MCAP file"),
         ("empty.mcap", "is empty"),
         ("missing.mcap", "no such file"),
     ):
         if verb == "check" and name != "missing.mcap":
             assert main(["check", name]) == FAILURE
-            assert said in capsys.readouterr().out
+            assert message in capsys.readouterr().out
         else:
-            assert said in refusal(capsys, FAILURE, verb, name)
+            assert message in refusal(capsys, FAILURE, verb, name)
 
 
 def write_broken(name: str, broken: Channel | None, log: TrialLog) -> None:
@@ -225,7 +229,7 @@ def write_broken(name: str, broken: Channel | None, log: TrialLog) -> None:
     write(TrialLog("x", channels, {}, log.vessel_toml), "x.mcap")
 
 
-def test_a_log_without_a_needed_channel_is_refused(
+def test_a_log_without_a_required_channel_is_rejected(
     recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_broken("rudder", None, read(recorded))
@@ -233,7 +237,7 @@ def test_a_log_without_a_needed_channel_is_refused(
     assert "no channel 'rudder' in x.mcap; it has heading, position, rpm, speed, yaw_rate" in line
 
 
-def test_a_channel_of_one_sample_is_refused(
+def test_a_channel_of_one_sample_is_rejected(
     recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = read(recorded)
@@ -243,7 +247,7 @@ def test_a_channel_of_one_sample_is_refused(
     assert "one sample" in refusal(capsys, FAILURE, "replay", "x.mcap")
 
 
-def test_times_that_run_backwards_are_refused_and_the_remedy_works(
+def test_decreasing_time_stamps_are_rejected_and_the_remedy_works(
     recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = read(recorded)
@@ -253,11 +257,11 @@ def test_times_that_run_backwards_are_refused_and_the_remedy_works(
     line = refusal(capsys, FAILURE, "replay", "x.mcap")
     assert "backwards" in line
     assert "shiplog convert" in line
-    assert main(["convert", "x.mcap", "sorted.mcap"]) == FINE
-    assert main(["replay", "sorted.mcap"]) == FINE
+    assert main(["convert", "x.mcap", "sorted.mcap"]) == OK
+    assert main(["replay", "sorted.mcap"]) == OK
 
 
-def test_infinity_is_refused(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_infinite_value_is_rejected(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = read(recorded)
     c = log["yaw_rate"]
     values = c.values.copy()
@@ -268,7 +272,7 @@ def test_infinity_is_refused(recorded: Path, capsys: pytest.CaptureFixture[str])
     assert "infinit" in refusal(capsys, FAILURE, "replay", "x.mcap")
 
 
-def test_a_unit_nobody_knows_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_unit_is_rejected(capsys: pytest.CaptureFixture[str]) -> None:
     Path("run.txt").write_text("0 1\n1 2\n")
     Path("layout.toml").write_text(
         'delimiter = "whitespace"\n[time]\ncolumn = 1\nunit = "s"\n'
@@ -278,7 +282,7 @@ def test_a_unit_nobody_knows_is_refused(capsys: pytest.CaptureFixture[str]) -> N
     assert "'knot'" in line
 
 
-def test_a_vessel_file_with_three_faults_is_refused_with_all_three(
+def test_all_errors_of_a_vessel_file_are_reported_at_once(
     recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = (PROJECT / "sample_data" / "vessels" / "table1.toml").read_text()
@@ -289,12 +293,12 @@ def test_a_vessel_file_with_three_faults_is_refused_with_all_three(
         ["record", "simulate", "spiral", "--vessel", "bad.toml", "-o", "x.mcap"],
     ):
         line = refusal(capsys, FAILURE, *arguments)
-        for fault in ("T1 must be positive", "alfa1", "h must be finite"):
-            assert fault in line
+        for error in ("T1 must be positive", "alfa1", "h must be finite"):
+            assert error in line
 
 
 @pytest.mark.parametrize("output", ["missing/z.rrd", "."])
-def test_an_unwritable_output_is_refused(
+def test_an_unwritable_output_is_rejected(
     recorded: Path, capsys: pytest.CaptureFixture[str], output: str
 ) -> None:
     assert "cannot write" in refusal(capsys, FAILURE, "replay", recorded, "-o", output)
@@ -331,7 +335,7 @@ def test_an_unwritable_output_is_refused(
         "convert x.mcap x.xlsx",
     ],
 )
-def test_a_wrong_request_is_a_usage_error_in_one_line(
+def test_an_invalid_request_is_a_usage_error_in_one_line(
     capsys: pytest.CaptureFixture[str], arguments: str
 ) -> None:
     refusal(capsys, USAGE, *arguments.split())
@@ -358,22 +362,22 @@ def test_no_output_is_written_over_a_log_or_another_output(
     assert recorded.read_bytes() == before
 
 
-def test_a_device_is_written_to_and_stays_one(recorded: Path) -> None:
-    assert main(["info", str(recorded), "--json", "/dev/null"]) == FINE
+def test_a_device_file_is_written_to_and_not_replaced(recorded: Path) -> None:
+    assert main(["info", str(recorded), "--json", "/dev/null"]) == OK
     assert Path("/dev/null").is_char_device()
 
 
-def test_damage_is_said_even_if_the_replay_then_fails(
+def test_damage_is_reported_even_if_the_replay_then_fails(
     recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data = bytearray(recorded.read_bytes())
     data[len(data) // 2] ^= 0x10
     Path("bad.mcap").write_bytes(data)
     code = main(["replay", "bad.mcap"])
-    said = capsys.readouterr().err.split("\n")
+    lines = capsys.readouterr().err.split("\n")
     assert code in (FAILURE, DATA_LOST)
-    assert said[0].startswith("warning: ")
-    assert "damage" in said[0]
+    assert lines[0].startswith("warning: ")
+    assert "damage" in lines[0]
 
 
 def test_another_source_can_be_chosen(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -381,20 +385,20 @@ def test_another_source_can_be_chosen(recorded: Path, capsys: pytest.CaptureFixt
     c = log["speed"]
     dead = Channel(c.name, "dead", c.unit, c.measured_ns, c.received_ns, 0 * c.values)
     write(TrialLog("x", (dead, *log), {}, log.vessel_toml), "x.mcap")
-    assert main(["replay", "x.mcap"]) == FINE
-    said = capsys.readouterr().err
-    assert "speed: 2 sources (dead, simulated), dead is used" in said
-    assert "never changes" in said
-    assert main(["replay", "x.mcap", "--source", "speed=simulated"]) == FINE
-    said = capsys.readouterr().err
-    assert "never changes" not in said
-    assert "2 sources" not in said
+    assert main(["replay", "x.mcap"]) == OK
+    warnings = capsys.readouterr().err
+    assert "speed: 2 sources (dead, simulated); dead is used" in warnings
+    assert "never changes" in warnings
+    assert main(["replay", "x.mcap", "--source", "speed=simulated"]) == OK
+    warnings = capsys.readouterr().err
+    assert "never changes" not in warnings
+    assert "2 sources" not in warnings
     assert "no source 'doppler' of 'speed' in x.mcap; it has dead, simulated" in refusal(
         capsys, FAILURE, "replay", "x.mcap", "--source", "speed=doppler"
     )
 
 
-def test_a_recording_that_was_killed_is_not_recorded_over(
+def test_an_interrupted_recording_is_not_overwritten(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     Path("k.mcap.part").write_bytes(b"hours of trial")
@@ -403,7 +407,7 @@ def test_a_recording_that_was_killed_is_not_recorded_over(
     assert Path("k.mcap.part").read_bytes() == b"hours of trial"
 
 
-def test_what_was_lost_of_a_log_shows_in_every_verbs_exit_code(recorded: Path) -> None:
+def test_lost_data_set_the_exit_code_of_every_verb(recorded: Path) -> None:
     data = recorded.read_bytes()
     Path("cut.mcap").write_bytes(data[: len(data) * 3 // 4])
     assert main(["info", "cut.mcap", "--json", "-"]) == DATA_LOST
@@ -412,19 +416,19 @@ def test_what_was_lost_of_a_log_shows_in_every_verbs_exit_code(recorded: Path) -
     assert not Path("cut.ref.mcap").exists()
 
 
-def test_a_recording_that_was_killed_is_rescued_by_convert(
+def test_convert_recovers_an_interrupted_recording(
     zigzag: SimulatedTrial, capsys: pytest.CaptureFixture[str]
 ) -> None:
     writer = LogWriter("k.mcap.part", vessel_toml=zigzag.vessel_toml)
     writer.write(*zigzag.channels)
     writer.flush()
-    assert main(["convert", "k.mcap.part", "rescued.mcap"]) == FINE
+    assert main(["convert", "k.mcap.part", "rescued.mcap"]) == OK
     assert "not finished" in capsys.readouterr().err
     writer.close()
     assert read("rescued.mcap").warnings == ()
 
 
-def test_a_contrary_rudder_is_said_when_a_table_is_converted(
+def test_a_reversed_rudder_sign_is_reported_when_a_table_is_converted(
     recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = read(recorded)
@@ -436,16 +440,16 @@ def test_a_contrary_rudder_is_said_when_a_table_is_converted(
     for i, (name, unit) in enumerate(columns, start=1):
         layout += f'[{name}]\ncolumn = {i}\nunit = "{unit}"\n'
     Path("layout.toml").write_text(layout)
-    assert main(["convert", "run.txt", "run.mcap", "--layout", "layout.toml"]) == FINE
+    assert main(["convert", "run.txt", "run.mcap", "--layout", "layout.toml"]) == OK
     assert "its sign is reversed" in capsys.readouterr().err
 
 
-def test_without_a_verb_the_help_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_verb_the_help_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == USAGE
     assert "replay" in capsys.readouterr().err
 
 
-def test_heavy_libraries_wait_for_the_verb_that_needs_them(recorded: Path) -> None:
+def test_heavy_libraries_are_imported_only_by_verbs_that_need_them(recorded: Path) -> None:
     code = (
         "import sys; from shiplog.cli.main import main\n"
         "try: main(sys.argv[1:])\n"
@@ -464,7 +468,7 @@ def test_heavy_libraries_wait_for_the_verb_that_needs_them(recorded: Path) -> No
         assert done.stdout.strip().endswith("set()"), done.stdout
 
 
-def test_a_folder_that_hides_our_package_is_named(recorded: Path) -> None:
+def test_a_folder_that_shadows_a_package_of_shiplog_is_named(recorded: Path) -> None:
     Path("analysis").mkdir()
     Path("analysis/__init__.py").touch()
     done = subprocess.run(
@@ -478,9 +482,9 @@ def test_a_folder_that_hides_our_package_is_named(recorded: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_a_review_is_no_log(capsys: pytest.CaptureFixture[str]) -> None:
-    said = refusal(capsys, USAGE, "replay", "trial.rrd")
-    assert "a review, not a log; open it with: rerun trial.rrd" in said
+def test_a_review_is_rejected_as_a_log(capsys: pytest.CaptureFixture[str]) -> None:
+    message = refusal(capsys, USAGE, "replay", "trial.rrd")
+    assert "a review, not a log; open it with: rerun trial.rrd" in message
 
 
 @pytest.mark.parametrize(
@@ -490,11 +494,11 @@ def test_a_review_is_no_log(capsys: pytest.CaptureFixture[str]) -> None:
         ("replay trial.mcap -o review.txt", ".rrd"),
     ],
 )
-def test_an_output_is_called_what_it_is(
+def test_an_output_with_a_wrong_suffix_is_rejected(
     capsys: pytest.CaptureFixture[str], arguments: str, suffix: str
 ) -> None:
-    said = refusal(capsys, USAGE, *arguments.split())
-    assert f"the output is a {suffix} file; give it a name that ends so" in said
+    message = refusal(capsys, USAGE, *arguments.split())
+    assert f"the output is a {suffix} file; give it a name that ends so" in message
 
 
 # ---- identify
@@ -507,72 +511,70 @@ def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
     for seed, manoeuvre in enumerate(("zigzag-20-20", "turning-circle-35")):
         path = str(folder / f"{manoeuvre}.mcap")
         simulate = f"record simulate {manoeuvre} --seed {seed} --duration 400 -o {path}"
-        assert main(simulate.split()) == FINE
+        assert main(simulate.split()) == OK
         paths.append(path)
     return paths[0], paths[1]
 
 
-def test_a_ship_is_identified_validated_written_sailed_and_replayed(
+def test_a_ship_is_identified_validated_written_simulated_and_replayed(
     two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     zigzag, circle = two_runs
     capsys.readouterr()
-    arguments = ["--fix", "T3=0.5", "--validate", circle, "-o", "found.toml", "--json", "f.json"]
-    assert main(["identify", zigzag, *arguments]) == FINE
-    said = capsys.readouterr()
-    assert "the paper's model, b1 = -d and e = T3 d" in said.out
-    assert "tactical diameter [m]" in said.out
-    assert "vessel file: found.toml" in said.err
-    found = json.loads(Path("f.json").read_text())
-    assert found["parameters"]["d"]["value"] == pytest.approx(1 / 7500, rel=3e-3)
-    assert found["fixed"]["T3"] == 0.5
-    (validation,) = found["validation"]
+    arguments = ["--fix", "T3=0.5", "--validate", circle, "-o", "ship.toml", "--json", "f.json"]
+    assert main(["identify", zigzag, *arguments]) == OK
+    output = capsys.readouterr()
+    assert "the paper's model, b1 = -d and e = T3 d" in output.out
+    assert "tactical diameter [m]" in output.out
+    assert "vessel file: ship.toml" in output.err
+    result = json.loads(Path("f.json").read_text())
+    assert result["parameters"]["d"]["value"] == pytest.approx(1 / 7500, rel=3e-3)
+    assert result["fixed"]["T3"] == 0.5
+    (validation,) = result["validation"]
     assert validation["rms"]["yaw_rate"] < np.radians(0.02)
-    simulate = "record simulate zigzag-20-20 --vessel found.toml --duration 200 -o again.mcap"
-    assert main(simulate.split()) == FINE
-    assert main(["replay", zigzag, "--vessel", "found.toml", "-o", "r.rrd"]) == FINE
+    simulate = "record simulate zigzag-20-20 --vessel ship.toml --duration 200 -o again.mcap"
+    assert main(simulate.split()) == OK
+    assert main(["replay", zigzag, "--vessel", "ship.toml", "-o", "r.rrd"]) == OK
     assert "identified (given)" in capsys.readouterr().out
 
 
-def test_a_ship_of_another_model_is_identified_written_sailed_and_replayed(
+def test_a_ship_of_another_model_is_identified_written_simulated_and_replayed(
     two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["identify", *two_runs, "--model", "norrbin", "-o", "found.toml"]) == FINE
-    assert 'name = "norrbin"' in Path("found.toml").read_text(encoding="utf-8")
+    assert main(["identify", *two_runs, "--model", "norrbin", "-o", "ship.toml"]) == OK
+    assert 'name = "norrbin"' in Path("ship.toml").read_text(encoding="utf-8")
     sway = "--sensor sway.white=0.05 --gust 2@50+50"
     simulate = (
-        f"record simulate zigzag-10-10 --vessel found.toml --duration 200 {sway} -o again.mcap"
+        f"record simulate zigzag-10-10 --vessel ship.toml --duration 200 {sway} -o again.mcap"
     )
-    assert main(simulate.split()) == FINE
-    assert main(["replay", "again.mcap", "-o", "r.rrd"]) == FINE
+    assert main(simulate.split()) == OK
+    assert main(["replay", "again.mcap", "-o", "r.rrd"]) == OK
     assert "identified (attached to the log)" in capsys.readouterr().out
-    alone = Path("found.toml").read_text(encoding="utf-8").partition("[yaw]")[0]
+    alone = Path("ship.toml").read_text(encoding="utf-8").partition("[yaw]")[0]
     Path("alone.toml").write_text(alone, encoding="utf-8")
-    assert main(["replay", "again.mcap", "--vessel", "alone.toml", "-o", "r.rrd"]) == FINE
-    said = capsys.readouterr()
-    assert "first model, fitted to this log" in said.out
-    assert "has only a model 'norrbin'" in said.err
+    assert main(["replay", "again.mcap", "--vessel", "alone.toml", "-o", "r.rrd"]) == OK
+    output = capsys.readouterr()
+    assert "first model, fitted to this log" in output.out
+    assert "has only a model 'norrbin'" in output.err
 
 
 def test_the_best_model_is_chosen_on_the_command_line(
     two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     capsys.readouterr()
-    assert (
-        main(["identify", *two_runs, "--model", "auto", "--json", "-", "-o", "best.toml"]) == FINE
+    assert main(["identify", *two_runs, "--model", "auto", "--json", "-", "-o", "best.toml"]) == OK
+    output = capsys.readouterr()
+    result = json.loads(output.out)
+    assert result["model"]["name"] in ("burylin", "burylin-tied")
+    assert [each["score"] for each in result["models"]] == sorted(
+        each["score"] for each in result["models"]
     )
-    said = capsys.readouterr()
-    found = json.loads(said.out)
-    assert found["model"]["name"] in ("burylin", "burylin-tied")
-    assert [each["score"] for each in found["models"]] == sorted(
-        each["score"] for each in found["models"]
-    )
-    assert "Models by cross-validation" in said.err
-    assert load_vessel("best.toml")[0].model is None  # the paper's needs no [model]
+    assert "Models by cross-validation" in output.err
+    assert load_vessel("best.toml")[0].model is None  # the paper's model needs no section [model]
 
 
 @pytest.mark.parametrize(
-    ("code", "arguments", "said"),
+    ("code", "arguments", "message"),
     [
         (USAGE, "Z Z", "named twice"),
         (USAGE, "Z --validate Z", "both fitted and used for validation"),
@@ -587,28 +589,28 @@ def test_the_best_model_is_chosen_on_the_command_line(
         (FAILURE, "Z -o none/x.toml", "there is no folder"),
     ],
 )
-def test_a_wrong_request_to_identify_is_refused_in_one_line(
+def test_an_invalid_request_to_identify_is_rejected_in_one_line(
     two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str],
-    code: int, arguments: str, said: str,
+    code: int, arguments: str, message: str,
 ) -> None:  # fmt: skip
     capsys.readouterr()
     words = [two_runs[0] if word == "Z" else word for word in arguments.split()]
-    assert said in refusal(capsys, code, "identify", *words)
+    assert message in refusal(capsys, code, "identify", *words)
 
 
-def test_a_short_run_and_a_straight_one_identify_nothing(
+def test_short_and_straight_runs_are_rejected_by_identify(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     main(["record", "simulate", "zigzag-20-20", "--duration", "10", "-o", "short.mcap"])
     main(["record", "simulate", "turning-circle-1", "--duration", "200", "-o", "straight.mcap"])
     capsys.readouterr()
     assert "too short to identify a ship" in refusal(capsys, FAILURE, "identify", "short.mcap")
-    said = refusal(capsys, FAILURE, "identify", "straight.mcap", "-o", "v.toml")
-    assert "the rudder moves by 1.0° in all" in said
+    message = refusal(capsys, FAILURE, "identify", "straight.mcap", "-o", "v.toml")
+    assert "the rudder moves by 1.0° in all" in message
     assert not Path("v.toml").exists()
 
 
-def test_a_word_that_is_no_verb_is_refused_with_the_list_of_verbs(
+def test_an_unknown_verb_is_rejected_with_the_list_of_verbs(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(SystemExit) as caught:
@@ -617,7 +619,7 @@ def test_a_word_that_is_no_verb_is_refused_with_the_list_of_verbs(
     assert "'record', 'info', 'convert', 'replay', 'identify', 'check'" in capsys.readouterr().err
 
 
-def test_a_replay_imports_no_library_that_it_does_not_need(recorded: Path) -> None:
+def test_a_replay_imports_no_unneeded_library(recorded: Path) -> None:
     code = (
         "import sys\n"
         f"sys.argv = ['shiplog', 'replay', {str(recorded)!r}, '-o', 'z.rrd', '--json', 'z.json']\n"

@@ -24,7 +24,7 @@ from .advice import check_ties, manoeuvres_to_identify
 from .fit_warnings import fit_warnings
 from .fixed_parameters import check_fixed, fixed_values
 from .identified_ship import IdentifiedShip, run_fits
-from .model_selection import Candidate, rank_models
+from .model_selection import Candidate, rank_models, require_two_runs
 from .parallel import single_blas_thread
 from .prior_sensitivity import prior_sensitivity
 from .runs import Run, common_vessel, consistency_warnings, distinct_runs
@@ -86,9 +86,14 @@ def identify(
     model = model or ("burylin-tied" if "T3" in fixed else "burylin")
     models, warnings = _models_of(model)
     check_fixed(models, fixed)
+    to_fit, to_predict = _opened(logs), _opened(validation_logs)
+    if not to_fit:
+        raise UsageError("no log to identify a ship from; give at least one")
+    if model == AUTO:
+        require_two_runs(len(to_fit))
     steps = _Steps(on_progress, auto=model == AUTO)
     steps.begin("read")
-    runs, held_out = _read(logs, validation_logs)
+    runs, held_out = distinct_runs(to_fit, to_predict)
     ship = common_vessel([*runs, *held_out], vessel)
     steps.begin("fit")
     candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)
@@ -152,16 +157,6 @@ def _models_of(model: str | Model) -> tuple[list[Model], list[str]]:
         models, warnings = loadable_models()
         return list(models), list(warnings)
     return [model if isinstance(model, Model) else ship_model(model)], []
-
-
-def _read(
-    logs: LogSource | Sequence[LogSource], validation_logs: LogSource | Sequence[LogSource]
-) -> tuple[list[Run], list[Run]]:
-    """Return the runs to fit and the runs to predict."""
-    fitted, held_out = _opened(logs), _opened(validation_logs)
-    if not fitted:
-        raise UsageError("no log to identify a ship from; give at least one")
-    return distinct_runs(fitted, held_out)
 
 
 def _opened(logs: LogSource | Sequence[LogSource]) -> list[Log]:

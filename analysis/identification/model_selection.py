@@ -100,11 +100,7 @@ def rank_models(
         There are fewer than two runs.
     """
     runs = _runs_of(segments)
-    if len(runs) < 2:
-        raise UsageError(
-            "models are compared by predicting each run from the others: give two logs or more, "
-            "or name the model"
-        )
+    require_two_runs(len(runs))
     # the models with the most parameters take longest, and are begun first
     order = sorted(range(len(models)), key=lambda i: -_free_count(models[i]))
     progress = _RankingProgress(models, order, len(runs), on_progress)
@@ -133,6 +129,21 @@ def rank_models(
         diverged = np.full((len(segments), len(MODEL_OUTPUTS)), np.inf)
         candidates.append(Candidate(model, fits[i], np.array(own) if own else diverged))
     return sorted(candidates, key=lambda c: (c.fit is None, c.score))
+
+
+def require_two_runs(count: int) -> None:
+    """Reject a number of runs that does not suffice to predict one from the others.
+
+    Raises
+    ------
+    UsageError
+        There are fewer than two runs.
+    """
+    if count < 2:
+        raise UsageError(
+            "models are compared by predicting each run from the others: give two logs or more, "
+            "or name the model"
+        )
 
 
 def _runs_of(segments: Sequence[Segment]) -> tuple[tuple[int, ...], ...]:
