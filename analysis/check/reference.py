@@ -123,7 +123,7 @@ def _disturbances(analysis: Analysis) -> Iterator[Channel]:
     for kind, summary in analysis.findings.disturbances.items():
         values = getattr(analysis.disturbance, kind)
         yield _blocks(analysis, f"{kind}_disturbance", "estimate", values)
-        yield _single(analysis, f"{kind}_disturbance", "std", summary.std)
+        yield _single(analysis, f"{kind}_disturbance", "std", summary.noise_std)
 
 
 def _coefficients(

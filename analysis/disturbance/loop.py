@@ -48,7 +48,7 @@ def surge_plant(c: Coefficients, speed: float) -> FloatArray:
     return np.array([[2 * c.g * speed]])
 
 
-def ship_observer(
+def make_ship_observer(
     c: Coefficients, turning: float, yaw: Force, surge: Force, model: ForceModel, sampling: Sampling
 ) -> ShipObserver:
     """Of yaw as `force_observer` designed it for the stiffness `turning`, 1/s², and of surge.
@@ -69,7 +69,7 @@ def ship_observer(
     return ShipObserver(yaw, surge, turning, following, chord=model.wave is not None)
 
 
-def starting(observer: ShipObserver, stats: SignalStats) -> ObserverState:
+def initial_state(observer: ShipObserver, stats: SignalStats) -> ObserverState:
     """The first values measured, and no disturbance."""
     w, v = stats.first.tolist()
     moment, force = (np.zeros(each.mean.shape[1]) for each in (observer.yaw, observer.surge))
@@ -77,7 +77,7 @@ def starting(observer: ShipObserver, stats: SignalStats) -> ObserverState:
 
 
 @compiled
-def observe(
+def observe_chunk(
     c: Coefficients,
     observer: ShipObserver,
     x: ObserverState,
@@ -114,8 +114,8 @@ def observe(
         rows[1, k], rows[2, k] = _parts(yaw, moment)
         rows[3, k], rows[4, k] = _parts(surge, force)
         # Heun's step of the model, the disturbances as their mean over it
-        m = _carry(yaw, moment, yaw_silence, room)
-        s = _carry(surge, force, surge_silence, room)
+        m = _advance(yaw, moment, yaw_silence, room)
+        s = _advance(surge, force, surge_silence, room)
         rate = (delta[k + 1] - delta[k]) / dt
         w1 = yaw_acceleration_rate(c, w, w_dot, v, n[k], delta[k], rate) + m
         v1 = surge_acceleration(c, w, v, n[k]) + s
@@ -146,7 +146,7 @@ def _parts(of: Force, x: FloatArray) -> tuple[float, float]:
 
 
 @compiled
-def _carry(of: Force, x: FloatArray, silence: float, now: FloatArray) -> float:
+def _advance(of: Force, x: FloatArray, silence: float, now: FloatArray) -> float:
     """A force's mean until the next instant; its state becomes what it is then, in place.
 
     `now` is room to work in.

@@ -27,7 +27,7 @@ from shiplog.vessel.settings import (
     settings_dict,
 )
 
-from .loop import observe, ship_observer, starting, surge_plant, yaw_plant
+from .loop import initial_state, make_ship_observer, observe_chunk, surge_plant, yaw_plant
 from .observer_design import ForceModel, Sampling, force_observer
 
 DISTURBANCE_UNITS = {  # in SI, as people read it, and the factor from the one to the other
@@ -70,16 +70,16 @@ class DisturbanceSummary:
     unit: str
     mean: float
     rms: float
-    lowest: float
-    highest: float
-    last: float  # the mean over the settling time at the end
-    std: float  # NaN where no rudder would do it
+    min: float
+    max: float
+    at_end: float  # the mean over the settling time at the end
+    noise_std: float  # NaN where no rudder would do it
     settling_secs: float  # before it what is seen is the observer's own transient
 
     @property
     def amplitude(self) -> float:
         """Of a wave: that of a sinusoid of its variance, less what sensor noise has of this."""
-        left = self.rms**2 - self.mean**2 - self.std**2
+        left = self.rms**2 - self.mean**2 - self.noise_std**2
         return np.nan if np.isnan(left) else sqrt(2 * max(left, 0.0))
 
 
@@ -103,15 +103,15 @@ class ForceObserver:
         wave_frequency: float | None = None,
     ) -> None:
         self._model = model
-        wanted = wanted_forces(settings, wave_frequency, stats)
-        turning = yaw_stiffness(model, stats.turning)
+        wanted = force_models(settings, wave_frequency, stats)
+        turning = yaw_stiffness(model, stats.yaw_rate_rms)
         yaw = force_observer(yaw_plant(model, turning), *wanted["yaw"])
-        surge = force_observer(surge_plant(model, stats.ahead), *wanted["surge"])
+        surge = force_observer(surge_plant(model, stats.median_speed), *wanted["surge"])
         forces = yaw.force, surge.force
-        self._observer = ship_observer(model, turning, *forces, *wanted["yaw"])
-        self._state = starting(self._observer, stats)
+        self._observer = make_ship_observer(model, turning, *forces, *wanted["yaw"])
+        self._state = initial_state(self._observer, stats)
         # a ship without way has a rudder that does nothing: its angle is then not a number
-        self._least_steering = 1e-3 * abs(model.d) * stats.steering
+        self._least_steering = 1e-3 * abs(model.d) * stats.max_rudder_effect
         self._steering = Quantiles()
         self._stds: dict[str, float] = {}
         self._courses: dict[str, _SummaryCollector] = {}
@@ -128,7 +128,7 @@ class ForceObserver:
     def step(self, chunk: Signals, following: Mapping[str, float]) -> Disturbance:
         """Observe the next chunk; `following` are the inputs at the instant after it."""
         delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
-        rows, self._state = observe(
+        rows, self._state = observe_chunk(
             self._model, self._observer, self._state, chunk["yaw_rate"], chunk["speed"], delta, n,
             chunk.dt_secs,
         )  # fmt: skip
@@ -198,15 +198,15 @@ class _SummaryCollector:
             unit=unit,
             mean=settled.mean,
             rms=float(np.sqrt(settled.mean_square)),
-            lowest=settled.lowest,
-            highest=settled.highest,
-            last=float(np.mean(last)) if len(last) and settled.count else np.nan,
-            std=std,
+            min=settled.min,
+            max=settled.max,
+            at_end=float(np.mean(last)) if len(last) and settled.count else np.nan,
+            noise_std=std,
             settling_secs=self._settling_secs,
         )
 
 
-def wanted_forces(
+def force_models(
     settings: DisturbanceSettings, wave_frequency: float | None, stats: SignalStats
 ) -> dict[str, tuple[ForceModel, Sampling]]:
     """What is to be observed in `yaw` and in `surge`, and of what samples.
@@ -224,7 +224,7 @@ def wanted_forces(
     frequencies = {"yaw": settings.yaw_frequency, "surge": settings.surge_frequency}
     for output, (name, frequency) in enumerate(frequencies.items()):
         interval = float(stats.interval_secs[output])
-        longest = float(stats.longest_steps[output]) * stats.dt_secs
+        longest = float(stats.gap_steps[output]) * stats.dt_secs
         model = ForceModel(degree, wave, settings.spectrum, frequency)
         if name in blind and len(blind) < len(frequencies):
             model = ForceModel(degree or 0, None, settings.spectrum, frequency)
@@ -233,7 +233,7 @@ def wanted_forces(
     return wanted
 
 
-def blindness(wave_frequency: float, stats: SignalStats) -> list[str]:
+def wave_frequency_warnings(wave_frequency: float, stats: SignalStats) -> list[str]:
     """Where a wave is not observed because the sensor is too slow for it, in words."""
     return [
         f"no wave is observed in {name}: samples every {secs:.3g} s show none of "

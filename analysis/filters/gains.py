@@ -65,14 +65,14 @@ def linear_axes(
     """
     R = noise.measurement_std**2 * stats.interval_secs
     q = noise.process_ratio * R
-    A = np.array([[0.0, 1.0], [yaw_stiffness(c, stats.turning), c.a]])
+    A = np.array([[0.0, 1.0], [yaw_stiffness(c, stats.yaw_rate_rms), c.a]])
     G, C, Q = np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]]), q[:1, None]
     if noise.wave is not None:
         shaping = wave_filter(noise.wave.std**2, noise.wave.frequency, noise.wave.damping)
         both = augment_with_shaping(A, G, C, np.ones(1), shaping, at="output", noise=G)
         A, G, C = both.A, both.G, both.C
         Q = np.diag([q[0], 1.0])
-    surge = np.array([[2 * c.g * stats.ahead]])
+    surge = np.array([[2 * c.g * stats.median_speed]])
     one = np.ones((1, 1))
     yaw_secs, surge_secs = stats.interval_secs
     return (

@@ -125,7 +125,7 @@ def _start(c: Coefficients, stats: SignalStats) -> tuple[FloatArray, FloatArray]
     delta, n = (stats.head[name][0] for name in PAPER_INPUTS)
     w_ddot = yaw_acceleration_rate(c, w, 0.0, v, n, delta, 0.0)
     start = np.array([w, 0.0, w_ddot, v, surge_acceleration(c, w, v, n)])
-    dw, dv = stats.spread + 1e-9
+    dw, dv = stats.std + 1e-9
     rate = abs(c.a) + 1e-3
     stds = np.array([dw, rate * dw, rate**2 * dw, dv, 1e-2 * dv])
     return start, np.diag(stds**2)

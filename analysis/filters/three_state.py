@@ -189,11 +189,11 @@ def _process_noise(
     c: Coefficients, noise: NoiseModel, stats: SignalStats, wave: _Block
 ) -> FloatArray:
     """Return the covariance (s, s) that the process noise adds from one instant to the next."""
-    speed = stats.ahead
+    speed = stats.median_speed
     A = np.array(
         [
             [0.0, 1.0, 0.0],
-            [yaw_stiffness(c, stats.turning), c.a, 0.0],
+            [yaw_stiffness(c, stats.yaw_rate_rms), c.a, 0.0],
             [0.0, 0.0, 2 * c.g * speed],
         ]
     )
@@ -208,7 +208,7 @@ def _start(c: Coefficients, stats: SignalStats, wave: _Block) -> tuple[FloatArra
     The standard deviations are those by which the signals vary.
     """
     w, v = stats.first
-    dw, dv = stats.spread + 1e-9
+    dw, dv = stats.std + 1e-9
     stds = np.array([dw, (abs(c.a) + 1e-3) * dw, dv])
     wave_P = solve_discrete_lyapunov(wave.F, wave.Q) if len(wave.F) else wave.Q
     return (

@@ -49,7 +49,7 @@ def noise_of(
     """
     kind = kind or filter_kind(settings.chosen)
     given = (settings.yaw_rate_std, settings.speed_std)
-    stds = np.array([a if b is None else b for a, b in zip(stats.noise, given, strict=True)])
+    stds = np.array([a if b is None else b for a, b in zip(stats.noise_std, given, strict=True)])
     stated, least, most = _ratios(settings, kind)
     noise = NoiseModel(stds, np.array(least), (given[0] is None, given[1] is None))
     head_stats = signal_stats(stats.head, model)

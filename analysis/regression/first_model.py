@@ -36,7 +36,9 @@ def fit_first_model(
             f"{' and '.join(unknown)}; give the ship's with --vessel: {name}"
         )
     return Vessel(
-        f"fitted to {name}", SPEED_PROPORTIONAL_RUDDER._replace(**found), approach_rpm=stats.rpm
+        f"fitted to {name}",
+        SPEED_PROPORTIONAL_RUDDER._replace(**found),
+        approach_rpm=stats.median_rpm,
     )
 
 

@@ -134,18 +134,18 @@ def second_pass(
     listeners = hold.add_raw, *(check.add for check in checks)
     for signals in resampled_chunks(log, clock, on_progress, "resample", *listeners):
         collector.add(hold.step(signals))
-        equations.add(signals, collector.fastest)
+        equations.add(signals, collector.max_speed)
     stats = collector.result()
     if not np.array_equal(stats.intervals, equations.intervals):
         equations = _Equations(alphas, clock, stats.intervals, window_secs)
         for signals in resampled_chunks(log, clock, on_progress, "resample"):
-            equations.add(signals, stats.fastest)
+            equations.add(signals, stats.max_speed)
     _require_outputs(log, stats)
     warnings = [
         *channel_warnings(log_stats, REQUIRED_CHANNELS),
         *(text for check in checks if (text := check.result())),
         *end_warnings(log_stats, clock, REQUIRED_CHANNELS),
-        *hold.said(),
+        *hold.warnings(),
         *equations.window_warnings(),
     ]
     return SecondPass(stats, equations.yaw, equations.surge, tuple(warnings))
@@ -247,7 +247,7 @@ class _Equations:
 
 def _require_outputs(log: Log, stats: SignalStats) -> None:
     """Raise `LogError` where yaw rate or speed has too few samples to estimate its noise."""
-    for name, count in zip(PAPER_OUTPUTS, stats.measured, strict=True):
+    for name, count in zip(PAPER_OUTPUTS, stats.sample_counts, strict=True):
         if count < MIN_OUTPUT_SAMPLES:
             raise LogError(
                 f"channel {name!r} has {count} samples where the other channels have some, too, "

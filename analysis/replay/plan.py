@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
 
-from analysis.disturbance.observer import blindness
+from analysis.disturbance.observer import wave_frequency_warnings
 from analysis.filters.base import FilterKind
 from analysis.filters.factory import filter_kind
 from analysis.filters.noise_model import NoiseModel
@@ -248,7 +248,7 @@ def _disturbance_settings(
             f"no wave found in the residual of the yaw rate: a wave of {frequency:g} rad/s, "
             "typical of the sea, is estimated; set disturbance.wave_frequency to another"
         )
-    warnings += blindness(frequency, stats)
+    warnings += wave_frequency_warnings(frequency, stats)
     return replace(settings, wave_frequency=frequency), warnings
 
 

@@ -305,7 +305,7 @@ class _Stages:
                 estimates.innovations[:, i], estimates.innovation_stds[:, i], estimates.gated[:, i]
             )
         disturbance = self._observer.step(_without_gated(held, estimates), following)
-        yaw_rows, surge_rows = self._weak_form.step(signals, self._plan.stats.fastest)
+        yaw_rows, surge_rows = self._weak_form.step(signals, self._plan.stats.max_speed)
         self._change_test.add(yaw_rows, surge_rows)
         return ReplayChunk(
             signals,

@@ -127,10 +127,10 @@ def _disturbance(summary: DisturbanceSummary) -> JsonObject:
         "unit": summary.unit,
         "mean": summary.mean,
         "rms": summary.rms,
-        "min": summary.lowest,
-        "max": summary.highest,
-        "at_end": summary.last,
-        "sensor_noise_std": summary.std,
+        "min": summary.min,
+        "max": summary.max,
+        "at_end": summary.at_end,
+        "sensor_noise_std": summary.noise_std,
         "settling_secs": summary.settling_secs,
     }
 

@@ -118,7 +118,7 @@ def _disturbance_table(findings: Findings) -> TextTable:
         if key not in findings.disturbances or not (slow or key.endswith("wave")):
             continue
         summary = findings.disturbances[key]
-        values = (summary.mean, summary.rms, summary.last, summary.std)
+        values = (summary.mean, summary.rms, summary.at_end, summary.noise_std)
         cells = (f"{value * scale:.3g}" if isfinite(value) else "" for value in values)
         rows.append((f"{name} [{unit}]", *cells))
     columns = ("disturbance of", "mean", "rms", "at the end", "std from\nsensor noise")

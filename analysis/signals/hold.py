@@ -47,7 +47,7 @@ class InputHold:
             self._last[name] = float(values[name][-1])
         return replace(signals, values=values)
 
-    def said(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """What was held, in words."""
         return [
             f"{name}: not measured for {count * self._clock.dt_secs:.1f} s in all; "

@@ -5,7 +5,7 @@ import numpy as np
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray
 
-_COUNT, _FIRST, _MEAN, _SQUARES, _LOWEST, _HIGHEST = range(6)
+_COUNT, _FIRST, _MEAN, _SQUARES, _MIN, _MAX = range(6)
 
 
 class Moments:
@@ -42,14 +42,14 @@ class Moments:
         return float(self._sums[_SQUARES] / self.count + self.mean**2) if self.count else np.nan
 
     @property
-    def lowest(self) -> float:
+    def min(self) -> float:
         """The least value, NaN of none."""
-        return float(self._sums[_LOWEST]) if self.count else np.nan
+        return float(self._sums[_MIN]) if self.count else np.nan
 
     @property
-    def highest(self) -> float:
+    def max(self) -> float:
         """The greatest value, NaN of none."""
-        return float(self._sums[_HIGHEST]) if self.count else np.nan
+        return float(self._sums[_MAX]) if self.count else np.nan
 
 
 @compiled
@@ -63,5 +63,5 @@ def _accumulate(values: FloatArray, sums: FloatArray) -> None:
             away = since - sums[_MEAN]
             sums[_MEAN] += away / sums[_COUNT]
             sums[_SQUARES] += away * (since - sums[_MEAN])
-            sums[_LOWEST] = min(sums[_LOWEST], value)
-            sums[_HIGHEST] = max(sums[_HIGHEST], value)
+            sums[_MIN] = min(sums[_MIN], value)
+            sums[_MAX] = max(sums[_MAX], value)

@@ -12,26 +12,56 @@ from shiplog.types import FloatArray, concatenate_signals
 
 from .moments import Moments
 
-HEAD = 50_000  # samples of a long log are enough to tell how well a model fits
+HEAD_COUNT = 50_000  # samples of a long log are enough to tell how well a model fits
 
 
 @dataclass(frozen=True, eq=False)
 class SignalStats:
-    """The signals' usual values; those of the outputs are (2,), yaw rate rad/s and speed m/s."""
+    """Statistics of resampled signals, which filters and observers need before they start.
 
-    count: int  # of the clock's instants
+    Arrays are of shape (2,): the yaw rate, rad/s, and the speed, m/s.
+
+    Attributes
+    ----------
+    count
+        Number of instants of the clock.
+    dt_secs
+        Time between instants, s.
+    sample_counts
+        Number of instants at which yaw rate and speed were measured.
+    first
+        The first measured values.
+    std
+        Standard deviations of the values about their means.
+    intervals
+        Median number of instants from sample to sample.
+    noise_std
+        Standard deviations of the white noise in the values, as in `noise_level`.
+    yaw_rate_rms
+        Root mean square of the yaw rate, rad/s.
+    median_speed, max_speed
+        Median speed and largest absolute speed, m/s.
+    median_rpm
+        Median of the propeller's revolutions, 1/min.
+    max_rudder_effect
+        Largest absolute rudder effect, as in `rudder_effects` of the paper's model.
+    head
+        The first `HEAD_COUNT` instants of the signals, with the inputs held.
+    """
+
+    count: int
     dt_secs: float
-    measured: tuple[int, int]  # how many instants have a sample of each output
-    first: FloatArray  # the first values measured
-    spread: FloatArray  # their standard deviation about the mean
-    intervals: FloatArray  # instants: the usual number from sample to sample
-    noise: FloatArray  # standard deviation of white noise in them
-    turning: float  # rad/s, the root of the mean square
-    ahead: float  # m/s, the median speed
-    fastest: float  # m/s
-    rpm: float  # the median
-    steering: float  # the rudder's largest effect, `ship.rudder_effects`
-    head: Signals  # the first of the signals, the inputs held
+    sample_counts: tuple[int, int]
+    first: FloatArray
+    std: FloatArray
+    intervals: FloatArray
+    noise_std: FloatArray
+    yaw_rate_rms: float
+    median_speed: float
+    max_speed: float
+    median_rpm: float
+    max_rudder_effect: float
+    head: Signals
 
     @property
     def interval_secs(self) -> FloatArray:
@@ -39,7 +69,7 @@ class SignalStats:
         return self.intervals * self.dt_secs
 
     @property
-    def longest_steps(self) -> FloatArray:
+    def gap_steps(self) -> FloatArray:
         """(2,) instants of the clock from sample to sample of an output, beyond which is a gap."""
         return np.array([gap_threshold_secs(s) / self.dt_secs for s in self.interval_secs])
 
@@ -54,7 +84,7 @@ class SignalStatsCollector:
         self._model = model
         self._outputs = {name: _OutputStatsCollector() for name in PAPER_OUTPUTS}
         self._speed, self._rpm = Quantiles(), Quantiles()
-        self.fastest = self._steering = 0.0  # m/s so far, and of the rudder's effect
+        self.max_speed = self._max_rudder_effect = 0.0  # m/s so far, and of the rudder's effect
         self._heads: list[Signals] = []
         self._count, self._dt = 0, 1.0
 
@@ -66,11 +96,13 @@ class SignalStatsCollector:
         known = np.isfinite(speed)
         self._speed.add(speed[known])
         self._rpm.add(chunk["rpm"])
-        self.fastest = max(self.fastest, float(np.max(np.abs(speed[known]), initial=0.0)))
+        self.max_speed = max(self.max_speed, float(np.max(np.abs(speed[known]), initial=0.0)))
         effects = rudder_effects(self._model, speed[known], chunk["rpm"][known])
-        self._steering = max(self._steering, float(np.max(np.abs(effects), initial=0.0)))
-        if self._count < HEAD:
-            self._heads.append(chunk.part(0, HEAD - self._count))
+        self._max_rudder_effect = max(
+            self._max_rudder_effect, float(np.max(np.abs(effects), initial=0.0))
+        )
+        if self._count < HEAD_COUNT:
+            self._heads.append(chunk.part(0, HEAD_COUNT - self._count))
         self._count, self._dt = self._count + len(chunk), chunk.dt_secs
 
     def result(self) -> SignalStats:
@@ -80,16 +112,16 @@ class SignalStatsCollector:
         return SignalStats(
             count=self._count,
             dt_secs=self._dt,
-            measured=(outputs[0].moments.count, outputs[1].moments.count),
+            sample_counts=(outputs[0].moments.count, outputs[1].moments.count),
             first=np.array([output.first for output in outputs]),
-            spread=np.array([output.moments.std for output in outputs]),
+            std=np.array([output.moments.std for output in outputs]),
             intervals=np.array([output.interval() for output in outputs]),
-            noise=np.array([output.noise.result() for output in outputs]),
-            turning=float(np.sqrt(yaw_rate.mean_square)),
-            ahead=self._speed.median(),
-            fastest=self.fastest,
-            rpm=self._rpm.median(),
-            steering=self._steering,
+            noise_std=np.array([output.noise.result() for output in outputs]),
+            yaw_rate_rms=float(np.sqrt(yaw_rate.mean_square)),
+            median_speed=self._speed.median(),
+            max_speed=self.max_speed,
+            median_rpm=self._rpm.median(),
+            max_rudder_effect=self._max_rudder_effect,
             head=concatenate_signals(self._heads),
         )
 

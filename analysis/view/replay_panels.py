@@ -71,7 +71,10 @@ def _disturbance(findings: Findings, drawn: Drawn, name: str) -> Panel:
     values = estimate.lines[0].values
     settled = estimate.time_secs >= summary.settling_secs
     kept = values[settled] if settled.mean() > 0.5 else values
-    noise, waves = BAND_STDS * summary.std * scale, _optional(drawn, f"disturbance_{name}/wave")
+    noise, waves = (
+        BAND_STDS * summary.noise_std * scale,
+        _optional(drawn, f"disturbance_{name}/wave"),
+    )
     return Panel(
         f"disturbance_{name}",
         f"{name} disturbance [{unit}]",

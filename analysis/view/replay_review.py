@@ -129,9 +129,9 @@ def _recording(plan: Plan) -> rr.RecordingStream:
     of an application; the axes of another ship would be wrong for this one.
     """
     name, stats, noise = plan.name, plan.stats, plan.noise
-    identity = (name, plan.clock.start_ns, plan.clock.count, plan.vessel, stats.measured)
+    identity = (name, plan.clock.start_ns, plan.clock.count, plan.vessel, stats.sample_counts)
     digest = sha256(repr(identity).encode())
-    for array in (stats.spread, noise.measurement_std, noise.process_ratio):
+    for array in (stats.std, noise.measurement_std, noise.process_ratio):
         digest.update(np.ascontiguousarray(array).tobytes())
     return rr.RecordingStream(
         re.sub(r"[^A-Za-z0-9_-]+", "-", f"shiplog {name}"),

@@ -41,7 +41,7 @@ class SeriesBuilder:
         self._decimators: dict[str, Decimator] = {}
         self._samples = {
             name: MeasuredSamples(longest)
-            for name, longest in zip(PAPER_OUTPUTS, stats.longest_steps, strict=True)
+            for name, longest in zip(PAPER_OUTPUTS, stats.gap_steps, strict=True)
         }
 
     def add(self, chunk: ReplayChunk) -> dict[str, Series]:

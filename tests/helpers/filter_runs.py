@@ -116,7 +116,7 @@ def five_states(
     yaw = [[0, 1, 0], [c.b1, c.a, 0], [0, c.b1, c.a]]
     A = block_diag(yaw, np.zeros((2, 2)))
     F, Q = held(A, np.diag(np.repeat(noise.process_ratio * r * stats.interval_secs, (3, 2))), dt)
-    dw, dv = stats.spread + 1e-9
+    dw, dv = stats.std + 1e-9
     rate = abs(c.a) + 1e-3
     P = np.diag([dw, rate * dw, rate**2 * dw, dv, 1e-2 * dv]) ** 2
     path = sailed(c, np.array([stats.first[0], 0.0, stats.first[1]]), delta, n, dt)
@@ -125,8 +125,8 @@ def five_states(
 
 def pushes(c: Coefficients, noise: NoiseModel, stats: SignalStats) -> np.ndarray:
     """What yaw moment and surge force add to the covariance of w, w' and v in a step, (3, 3)."""
-    stiffness = c.b1 + 2 * c.b2 * abs(stats.turning) + 3 * c.b3 * stats.turning**2
-    A = np.array([[0, 1, 0], [stiffness, c.a, 0], [0, 0, 2 * c.g * stats.ahead]])
+    stiffness = c.b1 + 2 * c.b2 * abs(stats.yaw_rate_rms) + 3 * c.b3 * stats.yaw_rate_rms**2
+    A = np.array([[0, 1, 0], [stiffness, c.a, 0], [0, 0, 2 * c.g * stats.median_speed]])
     q = noise.process_ratio * noise.measurement_std**2 * stats.interval_secs
     return held(A, np.diag([0.0, *q]), stats.dt_secs)[1]
 
@@ -143,8 +143,8 @@ def three_states(
     dt, r = stats.dt_secs, noise.measurement_std**2
     q = noise.process_ratio * r * stats.interval_secs
     A, C = np.array([[0, 1, 0], [c.b1, c.a, 0], [0, 0, 0]]), np.eye(3)[[0, 2]]
-    dw, dv = stats.spread + 1e-9 if spread is None else spread
-    P = np.diag([dw, (abs(c.a) + 1e-3) * (stats.spread[0] + 1e-9), dv]) ** 2
+    dw, dv = stats.std + 1e-9 if spread is None else spread
+    P = np.diag([dw, (abs(c.a) + 1e-3) * (stats.std[0] + 1e-9), dv]) ** 2
     intensity = np.diag([0.0, *q])
     path = sailed(c, np.array([stats.first[0], 0.0, stats.first[1]]), delta, n, dt)
     wave = noise.wave

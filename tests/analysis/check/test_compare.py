@@ -143,7 +143,7 @@ def test_every_number_of_the_results_is_compared(
             a, disturbance=replace(found, rudder=found.rudder * 2)
         ),
         "/yaw_disturbance/std": with_findings(
-            a, disturbances=findings.disturbances | {"yaw": replace(yaw_summary, std=0.0)}
+            a, disturbances=findings.disturbances | {"yaw": replace(yaw_summary, noise_std=0.0)}
         ),
         "/b1/trial_std": with_findings(
             a,

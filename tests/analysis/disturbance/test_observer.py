@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from places import KVLCC2, PROJECT
 from scipy.integrate import solve_ivp
 
-from analysis.disturbance.loop import observe
+from analysis.disturbance.loop import observe_chunk
 from analysis.disturbance.observer import (
     DISTURBANCE_UNITS,
     Disturbance,
@@ -51,8 +51,8 @@ def observed(vessel: Vessel, manoeuvre: str, noise: str, gusts: tuple[Gust, ...]
         signal_stats(signals, vessel.coefficients), vessel.coefficients, vessel.filter
     )
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
-    found, courses = observe_disturbance(signals, vessel.coefficients, noise_found)
-    return signals, found, courses, truth
+    found, summaries = observe_disturbance(signals, vessel.coefficients, noise_found)
+    return signals, found, summaries, truth
 
 
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "turning-circle", "pseudo-random"])
@@ -74,9 +74,9 @@ def test_a_gust_comes_and_goes(vessel: Vessel) -> None:
 
 
 def test_without_disturbance_what_is_seen_is_the_sensors_noise(vessel: Vessel) -> None:
-    _, found, courses, _ = observed(vessel, "zigzag-20-20", "white", ())
-    assert np.std(found.yaw[1500:]) == pytest.approx(courses["yaw"].std, rel=0.4)
-    assert np.std(found.surge[3000:]) == pytest.approx(courses["surge"].std, rel=0.6)
+    _, found, summaries, _ = observed(vessel, "zigzag-20-20", "white", ())
+    assert np.std(found.yaw[1500:]) == pytest.approx(summaries["yaw"].noise_std, rel=0.4)
+    assert np.std(found.surge[3000:]) == pytest.approx(summaries["surge"].noise_std, rel=0.6)
 
 
 def test_a_slow_sensor_is_corrected_as_fast_as_a_quick_one(vessel: Vessel) -> None:
@@ -204,11 +204,11 @@ def test_a_ramp_of_many_small_gusts_is_found_under_white_noise(vessel: Vessel) -
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
     c = vessel.coefficients
-    found, courses = observe_disturbance(
+    found, summaries = observe_disturbance(
         signals, c, noise_of(signal_stats(signals, c), c, vessel.filter), asked("ramp")
     )
     up = slice(2800, 4000)
-    assert np.std(found.yaw[up] - truth[up]) < 2 * courses["yaw"].std + 0.05 * truth[-1]
+    assert np.std(found.yaw[up] - truth[up]) < 2 * summaries["yaw"].noise_std + 0.05 * truth[-1]
     assert np.mean(found.yaw[5800:]) == pytest.approx(truth[-1], rel=0.1)
 
 
@@ -235,7 +235,7 @@ def phasor(values: np.ndarray, times: np.ndarray) -> tuple[complex, float]:
 def test_a_wave_is_found_in_amplitude_and_phase(vessel: Vessel, models: tuple[str, ...]) -> None:
     stds = radians(0.005), 0.02
     signals = sailed(vessel.coefficients, wave, surging, secs=1000.0, stds=stds)
-    found, courses = observe_disturbance(
+    found, summaries = observe_disturbance(
         signals, vessel.coefficients, quiet(stds), asked(*models), OMEGA
     )
     settled = slice(5000, None)
@@ -248,9 +248,9 @@ def test_a_wave_is_found_in_amplitude_and_phase(vessel: Vessel, models: tuple[st
         assert abs(turning) == pytest.approx(amplitude, rel=0.03)
         assert np.angle(turning) == pytest.approx(phase, abs=0.03)
         off = seen[settled] - amplitude * np.sin(OMEGA * times + phase)
-        assert np.std(off) < 0.03 * amplitude + 1.5 * courses[name].std
-        assert courses[name].amplitude == pytest.approx(amplitude, rel=0.03)
-        assert courses[name].unit == DISTURBANCE_UNITS[name][0]
+        assert np.std(off) < 0.03 * amplitude + 1.5 * summaries[name].noise_std
+        assert summaries[name].amplitude == pytest.approx(amplitude, rel=0.03)
+        assert summaries[name].unit == DISTURBANCE_UNITS[name][0]
 
 
 def test_on_a_clock_of_one_second_a_wave_is_found_as_well(vessel: Vessel) -> None:
@@ -271,13 +271,13 @@ def test_step_and_wave_are_told_apart(vessel: Vessel, models: tuple[str, ...]) -
     signals = sailed(
         vessel.coefficients, lambda t: step * (t >= 500) + wave(t), surging, secs=1000.0, stds=stds
     )
-    found, courses = observe_disturbance(
+    found, summaries = observe_disturbance(
         signals, vessel.coefficients, quiet(stds), asked(*models), OMEGA
     )
     before, after = slice(4500, 4990), slice(7000, None)
     assert np.max(np.abs(found.yaw[before])) < 0.1 * step
     assert np.mean(found.yaw[after]) == pytest.approx(step, rel=0.05)
-    assert np.std(found.yaw[after]) < 2 * courses["yaw"].std
+    assert np.std(found.yaw[after]) < 2 * summaries["yaw"].noise_std
     assert np.mean(found.yaw_wave[after]) == pytest.approx(0, abs=0.01 * WAVE)
     # without a wave in the exosystem it is taken for the moment itself
     alone, _ = observe_disturbance(signals, vessel.coefficients, quiet(stds))
@@ -322,24 +322,24 @@ def test_what_noise_leaves_in_each_part_is_what_is_said(
     # hardly turning, she is as linear as the observer was designed for
     stds = radians(0.02), 0.1
     signals = sailed(vessel.coefficients, secs=4000.0, stds=stds, rudder=radians(0.1))
-    found, courses = observe_disturbance(
+    found, summaries = observe_disturbance(
         signals, vessel.coefficients, quiet(stds), asked(*models), OMEGA
     )
-    for name, course in courses.items():
+    for name, summary in summaries.items():
         seen = getattr(found, name)[6000:]
-        if course.std == 0:
+        if summary.noise_std == 0:
             assert not seen.any()
             assert "wave" in models
         else:
-            assert np.std(seen) == pytest.approx(course.std, rel=0.35)
+            assert np.std(seen) == pytest.approx(summary.noise_std, rel=0.35)
             if name.endswith("wave"):
-                assert course.amplitude < np.std(seen)  # of noise there is no wave
+                assert summary.amplitude < np.std(seen)  # of noise there is no wave
 
 
 def test_the_std_of_a_wave_is_that_of_its_amplitude(vessel: Vessel) -> None:
     stds = radians(0.02), 0.1
     signals = sailed(vessel.coefficients, wave, secs=4000.0, stds=stds, rudder=radians(0.1))
-    found, courses = observe_disturbance(
+    found, summaries = observe_disturbance(
         signals, vessel.coefficients, quiet(stds), asked("constant", "wave"), OMEGA
     )
     period = round(2 * pi / OMEGA / 0.1)
@@ -350,7 +350,7 @@ def test_the_std_of_a_wave_is_that_of_its_amplitude(vessel: Vessel) -> None:
         for k in range(0, len(cut) - period, period)
     ]
     assert np.mean(amplitudes) == pytest.approx(WAVE, rel=0.02)
-    assert np.std(amplitudes) == pytest.approx(courses["yaw_wave"].std, rel=0.35)
+    assert np.std(amplitudes) == pytest.approx(summaries["yaw_wave"].noise_std, rel=0.35)
 
 
 def test_waves_that_shake_a_nonlinear_ship_do_not_lose_the_observer(vessel: Vessel) -> None:
@@ -375,7 +375,7 @@ def poles_at(c: Coefficients, observing: ForceObserver, w: float, every: int) ->
         measured = np.full(every, np.nan)
         measured[0] = w
         still = np.zeros(every + 1)
-        _, end = observe(
+        _, end = observe_chunk(
             c, observing._observer, start, measured, np.full(every, np.nan), still, still, dt
         )
         return np.array([end.w, end.w_dot, *end.moment])
@@ -400,7 +400,7 @@ def test_in_a_turn_the_poles_stay_where_they_were_placed(
     values["yaw_rate"] = np.where(np.arange(len(signals)) % every, np.nan, values["yaw_rate"])
     stats = signal_stats(replace(signals, values=values), c)
     observing = ForceObserver(c, quiet(), stats, asked(*models), OMEGA)
-    as_designed = np.sort(poles_at(c, observing, stats.turning, every).real)
+    as_designed = np.sort(poles_at(c, observing, stats.yaw_rate_rms, every).real)
     for turning in (0.0, 0.5, 1.0):
         found = np.sort(poles_at(c, observing, radians(turning), every).real)
         exact = "wave" in models
@@ -491,11 +491,14 @@ def test_where_a_log_is_cut_changes_no_bit(
     def make() -> ForceObserver:
         return ForceObserver(vessel.coefficients, quiet(), stats, asked(*models), OMEGA)
 
-    (whole, courses), (parts, of_parts) = in_chunks(broken, [], make), in_chunks(broken, cuts, make)
+    (whole, summaries), (parts, part_summaries) = (
+        in_chunks(broken, [], make),
+        in_chunks(broken, cuts, make),
+    )
     assert whole.keys() == parts.keys()
     for part, values in whole.items():
         assert values.tobytes() == parts[part].tobytes()
-    assert courses == of_parts
+    assert summaries == part_summaries
 
 
 # ---- what is asked for
@@ -504,16 +507,21 @@ def test_where_a_log_is_cut_changes_no_bit(
 @pytest.mark.parametrize("models", SUBSETS, ids="+".join)
 def test_only_what_was_asked_for_is_there(vessel: Vessel, models: tuple[str, ...]) -> None:
     signals = sailed(vessel.coefficients, wave, surging, secs=100.0)
-    found, courses = observe_disturbance(
+    found, summaries = observe_disturbance(
         signals, vessel.coefficients, quiet(), asked(*models), OMEGA
     )
     waves = "wave" in models
     assert (found.yaw_wave is not None) == (found.surge_wave is not None) == waves
-    assert list(courses) == ["yaw", "rudder", "surge", *(["yaw_wave", "surge_wave"] * waves)]
+    assert list(summaries) == ["yaw", "rudder", "surge", *(["yaw_wave", "surge_wave"] * waves)]
     slow = models != ("wave",)
     assert found.yaw.any() == found.surge.any() == found.rudder.any() == slow
     if not slow:
-        assert courses["yaw"].std == courses["rudder"].std == courses["surge"].std == 0
+        assert (
+            summaries["yaw"].noise_std
+            == summaries["rudder"].noise_std
+            == summaries["surge"].noise_std
+            == 0
+        )
 
 
 def test_the_union_of_the_models_is_observed(vessel: Vessel) -> None:
@@ -536,12 +544,12 @@ def test_a_frequency_of_no_wave_is_not_looked_at(vessel: Vessel) -> None:
 def test_an_observer_that_lost_the_ship_says_nothing(vessel: Vessel) -> None:
     signals = sailed(vessel.coefficients, secs=300.0)
     c = vessel.coefficients._replace(h=-10 * vessel.coefficients.h)  # backwards, hard
-    found, courses = observe_disturbance(
+    found, summaries = observe_disturbance(
         signals, c, quiet(), asked("constant", yaw_frequency=1e-4, surge_frequency=1e-4)
     )
     assert np.isnan(found.surge[-1])
     assert np.nanmax(np.abs(found.surge)) < 1e6
-    assert np.isfinite(courses["surge"].rms)
+    assert np.isfinite(summaries["surge"].rms)
 
 
 def slowly(stats: SignalStats, interval: float) -> SignalStats:
@@ -633,8 +641,10 @@ def test_every_log_is_observed_by_every_model(path: Path) -> None:
                 for part in ("yaw", "surge", "yaw_wave", "surge_wave"):
                     if getattr(found, part) is not None:
                         assert np.isfinite(getattr(found, part)).all(), (models, spectrum, part)
-            for course in observing.result().values():
-                assert np.isfinite([course.mean, course.rms, course.last, course.std]).all()
+            for summary in observing.result().values():
+                assert np.isfinite(
+                    [summary.mean, summary.rms, summary.at_end, summary.noise_std]
+                ).all()
 
 
 def test_a_wave_too_quick_for_one_sensor_is_left_out_of_that_alone(vessel: Vessel) -> None:

@@ -64,7 +64,7 @@ def seen_of(count: int) -> np.ndarray:
 
 def usual_of(c: Coefficients, inputs: np.ndarray, dt: float, **known: float) -> SignalStats:
     found = signal_stats(signals_of(seen_of(len(inputs)), *inputs.T, dt), c)
-    return replace(found, first=FIRST, spread=SPREAD, **known)
+    return replace(found, first=FIRST, std=SPREAD, **known)
 
 
 def linear(c: Coefficients, settings: FilterSettings, noise: NoiseModel) -> Pair:
@@ -84,7 +84,7 @@ def nonlinear(c: Coefficients, settings: FilterSettings, noise: NoiseModel) -> P
     """Runs of the ship as she is, a yaw moment and a surge force pushing her about."""
     dt, count, ahead, turning = 0.1, 1000, 7.0, 4e-3
     inputs = np.column_stack(steered(count, dt))
-    stats = usual_of(c, inputs, dt, ahead=ahead, turning=turning)
+    stats = usual_of(c, inputs, dt, median_speed=ahead, yaw_rate_rms=turning)
     rng = np.random.default_rng(3)
     rate = (abs(c.a) + 1e-3) * (SPREAD[0] + 1e-9)
     first = draws(rng, np.diag([SPREAD[0], rate, SPREAD[1]]) ** 2, SEEDS)

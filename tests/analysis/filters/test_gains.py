@@ -25,7 +25,9 @@ def usual_at(c: Coefficients, dt: float, intervals: tuple[int, int] = (1, 1)) ->
     """A ship that turns and goes ahead as usual, and how often she is measured."""
     still = signals_of(np.ones((40, 2)), np.zeros(40), np.full(40, 80.0), dt)
     found = signal_stats(still, c)
-    return replace(found, intervals=np.array(intervals, float), turning=TURNING, ahead=AHEAD)
+    return replace(
+        found, intervals=np.array(intervals, float), yaw_rate_rms=TURNING, median_speed=AHEAD
+    )
 
 
 def both(

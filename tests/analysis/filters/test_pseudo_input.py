@@ -175,7 +175,7 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_is_a_
     stats = replace(
         signal_stats(signals_of(np.ones((600, 2)), delta, n, dt), c),
         first=start[[0, 2]],
-        spread=SPREAD,
+        std=SPREAD,
     )
     noise = NoiseModel(np.array([1e-4, 0.1]), np.array([1e-2, 1e-3]))
     filtering = make_filter(c, noise, stats, STATED)

@@ -62,7 +62,7 @@ def usual_of(c: Coefficients, signals: Signals, **known: object) -> SignalStats:
     """Of signals that need not have been measured."""
     there = dict(signals.values)
     there |= {"yaw_rate": np.full(len(signals), 2e-3), "speed": np.full(len(signals), 7.0)}
-    return replace(signal_stats(replace(signals, values=there), c), spread=SPREAD, **known)
+    return replace(signal_stats(replace(signals, values=there), c), std=SPREAD, **known)
 
 
 def drawn(rng: np.random.Generator) -> tuple[np.ndarray, float, float, float, float]:
@@ -163,7 +163,7 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_grows
     delta, n = helm(count, dt)
     signals = signals_of(np.full((count, 2), np.nan), delta, n, dt)
     start = np.array([2e-3, 0.0, 7.0])
-    stats = usual_of(c, signals, first=start[[0, 2]], turning=4e-3, ahead=6.0)
+    stats = usual_of(c, signals, first=start[[0, 2]], yaw_rate_rms=4e-3, median_speed=6.0)
     filtering = make_filter(c, NOISE, stats, FilterSettings(kind=kind))
     estimates, trace = filtering.trace(signals, last_inputs(signals))
     path = sailed(c, start, delta, n, dt)

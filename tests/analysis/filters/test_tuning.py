@@ -86,7 +86,7 @@ def test_what_one_output_lacks_the_log_tells_and_the_others_is_kept(
     assert noise.tuned == noise.measured == (output == 0, output == 1)
     assert noise.process_ratio[1 - output] == pytest.approx((0.2**4, 0.2**2)[1 - output])
     assert noise.measurement_std[1 - output] == (1e-4, 0.2)[1 - output]
-    assert noise.measurement_std[output] == signal_stats(signals, c).noise[output]
+    assert noise.measurement_std[output] == signal_stats(signals, c).noise_std[output]
 
 
 def unlikelihood(
@@ -131,7 +131,7 @@ def test_a_ratio_that_a_run_was_drawn_with_is_found_again(
     c, dt, count = straight(vessel.coefficients), 0.5, 4000
     first, inputs = np.array([1e-3, 0.0, 8.0]), np.tile([0.0, 80.0], (count, 1))
     still = signals_of(np.tile(first[[0, 2]], (count, 1)), *inputs.T, dt)
-    stats = replace(signal_stats(still, c), spread=np.array([1e-3, 0.5]))
+    stats = replace(signal_stats(still, c), std=np.array([1e-3, 0.5]))
     noise = NoiseModel(STDS, np.array([1e-3 if kind == "pseudo-input" else 1e-4, 1e-2]))
     path = disturbed(c, first[None], inputs, dt, np.zeros((1, count, 3)))[0]
     if kind == "pseudo-input":
@@ -177,7 +177,7 @@ def test_a_wrong_model_is_given_more_process_noise_than_the_true_one(
 def test_spikes_make_no_process_noise(signals: Signals, vessel: Vessel, kind: str) -> None:
     rng, c = np.random.default_rng(3), vessel.coefficients
     values = {name: array.copy() for name, array in signals.values.items()}
-    for name, std in zip(("yaw_rate", "speed"), signal_stats(signals, c).noise, strict=True):
+    for name, std in zip(("yaw_rate", "speed"), signal_stats(signals, c).noise_std, strict=True):
         values[name][rng.choice(len(signals), 25)] += 40 * std
     clean, spiked = (told(s, c, kind=kind) for s in (signals, replace(signals, values=values)))
     assert np.all(spiked.process_ratio < 3 * clean.process_ratio)

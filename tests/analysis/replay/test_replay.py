@@ -419,7 +419,7 @@ def test_a_spike_is_rejected_counted_and_harmless(
     assert np.all(away < 0.3 * zigzag_analysis.estimates.stds)
     moment = np.abs(found.disturbance.yaw - zigzag_analysis.disturbance.yaw)
     assert (
-        moment.max() < zigzag_analysis.findings.disturbances["yaw"].std
+        moment.max() < zigzag_analysis.findings.disturbances["yaw"].noise_std
     )  # the observer ignores it, too
     ungated = analyse(spiked, settings={"filter.gate": 1e6})
     assert ungated.findings.residuals[0].gated == 0

@@ -40,8 +40,8 @@ def test_what_is_missing_is_the_last_known_even_from_before_the_clock() -> None:
             *(rudder[cut] for cut in cuts), 0.3
         ]  # fmt: skip
         assert holding.missing == {"rudder": 3, "rpm": 2}
-        assert [s.split(":")[0] for s in holding.said()] == ["rudder", "rpm"]
-        assert "3.0 s in all" in holding.said()[0]
+        assert [s.split(":")[0] for s in holding.warnings()] == ["rudder", "rpm"]
+        assert "3.0 s in all" in holding.warnings()[0]
 
 
 def test_nothing_is_said_where_nothing_is_missing() -> None:
@@ -50,4 +50,4 @@ def test_nothing_is_said_where_nothing_is_missing() -> None:
     holding = InputHold(Clock(START, 1.0, 1, {n: found[n] for n in ("rudder", "rpm")}))
     signals = Signals(START, 1.0, {"rudder": np.array([0.3]), "rpm": np.array([80.0])})
     assert holding.step(signals)["rudder"] == pytest.approx([0.3])
-    assert holding.said() == []
+    assert holding.warnings() == []

@@ -15,20 +15,23 @@ def test_what_is_usual_is_what_numpy_makes_of_the_whole(vessel: Vessel) -> None:
     signals = resample(TrialLog("x", trial.channels), channels=NAMES)
     stats, w, v = signal_stats(signals, vessel.coefficients), signals["yaw_rate"], signals["speed"]
     assert (stats.count, stats.dt_secs) == (len(w), signals.dt_secs)
-    assert stats.measured == (np.isfinite(w).sum(), np.isfinite(v).sum())
+    assert stats.sample_counts == (np.isfinite(w).sum(), np.isfinite(v).sum())
     assert stats.first.tolist() == [w[np.isfinite(w)][0], v[np.isfinite(v)][0]]
-    assert stats.spread == pytest.approx([np.nanstd(w), np.nanstd(v)], rel=1e-12)
+    assert stats.std == pytest.approx([np.nanstd(w), np.nanstd(v)], rel=1e-12)
     assert stats.interval_secs == pytest.approx([0.1, 0.5])
-    assert stats.turning == pytest.approx(np.sqrt(np.nanmean(w**2)), rel=1e-12)
-    assert (stats.ahead, stats.fastest) == (np.nanmedian(v), np.nanmax(v))
-    assert stats.rpm == np.median(signals["rpm"])
+    assert stats.yaw_rate_rms == pytest.approx(np.sqrt(np.nanmean(w**2)), rel=1e-12)
+    assert (stats.median_speed, stats.max_speed) == (np.nanmedian(v), np.nanmax(v))
+    assert stats.median_rpm == np.median(signals["rpm"])
     parted = SignalStatsCollector(vessel.coefficients)
     for cuts in zip([0, 1, 999], [1, 999, len(w)], strict=True):
         parted.add(signals.part(*cuts))
     again = parted.result()
-    for name in ("first", "spread", "interval_secs", "noise"):
+    for name in ("first", "std", "interval_secs", "noise_std"):
         assert np.array_equal(getattr(stats, name), getattr(again, name))
-    assert (stats.turning, stats.steering) == (again.turning, again.steering)
+    assert (stats.yaw_rate_rms, stats.max_rudder_effect) == (
+        again.yaw_rate_rms,
+        again.max_rudder_effect,
+    )
 
 
 def test_noise_is_found_below_the_ships_motion(vessel: Vessel) -> None:

@@ -151,7 +151,9 @@ def test_inputs_disturbances_and_residuals(review: Path, analysis: Analysis) -> 
     np.testing.assert_allclose(surge[:, 0], found.surge * 1000, rtol=1e-12)
     _, _, band = columns(review, "disturbance_surge/bounds")
     np.testing.assert_allclose(
-        band[0], np.array([2, -2]) * analysis.findings.disturbances["surge"].std * 1000, rtol=1e-12
+        band[0],
+        np.array([2, -2]) * analysis.findings.disturbances["surge"].noise_std * 1000,
+        rtol=1e-12,
     )
     _, _, residual = columns(review, "innovation_speed/normalised")
     expected = analysis.estimates.innovations[:, 1] / analysis.estimates.innovation_stds[:, 1]
