@@ -93,6 +93,7 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
     require_inputs(arguments.log)
     require_outputs(output, arguments.json)
     from analysis.replay.plan import plan_replay
+    from analysis.replay.precompile import compiling_beside
     from analysis.replay.replay import Replay
     from analysis.report.replay_json import replay_json
     from analysis.report.replay_tables import replay_markdown, replay_tables
@@ -100,7 +101,10 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
     from shiplog.vessel.vessel_parser import load_vessel
 
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
-    with progress("analysis") as on_progress:
+    with (
+        progress("analysis") as on_progress,
+        compiling_beside(arguments.filter, smooth=arguments.smooth) as compilation,
+    ):
         on_progress("read")
         log = open_log(arguments.log).select_sources(preferred)
         try:
@@ -110,6 +114,8 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
             raise
         from analysis.view.replay_review import open_replay_review
 
+        if compilation:
+            compilation.wait()
         replay = Replay(log, plan, on_progress=on_progress)
         with open_replay_review(plan, output, full=arguments.full) as review:
             for chunk in replay.chunks():
