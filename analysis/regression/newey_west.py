@@ -1,9 +1,20 @@
-"""Newey and West's (1987) errors of least squares over rows that overlap.
+"""Newey-West standard errors of least squares over overlapping rows.
 
-A row's influence on the values is (X'X)^-1 x times its residual. Their covariance is the sum of
-the influences' autocovariances under Bartlett's weights: the sum of the squares of the
-influences' sums over every run of `overlap` rows, those reaching over the ends too, over
-`overlap`. A sum of squares, it is never negative.
+The influence of row t on the coefficients is ``u_t = (X'X)^-1 x_t r_t``, with its residual r_t. The
+covariance of the coefficients is the sum of the autocovariances of the influences with Bartlett
+weights, over the L rows that overlap,
+
+    V = sum over |j| < L of (1 - |j| / L) sum over t of u_t u_(t+j)'.
+
+Its diagonal is computed as a sum of squares, which is never negative: of the sums of the influences
+over every L successive rows, including those that extend beyond the ends, divided by L.
+
+References
+----------
+W. K. Newey and K. D. West, "A simple, positive semi-definite, heteroskedasticity and
+autocorrelation consistent covariance matrix", Econometrica 55, 1987. N. M. Kiefer and T. J.
+Vogelsang, "A new asymptotic theory for heteroskedasticity-autocorrelation robust tests",
+Econometric Theory 21, 2005.
 """
 
 from typing import NamedTuple
@@ -16,49 +27,73 @@ from shiplog.types import FloatArray
 
 
 class OverlapSums(NamedTuple):
-    """What is remembered of the rows so far; changed in place."""
+    """Running sums of the influences on p coefficients; changed in place by `add_rows`.
 
-    last: FloatArray  # (overlap, p) influences, in a ring
-    sums: FloatArray  # (p,) of them
-    squares: FloatArray  # (p,) the sum of the squares of such sums
+    Attributes
+    ----------
+    last
+        (overlap, p) the influences of the last rows, in a ring buffer.
+    sums
+        (p,) the sums of these influences.
+    squares
+        (p,) the sums of the squares of all such sums so far.
+    """
+
+    last: FloatArray
+    sums: FloatArray
+    squares: FloatArray
 
 
 def empty_sums(overlap: int, p: int) -> OverlapSums:
-    """Before any row."""
+    """Return the sums of `p` coefficients before any row; `overlap` rows share data."""
     return OverlapSums(np.zeros((overlap, p)), np.zeros(p), np.zeros(p))
 
 
 @compiled
 def add_rows(
-    runs: OverlapSums, rows: FloatArray, count: int, values: FloatArray, inverse: FloatArray
+    state: OverlapSums, rows: FloatArray, count: int, values: FloatArray, inverse: FloatArray
 ) -> None:
-    """The runs that end in the next rows [X y] (m, p + 1), after `count` others.
+    """Add the influences of the next rows.
 
-    `values` (p,) are the regression's, `inverse` (p, p) is of its X'X.
+    Parameters
+    ----------
+    state
+        The running sums; changed in place.
+    rows
+        (m, p + 1) the next rows ``[X y]``.
+    count
+        The number of rows added before.
+    values
+        (p,) the coefficients.
+    inverse
+        (p, p) ``(X'X)^-1`` of all rows.
     """
-    overlap, p = runs.last.shape
+    overlap, p = state.last.shape
     for t in range(len(rows)):
         residual = rows[t, p]
         for i in range(p):
             residual -= rows[t, i] * values[i]
-        at = (count + t) % overlap
+        index = (count + t) % overlap
         for i in range(p):
             influence = 0.0
             for j in range(p):
                 influence += inverse[i, j] * rows[t, j]
             influence *= residual
-            runs.sums[i] += influence - runs.last[at, i]
-            runs.squares[i] += runs.sums[i] ** 2
-            runs.last[at, i] = influence
+            state.sums[i] += influence - state.last[index, i]
+            state.squares[i] += state.sums[i] ** 2
+            state.last[index, i] = influence
 
 
-def newey_west_variances(runs: OverlapSums, count: int) -> FloatArray:
-    """Of the values over the `count` rows so far, (p,)."""
-    overlap, p = runs.last.shape
-    whole = OverlapSums(*(part.copy() for part in runs))
-    after = np.zeros((overlap - 1, p + 1))  # the last runs reach over the end
-    add_rows(whole, after, count, np.zeros(p), np.zeros((p, p)))
-    return np.asarray(whole.squares / overlap)
+def newey_west_variances(state: OverlapSums, count: int) -> FloatArray:
+    """Return the variances of the coefficients over the `count` rows so far, (p,).
+
+    The state is not changed, so that more rows may follow.
+    """
+    overlap, p = state.last.shape
+    final = OverlapSums(*(part.copy() for part in state))
+    padding = np.zeros((overlap - 1, p + 1))  # the last sums extend beyond the end
+    add_rows(final, padding, count, np.zeros(p), np.zeros((p, p)))
+    return np.asarray(final.squares / overlap)
 
 
 @compiled
@@ -70,27 +105,46 @@ def window_variances(
     inverses: FloatArray,
     overlap: int,
 ) -> FloatArray:
-    """Of the values of k windows over their own rows, (p, k); NaN unless `wanted`.
+    """Compute the variances of the coefficients of k windows, each over its own rows.
 
-    `columns` (p + 1, n) are [X y]', of which window w holds those from `spans[w, 0]` to before
-    `spans[w, 1]`; `values` (p, k) and `inverses` (p, p, k) are its regression's. The same as
-    `add_runs`, a column at a time, so that the processor takes several rows at once.
+    The same sums as `add_rows`, one column at a time, so that the compiler vectorises over rows.
+
+    Parameters
+    ----------
+    columns
+        (p + 1, n) the rows ``[X y]``, transposed.
+    spans
+        (k, 2) the first row of each window, and the row after its last.
+    wanted
+        (k,) the windows to compute.
+    values
+        (p, k) the coefficients of each window.
+    inverses
+        (p, p, k) ``(X'X)^-1`` of each window.
+    overlap
+        The number of successive rows that share data.
+
+    Returns
+    -------
+    variances
+        (p, k) the variances; NaN in a window that is not wanted.
     """
     p, k = values.shape
     longest = 0
-    for first, end in spans:
-        longest = max(longest, end - first)
+    for w in range(k):
+        longest = max(longest, spans[w, 1] - spans[w, 0])
     residual, influence = np.empty(longest), np.empty(longest + overlap)
-    found = np.full((p, k), np.nan)
+    variances = np.full((p, k), np.nan)
     for w in range(k):
         if not wanted[w]:
             continue
-        first, end = spans[w]
+        first, end = spans[w, 0], spans[w, 1]
         _residuals(columns, first, end, values, w, residual)
         for i in range(p):
-            _influences(columns, first, end, inverses, i, w, influence)
-            found[i, w] = _squares(influence, residual, end - first, overlap) / overlap
-    return found
+            _unscaled_influences(columns, first, end, inverses, i, w, influence)
+            sum_of_squares = _overlap_squares(influence, residual, end - first, overlap)
+            variances[i, w] = sum_of_squares / overlap
+    return variances
 
 
 @compiled
@@ -98,30 +152,34 @@ def _residuals(
     columns: FloatArray, first: np.int64, end: np.int64, values: FloatArray, w: int,
     residual: FloatArray,
 ) -> None:  # fmt: skip
+    """Write the residuals of window `w` to the start of `residual`."""
     p, n = len(values), end - first
-    residual[:n] = columns[p, first:end]
+    for t in range(n):
+        residual[t] = columns[p, first + t]
     for i in range(p):
-        value, column = values[i, w], columns[i, first:end]
+        value = values[i, w]
         for t in range(n):
-            residual[t] -= value * column[t]
+            residual[t] -= value * columns[i, first + t]
 
 
 @compiled
-def _influences(
+def _unscaled_influences(
     columns: FloatArray, first: np.int64, end: np.int64, inverses: FloatArray, i: int, w: int,
     influence: FloatArray,
 ) -> None:  # fmt: skip
-    """On value i, of residuals of one; zeros behind them."""
+    """Write row i of ``(X'X)^-1 X'`` to `influence`: for residuals of one; zeros after it."""
     influence[:] = 0.0
     for j in range(len(inverses)):
-        weight, column = inverses[i, j, w], columns[j, first:end]
-        for t in range(len(column)):
-            influence[t] += weight * column[t]
+        weight = inverses[i, j, w]
+        for t in range(end - first):
+            influence[t] += weight * columns[j, first + t]
 
 
 @compiled
-def _squares(influence: FloatArray, residual: FloatArray, n: np.int64, overlap: int) -> float:
-    """The sum of the squares of the sums over each run."""
+def _overlap_squares(
+    influence: FloatArray, residual: FloatArray, n: np.int64, overlap: int
+) -> float:
+    """Sum the squares of the sums of ``influence * residual`` over every `overlap` rows."""
     for t in range(n):
         influence[t] *= residual[t]
     run = squares = 0.0
@@ -132,9 +190,25 @@ def _squares(influence: FloatArray, residual: FloatArray, n: np.int64, overlap: 
 
 
 def small_sample_factor(b: FloatArray | float) -> FloatArray:
-    """What errors are to be enlarged by where rows overlap over a share `b` of them all.
+    """Return the factor that enlarges a standard error where few rows are independent.
 
-    The 95 % point of Kiefer and Vogelsang (2005) over the Gaussian's.
+    Two enlarged standard errors are a 95 % interval.
+
+    Parameters
+    ----------
+    b
+        The number of rows that overlap, as a share of all rows; larger values count as 1.
+
+    Returns
+    -------
+    factor
+        The ratio of the critical value at 95 % of Kiefer and Vogelsang (2005, Bartlett kernel)
+        to that of the normal distribution, 1.96.
+
+    Examples
+    --------
+    >>> small_sample_factor(0.1).round(3).tolist()
+    1.153
     """
     b = np.minimum(b, 1.0)
     return np.asarray((1.96 + b * (2.9694 + b * (0.4160 - b * 0.5324))) / 1.96)

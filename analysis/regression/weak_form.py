@@ -1,19 +1,30 @@
-"""The model's equations in integral form: coefficients from data without differentiating noise.
+"""Equations of motion in integral (weak) form: regression without differentiating noisy data.
 
-Burylin's regression, eq. (7), has w'' and v' on its left side, which no sensor measures. He takes
-them from the filter, whose w'' and v' are copies of the model it was given, and so finds that
-model again. Here each equation is multiplied by a smooth bump phi that vanishes at its ends, and
-integrated by parts: the derivatives go over to phi,
+Burylin's regression, his eq. (7), has w'' and v' on its left side, which no sensor measures. He
+takes them from the Kalman filter, whose w'' and v' are those of its own model; the regression
+therefore returns the coefficients assumed in the filter. Here each equation is multiplied by a
+smooth test function phi, a bump that vanishes with its derivatives at its ends, and integrated by
+parts. The derivatives move to phi:
 
     int phi'' w = -a int phi' w + b1 int phi w + b2 int phi w|w| + b3 int phi w^3
                   + d int phi ks delta + e int phi ks delta',
     -int phi' v = f int phi w^2 + g int phi v^2 + h int phi n,
 
-and only what was measured remains. One bump gives one row of a linear regression.
+with w the yaw rate (rad/s), v the speed (m/s), delta the rudder angle (rad), n the propeller
+revolutions (rpm) and ks the rudder's effectiveness (`shiplog.ships.paper.rudder_effects`). Only
+measured signals remain, and delta' from the measured rudder. One bump gives one row of a linear
+regression.
+
+References
+----------
+Ya. V. Burylin: see `shiplog.ships.paper` and ``examples/papers/continuous_identification.py``.
+Ya. V. Burylin: see `shiplog.ships.paper` and "examples/papers/continuous_identification.py".
+Modeling and Simulation 19, 2021: test functions (1 - s^2)^p for regression in weak form.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,51 +41,83 @@ from shiplog.ships.paper import (
 from shiplog.types import FloatArray, Signals
 
 CHANNELS = (*PAPER_OUTPUTS, *PAPER_INPUTS)
-BUMP_SECS = 60.0  # long against the noise, short against the ship's turning
-STRIDE_SECS = 1.0
-MIN_RUDDER_RANGE = np.radians(2.0)  # a rudder that moves less tells nothing of yaw,
-MIN_RELATIVE_SPEED_RANGE = (
-    0.02  # nor does a speed that changes by a smaller share of itself tell of surge
-)
-SLIPSTREAM = "slipstream"  # a regressor: what the rudder does in the propeller's race
-BUMP_POWER = 4  # (1 - s^2)^4: three derivatives vanish at the ends
+BUMP_SECS = 60.0  # long relative to the noise, short relative to the ship's turning
+STRIDE_SECS = 1.0  # from one bump to the next
+MIN_RUDDER_RANGE = np.radians(2.0)  # a smaller range of the rudder does not determine yaw
+MIN_RELATIVE_SPEED_RANGE = 0.02  # of the largest speed; a smaller one does not determine surge
+BUMP_POWER = 4  # phi = (1 - s^2)^4: three derivatives vanish at the ends
+SLIPSTREAM = "slipstream"  # a regressor: rudder times propeller revolutions
+INTEGRAL_COUNT = 13  # per bump: target, excitation and regressors of yaw (8) and of surge (5)
+YAW_INTEGRALS = 8
 
 
 @dataclass(frozen=True)
 class Equation:
-    """What a regression's rows have in common, a row a bump."""
+    """Regressors and bumps of one equation of motion.
 
-    names: tuple[str, ...]  # of the p regressors
-    stride_secs: float  # from one bump to the next
-    bump_secs: float  # the length of one
+    Attributes
+    ----------
+    names
+        The names of the p regressors: of their coefficients, `SLIPSTREAM` or ``constant``.
+    stride_secs
+        Time from the centre of one bump to the next, s.
+    bump_secs
+        Length of a bump, s.
+
+    Examples
+    --------
+    >>> Equation(("f", "g", "h"), stride_secs=1.0, bump_secs=60.0).overlap
+    60
+    """
+
+    names: tuple[str, ...]
+    stride_secs: float
+    bump_secs: float
 
     @property
     def overlap(self) -> int:
-        """How many rows on either side share a bump's data."""
+        """The number of successive rows that share data."""
         return max(1, int(self.bump_secs / self.stride_secs))
 
     def with_constant(self) -> "Equation":
-        """The same with one more regressor: a disturbance that never changes."""
+        """Return the equation with one more regressor: a constant disturbance."""
         return replace(self, names=(*self.names, "constant"))
 
     def with_slipstream(self) -> "Equation":
-        """The same with one more regressor, for a rudder of which nothing is known."""
+        """Return the equation with one more regressor: a rudder in the propeller's slipstream."""
         return replace(self, names=(*self.names, SLIPSTREAM))
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows of one equation's regression; those that touch a gap are NaN."""
+    """Rows of one equation's regression; NaN where a bump overlaps a gap in the data.
+
+    Attributes
+    ----------
+    equation
+        The equation.
+    centres_secs
+        (m,) centres of the bumps, s since the signals' start.
+    target
+        (m,) left sides of the equation.
+    regressors
+        (m, p) integrals beside the coefficients.
+    excitation
+        (m,) mean of the quantity that must vary for the rows to determine the coefficients: the
+        rudder angle (rad) for yaw, the speed (m/s) for surge.
+    min_excitation
+        The range of `excitation` below which rows determine nothing.
+    """
 
     equation: Equation
-    centres_secs: FloatArray  # (m,) since the signals' start
-    target: FloatArray  # (m,)
-    regressors: FloatArray  # (m, p)
-    excitation: FloatArray  # (m,) what must move for the rows to tell anything
-    min_excitation: float  # by how much, at the least
+    centres_secs: FloatArray
+    target: FloatArray
+    regressors: FloatArray
+    excitation: FloatArray
+    min_excitation: float
 
     def part(self, start: int, stop: int) -> "Rows":
-        """The rows from `start` to before `stop`."""
+        """Return the rows from `start` to before `stop`."""
         cut = slice(start, stop)
         return replace(
             self,
@@ -86,21 +129,82 @@ class Rows:
 
 
 def weak_form(signals: Signals, model: Coefficients) -> tuple[Rows, Rows]:
-    """The rows of the yaw and of the surge equation of signals that are all there.
+    """Compute the rows of the yaw and the surge equation of a whole trial.
 
-    Of `model` only the alphas are used. `signals` must have NaN in `rudder` and `rpm` too where
-    they were not measured.
+    Parameters
+    ----------
+    signals
+        The resampled signals `CHANNELS`; NaN where a channel was not measured, also in the rudder
+        and the revolutions.
+    model
+        The ship model; only alpha1 to alpha3 are used, for the rudder's effectiveness.
+
+    Returns
+    -------
+    yaw, surge
+        The rows of both equations.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from shiplog import Signals, load_vessel
+    >>> t = np.arange(0, 200, 0.1)
+    >>> signals = Signals(0, 0.1, {
+    ...     "yaw_rate": 0.01 * np.sin(t / 20), "speed": np.full(len(t), 7.0),
+    ...     "rudder": 0.2 * np.cos(t / 20), "rpm": np.full(len(t), 96.0)})
+    >>> yaw, surge = weak_form(signals, load_vessel("table1")[0].paper_coefficients)
+    >>> yaw.equation.names, yaw.equation.bump_secs, yaw.regressors.shape
+    (('a', 'b1', 'b2', 'b3', 'd', 'e'), 40.0, (160, 6))
     """
     steps = (np.diff(np.flatnonzero(np.isfinite(signals[name]))) for name in CHANNELS)
-    usual = [float(np.median(step)) if len(step) else 1.0 for step in steps]
+    intervals = [float(np.median(step)) if len(step) else 1.0 for step in steps]
     fastest = float(np.nanmax(np.abs(signals["speed"])))
-    return WeakForm(model, len(signals), signals.dt_secs, usual).step(signals, fastest)
+    return WeakForm(model, len(signals), signals.dt_secs, intervals).step(signals, fastest)
+
+
+class Bump(NamedTuple):
+    """A test function and its derivatives, (2 half + 1,) each.
+
+    Multiplied by the time step and of unit area, so that a sum over samples is an integral.
+    """
+
+    phi: FloatArray
+    first: FloatArray
+    second: FloatArray
+
+
+class Integrands(NamedTuple):
+    """The signals that are integrated, (n,) each; `ks` is the rudder's effectiveness."""
+
+    w: FloatArray
+    v: FloatArray
+    delta: FloatArray
+    n: FloatArray
+    ks_delta: FloatArray
+    ks_delta_dot: FloatArray
 
 
 class WeakForm:
-    """Makes rows of signals that come in chunks, `count` instants in all.
+    """Stage that computes the rows of both equations from signals that come in chunks.
 
-    `intervals` (4,) are the usual numbers of instants from one sample of `CHANNELS` to the next.
+    The rows are the same to the last bit however the signals are divided into chunks.
+
+    Parameters
+    ----------
+    model
+        The ship model; only alpha1 to alpha3 are used.
+    count
+        The number of instants of the whole trial.
+    dt
+        The time step, s.
+    intervals
+        (4,) the typical number of instants from one sample of each of `CHANNELS` to the next.
+
+    Attributes
+    ----------
+    yaw, surge
+        The two equations. Of a trial shorter than five bumps, the bumps are shorter than
+        `BUMP_SECS`.
     """
 
     def __init__(
@@ -109,31 +213,36 @@ class WeakForm:
         self._model, self._count, self._dt = model, count, dt
         longest = [gap_threshold_secs(interval * dt) / dt for interval in intervals]
         self._longest = dict(zip(CHANNELS, longest, strict=True))
-        self._reach = int(max(self._longest.values())) + 2  # over which a sample has influence
+        self._reach = int(max(self._longest.values())) + 2  # instants that a sample influences
         self._half = max(2, round(min(BUMP_SECS, count * dt / 5) / dt / 2))
         self._stride = max(1, round(STRIDE_SECS / dt))
         self._bump = _bump(self._half, dt)
         stride_secs, bump_secs = self._stride * dt, 2 * self._half * dt
         self.yaw = Equation(YAW_COEFFICIENTS, stride_secs, bump_secs)
         self.surge = Equation(SURGE_COEFFICIENTS, stride_secs, bump_secs)
-        self._row, self._first = 0, 0  # the next row, and the first sample that is kept for it
+        self._row, self._first = 0, 0  # the next row, and the first sample kept for it
         self._kept = {name: np.zeros(0) for name in CHANNELS}
 
     @property
     def row_count(self) -> int:
-        """How many rows there will be in all."""
+        """The number of rows of the whole trial."""
         return max(0, (self._count - self._width) // self._stride + 1)
 
     def step(self, chunk: Signals, fastest: float) -> tuple[Rows, Rows]:
-        """The rows of yaw and of surge that the next chunk makes possible.
+        """Return the rows of yaw and surge whose data are complete with the next chunk.
 
-        `fastest` is the greatest speed of the trial, m/s, as far as it is known: what is judged by
-        it is judged by that of the last rows.
+        Parameters
+        ----------
+        chunk
+            The next signals.
+        fastest
+            The largest speed of the trial so far, m/s, which scales the surge rows'
+            `min_excitation`. Later stages use that of the last rows.
         """
         self._kept = {n: np.concatenate((kept, chunk[n])) for n, kept in self._kept.items()}
         end = self._first + len(self._kept["speed"])
-        settled = end if end == self._count else end - self._reach
-        until = max(self._row, (settled - self._width) // self._stride + 1)
+        complete = end if end == self._count else end - self._reach
+        until = max(self._row, (complete - self._width) // self._stride + 1)
         first = self._row
         sums = self._integrals(first * self._stride - self._first, until - first)
         self._row = until
@@ -141,7 +250,7 @@ class WeakForm:
         self._kept = {name: kept[drop:] for name, kept in self._kept.items()}
         self._first += drop
         centres = (self._half + self._stride * np.arange(first, until)) * self._dt
-        yaw, surge = sums[:, :8], sums[:, 8:]  # each: target, excitation, regressors
+        yaw, surge = sums[:, :YAW_INTEGRALS], sums[:, YAW_INTEGRALS:]
         return (
             Rows(self.yaw, centres, yaw[:, 0], yaw[:, 2:], yaw[:, 1], MIN_RUDDER_RANGE),
             Rows(
@@ -156,77 +265,80 @@ class WeakForm:
 
     @property
     def _width(self) -> int:
+        """The number of samples of a bump."""
         return 2 * self._half + 1
 
     def _integrals(self, start: int, count: int) -> FloatArray:
-        """The integrals of `_integrated` over `count` bumps, the first from sample `start` on."""
+        """Integrate over `count` bumps; the first starts at sample `start` of those kept."""
         if not count:
-            return np.zeros((0, 13))
-        w, v, delta, n = (_bridged(self._kept[name], self._longest[name]) for name in CHANNELS)
+            return np.zeros((0, INTEGRAL_COUNT))
+        w, v, delta, n = (_interpolate(self._kept[name], self._longest[name]) for name in CHANNELS)
         delta_dot = np.gradient(delta, self._dt)
         needed = slice(start, start + (count - 1) * self._stride + self._width)
         w, v, delta, delta_dot, n = (x[needed] for x in (w, v, delta, delta_dot, n))
         ks = rudder_effects(self._model, v, n)
-        with np.errstate(invalid="ignore", over="ignore"):  # a model that runs away
-            steering, steering_rate = ks * delta, ks * delta_dot
-        return _integrated(
-            w, v, delta, n, steering, steering_rate, *self._bump, self._stride, count
-        )
+        with np.errstate(invalid="ignore", over="ignore"):  # a model that diverges
+            integrands = Integrands(w, v, delta, n, ks * delta, ks * delta_dot)
+        return _integrate(integrands, self._bump, self._stride, count)
 
 
 @compiled
-def _integrated(
-    w: FloatArray,
-    v: FloatArray,
-    delta: FloatArray,
-    n: FloatArray,
-    steering: FloatArray,
-    steering_rate: FloatArray,
-    phi: FloatArray,
-    slope: FloatArray,
-    curvature: FloatArray,
-    stride: int,
-    count: int,
-) -> FloatArray:
-    """The two equations' integrals over each bump, (count, 13): targets, excitation, regressors.
+def _integrate(signals: Integrands, bump: Bump, stride: int, count: int) -> FloatArray:
+    """Integrate both equations over each of `count` bumps, `stride` samples apart.
 
-    NaN where anything integrated is.
+    Returns (count, 13): target, excitation and regressors of yaw, then those of surge. NaN where a
+    signal is NaN.
     """
-    rows = np.empty((count, 13))
+    phi, first, second = bump.phi, bump.first, bump.second
+    w, v, delta, n = signals.w, signals.v, signals.delta, signals.n
+    rows = np.empty((count, INTEGRAL_COUNT))
     for k in range(count):
-        yaw = yaw_moved = a = b1 = b2 = b3 = d = e = 0.0
-        surge = surge_moved = f = g = h = 0.0
+        yaw = mean_rudder = a = b1 = b2 = b3 = d = e = 0.0
+        surge = mean_speed = f = g = h = 0.0
         for j in range(len(phi)):
             i = stride * k + j
             square = w[i] * w[i]
-            yaw += curvature[j] * w[i]
-            yaw_moved += phi[j] * delta[i]
-            a -= slope[j] * w[i]
+            yaw += second[j] * w[i]
+            mean_rudder += phi[j] * delta[i]
+            a -= first[j] * w[i]
             b1 += phi[j] * w[i]
             b2 += phi[j] * (w[i] * abs(w[i]))
             b3 += phi[j] * (square * w[i])
-            d += phi[j] * steering[i]
-            e += phi[j] * steering_rate[i]
-            surge -= slope[j] * v[i]
-            surge_moved += phi[j] * v[i]
+            d += phi[j] * signals.ks_delta[i]
+            e += phi[j] * signals.ks_delta_dot[i]
+            surge -= first[j] * v[i]
+            mean_speed += phi[j] * v[i]
             f += phi[j] * square
             g += phi[j] * (v[i] * v[i])
             h += phi[j] * n[i]
-        rows[k] = (yaw, yaw_moved, a, b1, b2, b3, d, e, surge, surge_moved, f, g, h)
+        integrals = (yaw, mean_rudder, a, b1, b2, b3, d, e, surge, mean_speed, f, g, h)
+        for c in range(INTEGRAL_COUNT):
+            rows[k, c] = integrals[c]
     return rows
 
 
 def with_constant(rows: Rows) -> Rows:
-    """The same with one more regressor: a disturbance that never changes."""
+    """Return the rows with one more regressor: a constant disturbance."""
     ones = np.ones((len(rows.target), 1))
     regressors = np.hstack((rows.regressors, ones))
     return replace(rows, equation=rows.equation.with_constant(), regressors=regressors)
 
 
 def with_slipstream(yaw: Rows, surge: Rows) -> Rows:
-    """The rows of yaw with one more regressor: the rudder in proportion to the revolutions.
+    """Return the yaw rows with one more regressor: rudder times propeller revolutions.
 
-    `yaw` takes it in proportion to the speed alone, as a first model does; `surge` knows both.
+    Parameters
+    ----------
+    yaw
+        The yaw rows, with a rudder effectiveness proportional to the speed, as in a first model.
+    surge
+        The surge rows of the same bumps, from which the mean speed and revolutions are taken.
+
+    Returns
+    -------
+    rows
+        Their last regressor is ``int phi ks delta / v_rms * n_mean``, an approximation of
+        ``int phi n delta`` to a few per cent.
     """
     d, g, h = yaw.equation.names.index("d"), *map(surge.equation.names.index, ("g", "h"))
     speed, revolutions = np.sqrt(surge.regressors[:, g]), surge.regressors[:, h]
@@ -236,8 +348,8 @@ def with_slipstream(yaw: Rows, surge: Rows) -> Rows:
     return replace(yaw, equation=yaw.equation.with_slipstream(), regressors=regressors)
 
 
-def _bump(half: int, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """phi, phi' and phi'' on 2 half + 1 samples, of unit area; times dt, to sum as an integral."""
+def _bump(half: int, dt: float) -> Bump:
+    """Return the bump on ``2 half + 1`` samples with a time step `dt`."""
     s = np.arange(-half, half + 1) / half
     width = half * dt
     p, base = BUMP_POWER, 1 - s**2
@@ -245,13 +357,13 @@ def _bump(half: int, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     first = -2 * p * s * base ** (p - 1) / width
     second = (-2 * p * base ** (p - 1) + 4 * p * (p - 1) * s**2 * base ** (p - 2)) / width**2
     per_area = 1 / np.sum(phi)
-    return phi * per_area, first * per_area, second * per_area
+    return Bump(phi * per_area, first * per_area, second * per_area)
 
 
-def _bridged(values: FloatArray, longest: float) -> FloatArray:
-    """The signal with the instants between a sensor's samples filled in, its gaps left open.
+def _interpolate(values: FloatArray, longest: float) -> FloatArray:
+    """Interpolate a signal linearly between its samples, except in gaps.
 
-    A gap is more than `longest` instants from sample to sample.
+    A gap is more than `longest` instants from one sample to the next; it stays NaN.
     """
     at = np.flatnonzero(np.isfinite(values))
     if len(at) == len(values):

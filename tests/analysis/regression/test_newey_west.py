@@ -1,3 +1,5 @@
+"""Newey-West errors, compared with the textbook formula."""
+
 import numpy as np
 import pytest
 
@@ -10,8 +12,10 @@ from analysis.regression.newey_west import (
 from shiplog.types import FloatArray
 
 
-def sandwich(rows: FloatArray, values: FloatArray, inverse: FloatArray, overlap: int) -> FloatArray:
-    """The textbook's: autocovariances of the scores, weighted, between two inverses."""
+def textbook_variances(
+    rows: FloatArray, values: FloatArray, inverse: FloatArray, overlap: int
+) -> FloatArray:
+    """Return the variances by the textbook: weighted autocovariances between two inverses."""
     X, y = rows[:, :-1], rows[:, -1]
     scores = X * (y - X @ values)[:, None]
     S = scores.T @ scores
@@ -21,7 +25,7 @@ def sandwich(rows: FloatArray, values: FloatArray, inverse: FloatArray, overlap:
     return np.diag(inverse @ S @ inverse)
 
 
-def rows_of(seed: int, n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def regression(seed: int, n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     rng = np.random.default_rng(seed)
     X = rng.standard_normal((n, 3))
     y = X @ [1.0, 2.0, -3.0] + np.convolve(rng.standard_normal(n), np.ones(5), "same")
@@ -29,14 +33,14 @@ def rows_of(seed: int, n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 @pytest.mark.parametrize("overlap", [1, 2, 7, 40, 90])
-def test_runs_and_windows_are_the_textbooks_sandwich(overlap: int) -> None:
-    rows, values, inverse = rows_of(0, 60)
-    expected = sandwich(rows, values, inverse, overlap)
-    runs = empty_sums(overlap, 3)
-    add_rows(runs, rows, 0, values, inverse)
-    assert newey_west_variances(runs, len(rows)) == pytest.approx(expected, rel=1e-10)
+def test_variances_equal_those_of_the_textbook(overlap: int) -> None:
+    rows, values, inverse = regression(0, 60)
+    expected = textbook_variances(rows, values, inverse, overlap)
+    state = empty_sums(overlap, 3)
+    add_rows(state, rows, 0, values, inverse)
+    assert newey_west_variances(state, len(rows)) == pytest.approx(expected, rel=1e-10)
     spans = np.array([[0, 60], [0, 60], [5, 30]])
-    found = window_variances(
+    variances = window_variances(
         rows.T.copy(),
         spans,
         np.array([True, False, True]),
@@ -44,18 +48,20 @@ def test_runs_and_windows_are_the_textbooks_sandwich(overlap: int) -> None:
         np.tile(inverse[:, :, None], 3),
         overlap,
     )
-    assert found[:, 0] == pytest.approx(expected, rel=1e-10)
-    assert np.isnan(found[:, 1]).all()
-    assert found[:, 2] == pytest.approx(sandwich(rows[5:30], values, inverse, overlap), rel=1e-10)
+    assert variances[:, 0] == pytest.approx(expected, rel=1e-10)
+    assert np.isnan(variances[:, 1]).all()
+    assert variances[:, 2] == pytest.approx(
+        textbook_variances(rows[5:30], values, inverse, overlap), rel=1e-10
+    )
 
 
-def test_how_the_rows_are_parted_changes_no_bit() -> None:
-    rows, values, inverse = rows_of(1, 200)
-    whole, parted = empty_sums(30, 3), empty_sums(30, 3)
-    add_rows(whole, rows, 0, values, inverse)
+def test_results_do_not_depend_on_the_chunks_to_the_last_bit() -> None:
+    rows, values, inverse = regression(1, 200)
+    at_once, in_chunks = empty_sums(30, 3), empty_sums(30, 3)
+    add_rows(at_once, rows, 0, values, inverse)
     count = 0
     for part in np.split(rows, [0, 1, 17, 18, 99, 140]):
-        add_rows(parted, part, count, values, inverse)
+        add_rows(in_chunks, part, count, values, inverse)
         count += len(part)
-        newey_west_variances(parted, count)  # asked for between, it disturbs nothing
-    assert (newey_west_variances(whole, 200) == newey_west_variances(parted, 200)).all()
+        newey_west_variances(in_chunks, count)  # computing them early does not change the state
+    assert (newey_west_variances(at_once, 200) == newey_west_variances(in_chunks, 200)).all()

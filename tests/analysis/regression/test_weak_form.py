@@ -1,3 +1,5 @@
+"""Rows of the equations in integral form, compared with the integrals of simulated trials."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -24,12 +26,12 @@ def signals(clean: SimulatedTrial) -> Signals:
 def test_the_true_coefficients_satisfy_every_row(signals: Signals, vessel: Vessel) -> None:
     for rows in weak_form(signals, vessel.coefficients):
         true = np.array([getattr(vessel.coefficients, name) for name in rows.equation.names])
-        left_over = rows.target - rows.regressors @ true
-        # a step of the revolutions between two samples is known no better than to a sample
-        assert np.max(np.abs(left_over)) < 1e-3 * np.max(np.abs(rows.target))
+        residual = rows.target - rows.regressors @ true
+        # the time of a step of the revolutions is only known to one sample
+        assert np.max(np.abs(residual)) < 1e-3 * np.max(np.abs(rows.target))
 
 
-def test_a_row_is_the_integral_it_stands_for(signals: Signals, vessel: Vessel) -> None:
+def test_a_row_equals_its_integral(signals: Signals, vessel: Vessel) -> None:
     yaw, _ = weak_form(signals, vessel.coefficients)
     k = 77
     t = signals.time_secs - yaw.centres_secs[k]
@@ -39,13 +41,13 @@ def test_a_row_is_the_integral_it_stands_for(signals: Signals, vessel: Vessel) -
     w = signals["yaw_rate"]
     assert yaw.regressors[k, 1] == pytest.approx(np.trapezoid(phi * w, t), rel=1e-9)
     assert yaw.regressors[k, 2] == pytest.approx(np.trapezoid(phi * w * np.abs(w), t), rel=1e-9)
-    # int phi w' is what stands beside a: the truth's own derivative, never measured
+    # the regressor of a is int phi w': compared with the derivative of the true yaw rate
     assert yaw.equation.names[0] == "a"
-    slope = np.gradient(w, signals.dt_secs)
-    assert yaw.regressors[k, 0] == pytest.approx(np.trapezoid(phi * slope, t), rel=1e-3)
+    yaw_acceleration = np.gradient(w, signals.dt_secs)
+    assert yaw.regressors[k, 0] == pytest.approx(np.trapezoid(phi * yaw_acceleration, t), rel=1e-3)
 
 
-def test_rows_stand_a_second_apart_and_inside_the_record(signals: Signals, vessel: Vessel) -> None:
+def test_bumps_are_one_second_apart_and_inside_the_trial(signals: Signals, vessel: Vessel) -> None:
     yaw, surge = weak_form(signals, vessel.coefficients)
     assert np.diff(yaw.centres_secs) == pytest.approx(1.0)
     assert yaw.centres_secs[0] == pytest.approx(yaw.equation.bump_secs / 2)
@@ -54,18 +56,18 @@ def test_rows_stand_a_second_apart_and_inside_the_record(signals: Signals, vesse
     assert np.array_equal(yaw.centres_secs, surge.centres_secs)
 
 
-def test_rows_that_touch_a_gap_are_left_out_and_no_others(signals: Signals, vessel: Vessel) -> None:
+def test_rows_are_nan_where_a_bump_overlaps_a_gap(signals: Signals, vessel: Vessel) -> None:
     values = dict(signals.values)
     values["yaw_rate"] = values["yaw_rate"].copy()
     values["yaw_rate"][2000:2100] = np.nan  # 200 s to 210 s
     yaw, surge = weak_form(replace(signals, values=values), vessel.coefficients)
-    touched = (yaw.centres_secs + 30 >= 200) & (yaw.centres_secs - 30 <= 209.9)
-    assert np.array_equal(np.isnan(yaw.target), touched)
-    assert np.array_equal(np.isnan(surge.regressors[:, 0]), touched)  # f w^2
+    overlaps_gap = (yaw.centres_secs + 30 >= 200) & (yaw.centres_secs - 30 <= 209.9)
+    assert np.array_equal(np.isnan(yaw.target), overlaps_gap)
+    assert np.array_equal(np.isnan(surge.regressors[:, 0]), overlaps_gap)  # f w^2
     assert not np.isnan(surge.target).any()  # v alone
 
 
-def test_a_slow_sensor_has_no_gaps(vessel: Vessel) -> None:
+def test_samples_of_a_slow_sensor_are_interpolated(vessel: Vessel) -> None:
     sensors = suite("none", {"speed.rate_hz": 0.5})
     trial = simulate(vessel, "zigzag-20-20", duration_secs=300.0, sensors=sensors)
     signals = resample(TrialLog("slow", trial.channels), channels=NAMES)
@@ -73,11 +75,11 @@ def test_a_slow_sensor_has_no_gaps(vessel: Vessel) -> None:
     yaw, surge = weak_form(signals, vessel.coefficients)
     assert np.isfinite(yaw.regressors[3:-3]).all()
     true = np.array([getattr(vessel.coefficients, name) for name in surge.equation.names])
-    left_over = (surge.target - surge.regressors @ true)[3:-3]
-    assert np.max(np.abs(left_over)) < 0.02 * np.max(np.abs(surge.target[3:-3]))
+    residual = (surge.target - surge.regressors @ true)[3:-3]
+    assert np.max(np.abs(residual)) < 0.02 * np.max(np.abs(surge.target[3:-3]))
 
 
-def test_a_coarse_clock_gives_rows_as_far_apart_as_its_steps(vessel: Vessel) -> None:
+def test_a_time_step_over_one_second_is_the_distance_of_bumps(vessel: Vessel) -> None:
     trial = simulate(vessel, "zigzag-20-20", duration_secs=600.0, sensors=suite("none"))
     signals = resample(TrialLog("coarse", trial.channels), 2.0, NAMES)
     yaw, _ = weak_form(signals, vessel.coefficients)
@@ -85,25 +87,25 @@ def test_a_coarse_clock_gives_rows_as_far_apart_as_its_steps(vessel: Vessel) -> 
     assert np.diff(yaw.centres_secs) == pytest.approx(2.0)
 
 
-def test_a_constant_is_one_more_regressor(signals: Signals, vessel: Vessel) -> None:
+def test_a_constant_adds_a_regressor_of_ones(signals: Signals, vessel: Vessel) -> None:
     yaw, _ = weak_form(signals, vessel.coefficients)
-    more = with_constant(yaw)
-    assert more.equation.names == (*yaw.equation.names, "constant")
-    assert np.all(more.regressors[:, -1] == 1)
+    extended = with_constant(yaw)
+    assert extended.equation.names == (*yaw.equation.names, "constant")
+    assert np.all(extended.regressors[:, -1] == 1)
 
 
-def test_the_slipstream_is_the_rudder_in_proportion_to_the_revolutions(
+def test_the_slipstream_regressor_is_proportional_to_rudder_times_revolutions(
     signals: Signals, vessel: Vessel
 ) -> None:
-    """To a few per cent: speed and revolutions are means over a bump."""
+    """Compare to a few per cent, since speed and revolutions are means over a bump."""
     n, v = signals["rpm"], signals["speed"]
-    bare = vessel.coefficients._replace(alpha1=1.0, alpha2=0.0)
-    race = vessel.coefficients._replace(alpha1=0.0, alpha2=1.0, alpha3=0.0)
-    yaw, surge = weak_form(signals, bare)
-    found = with_slipstream(yaw, surge)
-    assert found.equation.names == (*yaw.equation.names, "slipstream")
-    expected = weak_form(signals, race)[0].regressors[:, 4]
-    off = found.regressors[:, -1] - expected
-    assert np.sqrt(np.mean(off**2) / np.mean(expected**2)) < 0.05
+    by_speed = vessel.coefficients._replace(alpha1=1.0, alpha2=0.0)
+    by_revolutions = vessel.coefficients._replace(alpha1=0.0, alpha2=1.0, alpha3=0.0)
+    yaw, surge = weak_form(signals, by_speed)
+    extended = with_slipstream(yaw, surge)
+    assert extended.equation.names == (*yaw.equation.names, "slipstream")
+    expected = weak_form(signals, by_revolutions)[0].regressors[:, 4]
+    error = extended.regressors[:, -1] - expected
+    assert np.sqrt(np.mean(error**2) / np.mean(expected**2)) < 0.05
     assert n.std() > 0.05 * n.mean()
     assert v.std() > 0.02 * v.mean()
