@@ -471,14 +471,14 @@ def waves() -> None:
             error = yaw_rate_error(replays.series(settings), trial)
             cells.append(number(degrees(error) * 1e3, 3))
         rows.append((label, *cells))
-    found = replays.plan({**bandwidth_settings(), "filter.wave": True}).noise.wave
-    if found is None:
+    fit = replays.plan({**bandwidth_settings(), "filter.wave": True}).noise.wave
+    if fit is None:
         raise RuntimeError("no wave found in the yaw rate of the simulated log")
     paragraph(
         "A zig-zag as above, ten minutes long, with a narrow-band wave of 0.02 °/s rms at 0.6 rad/s"
         " with a damping of 0.1 added to the gyro. `--wave` fits a wave to the residual of a slow"
-        f" filter: {number(degrees(found.std), 3)} °/s at {number(found.frequency, 3)} rad/s with"
-        f" a damping of {number(found.damping, 2)}. It then separates the wave from the motion of"
+        f" filter: {number(degrees(fit.std), 3)} °/s at {number(fit.frequency, 3)} rad/s with"
+        f" a damping of {number(fit.damping, 2)}. It then separates the wave from the motion of"
         " the ship. The error of the ship's own yaw rate, in 0.001 °/s:"
     )
     table("", ("filter", "without --wave", "with --wave"), rows)
