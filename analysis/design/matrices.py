@@ -10,13 +10,28 @@ from shiplog.types import FloatArray
 
 Definite = Literal["semi", "positive"]
 
-ROUNDING = 1e-10  # what symmetry and definiteness are judged to, every unit being one
+ROUNDING = 1e-10  # relative tolerance of symmetry and definiteness, after scaling
 
 
 def as_finite_array(name: str, values: ArrayLike) -> FloatArray:
-    """`values` as an array of real, finite numbers, of any shape.
+    """Convert `values` to an array of finite real numbers, of any shape.
 
-    Raises `UsageError` for what is no array of real numbers, and for NaN and infinities.
+    Parameters
+    ----------
+    name
+        Name of the argument, for error messages.
+    values
+        Numbers of any shape.
+
+    Returns
+    -------
+    FloatArray
+        A copy of the values, of their shape.
+
+    Raises
+    ------
+    UsageError
+        The values are not an array of real numbers, or contain NaN or infinities.
     """
     try:
         array = np.asarray(values)
@@ -32,15 +47,28 @@ def as_finite_array(name: str, values: ArrayLike) -> FloatArray:
 def as_matrix(
     name: str, values: ArrayLike, rows: int | None = None, columns: int | None = None
 ) -> FloatArray:
-    """`values` as a matrix (rows, columns) of finite numbers; `None` is any number but none.
+    """Convert `values` to a matrix of finite numbers and check its shape.
 
-    Raises `UsageError` where it is of another shape, and what `as_finite_array` raises.
+    Parameters
+    ----------
+    name
+        Name of the argument, for error messages.
+    values
+        Numbers, (rows, columns).
+    rows, columns
+        Required size; `None` accepts any size above zero.
+
+    Raises
+    ------
+    UsageError
+        The shape differs, or `as_finite_array` rejects the values.
     """
     array = as_finite_array(name, values)
     expected = f"({'any' if rows is None else rows}, {'any' if columns is None else columns})"
     fits = array.ndim == 2 and array.size > 0
     fits = fits and all(
-        wanted in (None, found) for wanted, found in zip((rows, columns), array.shape, strict=False)
+        required in (None, size)
+        for required, size in zip((rows, columns), array.shape, strict=False)
     )
     if not fits:
         raise UsageError(f"{name} is of shape {array.shape}; expected {expected}")
@@ -48,9 +76,12 @@ def as_matrix(
 
 
 def as_square_matrix(name: str, values: ArrayLike, n: int | None = None) -> FloatArray:
-    """`values` as a matrix (n, n) of finite numbers; `None` is any n.
+    """Convert `values` to a square matrix (n, n) of finite numbers; `None` accepts any n.
 
-    Raises `UsageError` where it is not square or not of that n, and what `as_finite_array` raises.
+    Raises
+    ------
+    UsageError
+        The matrix is not square or not (n, n), or `as_finite_array` rejects the values.
     """
     array = as_finite_array(name, values)
     size = n if n is not None else max(array.shape, default=0)
@@ -63,11 +94,36 @@ def as_square_matrix(name: str, values: ArrayLike, n: int | None = None) -> Floa
 def as_symmetric_matrix(
     name: str, values: ArrayLike, n: int | None = None, *, definite: Definite = "semi"
 ) -> FloatArray:
-    """`values` as a symmetric matrix (n, n), positive semidefinite or positive definite.
+    """Convert `values` to a symmetric positive semidefinite or positive definite matrix (n, n).
 
-    A scalar stands for a matrix (1, 1). Each entry is judged in the units of its own row and
-    column, to a relative 1e-10; what is given back is symmetric to the bit. Raises `UsageError`
-    for any other, and what `as_square_matrix` raises.
+    Symmetry and eigenvalues are judged to a relative 1e-10 after each row and column is scaled to a
+    unit diagonal, so that states in very different units are treated alike.
+
+    Parameters
+    ----------
+    name
+        Name of the argument, for error messages.
+    values
+        Numbers, (n, n); a scalar is taken as a matrix (1, 1).
+    n
+        Required size; `None` accepts any.
+    definite
+        "semi" accepts zero eigenvalues, "positive" rejects them.
+
+    Returns
+    -------
+    FloatArray
+        (n, n), exactly symmetric.
+
+    Raises
+    ------
+    UsageError
+        The matrix is not symmetric or not definite as required, or `as_square_matrix` rejects it.
+
+    Examples
+    --------
+    >>> as_symmetric_matrix("R", 2.0).tolist()
+    [[2.0]]
     """
     array = as_finite_array(name, values)
     array = as_square_matrix(name, array.reshape(1, 1) if array.ndim == 0 else array, n)
@@ -75,23 +131,23 @@ def as_symmetric_matrix(
     units = np.sqrt(np.maximum(np.diag(array), ROUNDING**2 * largest))
     scaled = array / np.outer(units, units)
     if np.abs(scaled - scaled.T).max() > ROUNDING * max(1.0, np.abs(scaled).max()):
-        off = np.abs(array - array.T).max()
+        difference = np.abs(array - array.T).max()
         raise UsageError(
-            f"{name}, {array.shape}, differs from its transpose by {off:.3g}; expected a symmetric"
-            " matrix"
+            f"{name}, {array.shape}, differs from its transpose by {difference:.3g}; expected a"
+            " symmetric matrix"
         )
     least = np.linalg.eigvalsh(scaled + scaled.T)[0] / 2
     if least < -ROUNDING or (definite == "positive" and least < ROUNDING**1.5):
-        wanted = "definite" if definite == "positive" else "semidefinite"
+        required = "definite" if definite == "positive" else "semidefinite"
         raise UsageError(
             f"{name}, {array.shape}, has the eigenvalue {np.linalg.eigvalsh(array)[0]:.3g};"
-            f" expected a positive {wanted} matrix"
+            f" expected a positive {required} matrix"
         )
     return (array + array.T) / 2
 
 
 def as_number(name: str, value: float, *, least: float = 0.0) -> float:
-    """`value` as a finite number not below `least`; raises `UsageError` for any other."""
+    """Convert `value` to a finite number not below `least`; raise `UsageError` otherwise."""
     array = as_finite_array(name, value)
     if array.ndim != 0 or array < least:
         raise UsageError(f"{name} is {value}; expected one number not below {least:g}")
@@ -99,7 +155,7 @@ def as_number(name: str, value: float, *, least: float = 0.0) -> float:
 
 
 def as_count(name: str, value: int) -> int:
-    """`value` as a whole number not below one; raises `UsageError` for any other."""
+    """Convert `value` to a whole number not below one; raise `UsageError` otherwise."""
     if as_number(name, value, least=1) % 1:
         raise UsageError(f"{name} is {value}; expected a whole number")
     return int(value)

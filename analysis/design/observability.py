@@ -15,12 +15,33 @@ AXIS_TOLERANCE = 1e-8  # of the norm of A: the accuracy of a double eigenvalue
 
 
 def unobservable_eigenvalues(A: FloatArray, C: FloatArray) -> ComplexArray:
-    """Return the unobservable eigenvalues (k,) of A (n, n) with the output matrix C (m, n).
+    """Compute the eigenvalues of A that are unobservable from y = C x.
 
-    The staircase form: orthogonal rotations split off the states that C shows, then those that
+    The staircase form: orthogonal rotations split off the states that C measures, then those that
     drive these, and so on; the eigenvalues of the remaining states are unobservable. Unlike
-    Hautus's test this needs no eigenvalue of A, which is known to half the digits only where it is
-    multiple. The uncontrollable eigenvalues of an input matrix B are `unseen_modes(A.T, B.T)`.
+    Hautus's test it needs no eigenvalue of A, and a double eigenvalue is computed to half the
+    digits only. The uncontrollable eigenvalues of an input matrix B are
+    `unobservable_eigenvalues(A.T, B.T)`.
+
+    Parameters
+    ----------
+    A
+        (n, n), 1/s.
+    C
+        (m, n): the output matrix.
+
+    Returns
+    -------
+    ComplexArray
+        (k,), 1/s; empty where the pair is observable.
+
+    Examples
+    --------
+    The rate of a double integrator is measured, its position is not:
+
+    >>> A, C = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0, 1.0]])
+    >>> unobservable_eigenvalues(A, C).tolist()
+    [0j]
     """
     A, (units, _) = matrix_balance(A, permute=False, separate=True)
     C = C * units
@@ -29,13 +50,13 @@ def unobservable_eigenvalues(A: FloatArray, C: FloatArray) -> ComplexArray:
     size = float(np.linalg.norm(A))
     threshold = RANK_TOLERANCE
     while len(A):
-        _, shown, rotation = np.linalg.svd(C)
-        rank = int(np.sum(shown > threshold))
+        _, values, rotation = np.linalg.svd(C)
+        rank = int(np.sum(values > threshold))
         if rank == 0:
             break
-        # what is still hidden: how it moves itself, and how it moves what was just seen
-        seen, hidden = rotation[:rank], rotation[rank:]
-        A, C = hidden @ A @ hidden.T, seen @ A @ hidden.T
+        # the dynamics of the remaining states, and how they drive the states just split off
+        observed, remaining = rotation[:rank], rotation[rank:]
+        A, C = remaining @ A @ remaining.T, observed @ A @ remaining.T
         threshold = RANK_TOLERANCE * size
     return np.linalg.eigvals(A).astype(complex)
 

@@ -70,10 +70,10 @@ class TickObserver:
     ) -> FloatArray:
         """The estimate (n,) at the end of a tick from that at its start.
 
-        `y` (2k + 1, m) is what was measured through the tick, evenly spaced, both ends counted:
-        the ends and middles of k Runge-Kutta steps. `u` (r,) is held, or of the same instants
-        (2k + 1, r). Full order: x̂' = f(x̂, u) + L (y - C x̂). Reduced order: what is measured is y,
-        the rest z + N y with z' = f2 - N f1; z starts as ω̂ - N y, N being this tick's.
+        `y` (2k + 1, m) is what was measured through the tick, evenly spaced, both ends counted: the
+        ends and middles of k Runge-Kutta steps. `u` (r,) is held, or of the same instants (2k + 1,
+        r). Full order: x̂' = f(x̂, u) + L (y - C x̂). Reduced order: what is measured is y, the
+        rest z + N y with z' = f2 - N f1; z starts as ω̂ - N y, N being this tick's.
 
         Raises `UsageError` for measurements and inputs that do not fit, and what `gain` raises.
         """

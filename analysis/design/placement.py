@@ -1,8 +1,9 @@
 """Pole placement for observers of several outputs, and Hautus's test of observability.
 
-Source: Zubov, Mikrin, Oleinik, Ryabchenko, "Algorithms for the synthesis of linear observers for
-nonlinear dynamic systems", eqs (2.2) to (2.12). As printed (2.10) places A + L C, (2.7) starts from
-A and not its transpose, and the last Φ is m × m; here each is as it must be.
+Source: N. E. Zubov, E. A. Mikrin, A. S. Oleinik, V. N. Ryabchenko, "Algorithms for the synthesis
+of linear observers for nonlinear dynamic systems", eqs (2.2) to (2.12). Three misprints are
+corrected: (2.10) places A + L C instead of A - L C, (2.7) starts from A instead of its transpose,
+and the last Φ is printed as m × m.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,91 +22,152 @@ from .observability import ComplexArray
 
 OBSERVABILITY_TOLERANCE = 1e-10  # smallest singular value of an observable direction
 MIN_PARTICIPATION = 1e-6  # a state with a smaller component is not part of a mode
-CONJUGATE_TOLERANCE = 1e-9  # relative distance of a pole from its partner's conjugate
-CLUSTER_RADIUS = 1e-3  # eigenvalues this near may be one defective one
-ROUNDING = 1e-14  # computed size of a singular value that is zero
-MODE_TOLERANCE = 1e-8  # modes this near are the same
+CONJUGATE_TOLERANCE = 1e-9  # relative distance of a pole from the conjugate of its partner
+CLUSTER_RADIUS = 1e-3  # eigenvalues this close may be one multiple eigenvalue
+ROUNDING = 1e-14  # a zero singular value is computed up to this size
+MODE_TOLERANCE = 1e-8  # modes this close are the same
 MAX_POLYNOMIAL_ERROR = 1e-4  # relative, due to rounding
 
 
 @dataclass(frozen=True)
 class UnobservableMode:
-    """An eigenvalue that the measurements do not show; of a complex pair the one above."""
+    """An eigenvalue of A that the measurements do not show.
 
-    value: complex  # rad/s
-    states: tuple[int, ...]  # those that move in it
+    Attributes
+    ----------
+    value
+        The eigenvalue, 1/s; of a complex pair the one with positive imaginary part, rad/s.
+    states
+        Indices of the states with a component in the mode.
+    """
+
+    value: complex
+    states: tuple[int, ...]
 
 
 def place_multilevel(A: ArrayLike, C: ArrayLike, poles: ArrayLike) -> FloatArray:
-    """The gain L (n, m) that gives A - L C the poles asked for, each as often as it is asked for.
+    """Compute the observer gain L that gives A - L C the requested poles.
 
-    A (n, n), C (m, n), poles (n,) real or complex with their conjugates, 1/s. The system is taken
-    apart in levels: what C shows, what moves that, and so on; each level is given some of the
-    poles, the last level the last ones. A level of odd size that no real pole is left for shares a
-    pair with the level above. The gain does not depend on the units of the states. With several
-    measurements there are other gains with the same poles: channels that have nothing to do with
-    each other are better placed each for itself, else they are coupled.
+    The system is decomposed into levels: the states that C measures, the states that drive these,
+    and so on. Each level is assigned some of the poles, the last level the last ones. A level of
+    odd size for which no real pole remains shares a complex pair with the level above. Poles may be
+    repeated as often as wanted, and the gain does not depend on the units of the states.
 
-    Raises `UsageError` for matrices that do not fit, poles that are not n or lack a conjugate, a
-    pair (A, C) that is not observable, naming the mode, and where rounding leaves the poles
-    somewhere else. Source: Zubov et al., (2.2) to (2.6), after the transposition of (2.7).
+    With several measurements other gains give the same poles. Uncoupled channels should be placed
+    one by one; placed together they become coupled.
+
+    Parameters
+    ----------
+    A
+        (n, n), 1/s.
+    C
+        (m, n): y = C x.
+    poles
+        (n,), 1/s: real, or complex with their conjugates.
+
+    Returns
+    -------
+    FloatArray
+        L, (n, m).
+
+    Raises
+    ------
+    UsageError
+        The matrices do not fit; the poles are not n or lack a conjugate; (A, C) is not observable
+        (the message names the mode); or rounding moves the poles.
+
+    References
+    ----------
+    Zubov et al., (2.2) to (2.6), after the transposition of (2.7).
+
+    Examples
+    --------
+    An observer of a double integrator with both poles at -1 1/s:
+
+    >>> place_multilevel([[0, 1], [0, 0]], [[1, 0]], [-1, -1]).round(6).tolist()
+    [[2.0], [1.0]]
     """
     A = as_square_matrix("A", A)
     C = as_matrix("C", C, columns=len(A))
-    wanted = checked_poles("poles", poles, len(A))
-    hidden = unobservable_modes(A, C)
-    if hidden:
+    requested = checked_poles("poles", poles, len(A))
+    unobservable = unobservable_modes(A, C)
+    if unobservable:
         raise UsageError(
-            f"A {A.shape} and C {C.shape}: the mode at {format_mode(hidden[0].value)} cannot be"
-            " seen in the measurements; measure another state"
+            f"A {A.shape} and C {C.shape}: the mode at {format_mode(unobservable[0].value)}"
+            " cannot be seen in the measurements; measure another state"
         )
-    pair = _natural_units(A, C, float(np.abs(wanted).max()))
-    L = _placed(pair.A, pair.C, wanted / pair.rate)
-    missed = polynomial_error(pair.A - L @ pair.C, wanted / pair.rate)
-    if missed > MAX_POLYNOMIAL_ERROR:
+    pair = _natural_units(A, C, float(np.abs(requested).max()))
+    L = _placed(pair.A, pair.C, requested / pair.rate)
+    error = polynomial_error(pair.A - L @ pair.C, requested / pair.rate)
+    if error > MAX_POLYNOMIAL_ERROR:
         raise UsageError(
-            f"poles {wanted.shape}: rounding leaves the characteristic polynomial off by"
-            f" {missed:.1g}; A {A.shape} and C {C.shape} hardly show a mode, or are too uneven:"
-            " measure more, or take a Kalman gain"
+            f"poles {requested.shape}: rounding changes the characteristic polynomial by a relative"
+            f" {error:.1g}; with A {A.shape} and C {C.shape} a mode is almost unobservable or the"
+            " scales differ too much: measure more states, or use a Kalman gain"
         )
     return pair.rate * pair.units[:, None] * L
 
 
 def unobservable_modes(A: ArrayLike, C: ArrayLike) -> tuple[UnobservableMode, ...]:
-    """The modes of x' = A x that y = C x does not show; none where the pair is observable.
+    """Compute the modes of x' = A x that y = C x does not show, by Hautus's test.
 
-    A (n, n), C (m, n). A mode λ is hidden where [A - λ I; C] has a direction of singular value
-    below 1e-10, A and C being scaled to natural units: an inertia of 1e12 hides nothing. Raises
-    `UsageError` for matrices that do not fit. Source: Hautus's test, at every eigenvalue.
+    A mode λ is unobservable where [A - λ I; C] has a singular value below 1e-10, with A and C
+    scaled to natural units: a large inertia (1e12, say) does not make a mode unobservable.
+
+    Parameters
+    ----------
+    A
+        (n, n), 1/s.
+    C
+        (m, n).
+
+    Returns
+    -------
+    tuple of UnobservableMode
+        Empty where the pair is observable.
+
+    Raises
+    ------
+    UsageError
+        The matrices do not fit.
+
+    Examples
+    --------
+    The rate of a double integrator is measured, its position is not:
+
+    >>> unobservable_modes([[0, 1], [0, 0]], [[0, 1]])
+    (UnobservableMode(value=0j, states=(0,)),)
     """
     A = as_square_matrix("A", A)
     C = as_matrix("C", C, columns=len(A))
     pair = _natural_units(A, C)
-    found: list[UnobservableMode] = []
-    for mode, shown, directions in _least_visible(pair.A, pair.C):
+    modes: list[UnobservableMode] = []
+    for mode, values, directions in _least_visible(pair.A, pair.C):
         new = all(
-            abs(mode * pair.rate - known.value) > MODE_TOLERANCE * pair.rate for known in found
+            abs(mode * pair.rate - earlier.value) > MODE_TOLERANCE * pair.rate for earlier in modes
         )
-        if shown[-1] < OBSERVABILITY_TOLERANCE and mode.imag >= 0 and new:
-            moved = np.linalg.norm(directions[shown < OBSERVABILITY_TOLERANCE], axis=0)
-            states = tuple(np.flatnonzero(moved > MIN_PARTICIPATION).tolist())
-            found.append(UnobservableMode(mode * pair.rate, states))
-    return tuple(found)
+        if values[-1] < OBSERVABILITY_TOLERANCE and mode.imag >= 0 and new:
+            components = np.linalg.norm(directions[values < OBSERVABILITY_TOLERANCE], axis=0)
+            states = tuple(np.flatnonzero(components > MIN_PARTICIPATION).tolist())
+            modes.append(UnobservableMode(mode * pair.rate, states))
+    return tuple(modes)
 
 
 def _least_visible(
     A: FloatArray, C: FloatArray
 ) -> Iterator[tuple[complex, FloatArray, ComplexArray]]:
-    """At each eigenvalue λ of A: λ, the singular values and the right vectors of [A - λ I; C].
+    """Yield each eigenvalue λ of A, the singular values and right vectors of [A - λ I; C].
 
-    A multiple eigenvalue is computed to a half of the digits or less, too few for the test, but
-    the mean of its computed values to all: of the means with its neighbours the one C shows least.
+    A multiple eigenvalue is computed to half of the digits or less, too few for the test, but the
+    mean of its computed values to all digits. Of the means with the neighbouring eigenvalues the
+    one with the smallest singular value is taken.
     """
     eigenvalues = np.linalg.eigvals(A).astype(complex)
     for eigenvalue in eigenvalues:
-        away = np.abs(eigenvalues - eigenvalue)
-        nearest = eigenvalues[np.argsort(away, kind="stable")][: np.sum(away < CLUSTER_RADIUS)]
-        tried: list[tuple[complex, FloatArray, ComplexArray]] = []
+        distance = np.abs(eigenvalues - eigenvalue)
+        order = np.argsort(distance, kind="stable")
+        nearest = eigenvalues[order][: np.sum(distance < CLUSTER_RADIUS)]
+        candidates: list[tuple[complex, FloatArray, ComplexArray]] = []
         for count in range(1, len(nearest) + 1):
             mean = complex(nearest[:count].mean())
             mode = complex(
@@ -114,65 +176,92 @@ def _least_visible(
                     for part in (mean.real, mean.imag)
                 )
             )
-            _, shown, directions = np.linalg.svd(np.vstack((A - mode * np.eye(len(A)), C)))
-            tried.append((mode, shown, directions))
-        # of those that rounding alone keeps from zero the mean of the most
-        yield min(reversed(tried), key=lambda one: max(float(one[1][-1]), ROUNDING))
+            _, values, directions = np.linalg.svd(np.vstack((A - mode * np.eye(len(A)), C)))
+            candidates.append((mode, values, directions))
+        # among candidates that are zero up to rounding, the mean over the most eigenvalues
+        yield min(reversed(candidates), key=lambda item: max(float(item[1][-1]), ROUNDING))
 
 
 def format_mode(mode: complex) -> str:
-    """A mode as a message says it: a decay rate, or a pair of conjugates, in 1/s."""
+    """Format a mode for a message: a decay rate, or a conjugate pair a ± bj, in 1/s."""
     value = complex(mode)
     real = f"{value.real + 0.0:.4g}"
     return real if value.imag == 0 else f"{real} ± {abs(value.imag):.4g}j"
 
 
 def checked_poles(name: str, poles: ArrayLike, n: int, *, stable: bool = False) -> ComplexArray:
-    """`poles` as n finite numbers (n,) that a real matrix can have, conjugates to the bit.
+    """Convert `poles` to n finite numbers (n,), complex pairs being exact conjugates.
 
-    Raises `UsageError` for another number of them, NaN, one without its conjugate, and where they
-    must be stable one that is not.
+    Parameters
+    ----------
+    name
+        Name of the argument, for error messages.
+    poles
+        (n,), 1/s.
+    n
+        Required number of poles.
+    stable
+        Reject poles whose real part is not negative.
+
+    Raises
+    ------
+    UsageError
+        The number of poles is not n, a pole is NaN or infinite, has no conjugate, or is not stable.
     """
     try:
-        found = np.asarray(poles).astype(np.complex128)
+        checked = np.asarray(poles).astype(np.complex128)
     except (TypeError, ValueError):
-        raise UsageError(f"{name} are no numbers; expected ({n},)") from None
-    if found.shape != (n,):
-        raise UsageError(f"{name} are of shape {found.shape}; expected ({n},), one for each state")
-    if not np.isfinite(found).all():
-        raise UsageError(f"{name}, {found.shape}, have NaN or infinities; expected finite numbers")
-    found.imag[np.abs(found.imag) <= CONJUGATE_TOLERANCE * np.abs(found)] = 0
-    lower = list(found[found.imag < 0])
-    for pole in found[found.imag > 0]:
+        raise UsageError(f"{name} are not numbers; expected ({n},)") from None
+    if checked.shape != (n,):
+        raise UsageError(
+            f"{name} are of shape {checked.shape}; expected ({n},), one for each state"
+        )
+    if not np.isfinite(checked).all():
+        raise UsageError(
+            f"{name}, {checked.shape}, have NaN or infinities; expected finite numbers"
+        )
+    checked.imag[np.abs(checked.imag) <= CONJUGATE_TOLERANCE * np.abs(checked)] = 0
+    lower = list(checked[checked.imag < 0])
+    for pole in checked[checked.imag > 0]:
         partner = min(lower, key=lambda other: abs(other - pole.conj()), default=np.inf)
         if abs(partner - pole.conj()) > CONJUGATE_TOLERANCE * abs(pole):
-            raise UsageError(_alone(name, found, pole))
+            raise UsageError(_alone(name, checked, pole))
         lower.remove(partner)
     if lower:
-        raise UsageError(_alone(name, found, lower[0]))
-    if stable and found.real.max() >= 0:
+        raise UsageError(_alone(name, checked, lower[0]))
+    if stable and checked.real.max() >= 0:
         raise UsageError(
-            f"{name}, {found.shape}, go up to {found.real.max():.4g}; expected negative real parts"
+            f"{name}, {checked.shape}, go up to {checked.real.max():.4g}; expected"
+            " negative real parts"
         )
-    return found
+    return checked
 
 
 def _alone(name: str, poles: ComplexArray, pole: complex) -> str:
+    """Return the message for a pole without its conjugate."""
     return f"{name}, {poles.shape}, have {pole:.4g} without its conjugate; expected both"
 
 
 def polynomial_error(F: FloatArray, poles: ComplexArray) -> float:
-    """How far the characteristic polynomial of F (n, n) is from that of `poles` (n,), relative.
+    """Compute the relative difference of the characteristic polynomials of F and of `poles`.
 
-    The largest difference of a coefficient, as a part of what the coefficient is at most for poles
-    of those sizes. Poles are no measure: a k-fold one moves by the k-th root of an error.
+    The largest difference of a coefficient, relative to the largest value this coefficient can have
+    for poles of these magnitudes. The poles themselves are no measure: a k-fold pole moves by the
+    k-th root of an error.
+
+    Parameters
+    ----------
+    F
+        (n, n).
+    poles
+        (n,).
     """
     sizes = np.where(poles == 0, 1.0, np.abs(poles))
     return float(np.max(np.abs(np.poly(F) - np.poly(poles)) / np.poly(-sizes)))
 
 
 class _Pair(NamedTuple):
-    """A pair whose states are z = x / units and whose time is t · rate: no number beyond one."""
+    """A pair (A, C) in the states z = x / units and the time t · rate; no entry exceeds one."""
 
     A: FloatArray
     C: FloatArray
@@ -181,18 +270,18 @@ class _Pair(NamedTuple):
 
 
 def _natural_units(A: FloatArray, C: FloatArray, fastest: float = 0.0) -> _Pair:
-    """The pair in units that do not depend on those it came in.
+    """Scale a pair to units that do not depend on those it came in.
 
-    A state's unit is such that along the strongest path from it to the measurements every factor is
-    one. Time's is the spectral radius of |A|, which lets no path grow by going round; `fastest`,
-    1/s, if that is more.
+    The unit of a state is such that along the strongest path from it to the measurements every
+    factor is one. The unit of time is the spectral radius of |A|, so that no closed path has a gain
+    above one, or `fastest` (1/s) if that is larger.
     """
     rate = max(float(np.abs(np.linalg.eigvals(np.abs(A))).max()), fastest) or 1.0
     A = A / rate
-    seen = np.abs(C).max(axis=0)
+    visibility = np.abs(C).max(axis=0)
     for _ in range(len(A)):
-        seen = np.maximum(seen, (seen[:, None] * np.abs(A)).max(axis=0))
-    units = 1 / np.where(seen > 0, seen, 1.0)
+        visibility = np.maximum(visibility, (visibility[:, None] * np.abs(A)).max(axis=0))
+    units = 1 / np.where(visibility > 0, visibility, 1.0)
     return _Pair(A * units / units[:, None], C * units, units, rate)
 
 
@@ -206,7 +295,7 @@ class _Level(NamedTuple):
 
 
 def _levels(A: FloatArray, B: FloatArray) -> list[_Level]:
-    """The levels of an observable pair, transposed, A (n, n) and B (n, m): (2.2), (2.3), (2.9)."""
+    """Decompose an observable pair, transposed, A (n, n), B (n, m): (2.2), (2.3), (2.9)."""
     levels = []
     while True:
         left, values, right = np.linalg.svd(B)
@@ -217,23 +306,35 @@ def _levels(A: FloatArray, B: FloatArray) -> list[_Level]:
             return levels
         if rank == 0:
             raise UsageError(
-                f"the mode at {format_mode(np.linalg.eigvals(A)[0])} can hardly be seen in the"
-                " measurements; measure another state"
+                f"the mode at {format_mode(np.linalg.eigvals(A)[0])} is almost unobservable"
+                " from the measurements; measure another state"
             )
         A, B = N @ A @ N.T, N @ A @ U
 
 
 class _Share(NamedTuple):
-    """The poles of one level."""
+    """The poles of one level.
 
-    closes: complex | None  # half of a pair, the other half being at the level below
+    Attributes
+    ----------
+    closes
+        Half of a pair whose other half is at the level below.
+    pairs
+        Complex pairs, each given by one pole.
+    reals
+        Real poles.
+    opens
+        Half of a pair whose other half is at the level above.
+    """
+
+    closes: complex | None
     pairs: Sequence[complex]
     reals: Sequence[float]
-    opens: complex | None  # half of a pair, the other half being at the level above
+    opens: complex | None
 
 
 def _shares(sizes: Sequence[int], poles: ComplexArray) -> list[_Share]:
-    """The poles of levels of those sizes, the last level first: pairs whole as far as they fit."""
+    """Distribute the poles over levels of these sizes, last level first; split few pairs."""
     reals = [float(pole.real) for pole in poles if pole.imag == 0]
     pairs = [complex(pole) for pole in poles if pole.imag > 0]
     shares: list[_Share] = []
@@ -254,9 +355,10 @@ def _shares(sizes: Sequence[int], poles: ComplexArray) -> list[_Share]:
 
 
 def _placed(A: FloatArray, C: FloatArray, poles: ComplexArray) -> FloatArray:
-    """L of `place_multilevel`, from the last level up: (2.5), (2.6).
+    """Compute L of `place_multilevel` in natural units, from the last level up: (2.5), (2.6).
 
-    With T = B⁻, T (A - B K) = Φ T + Ψ N: what T sees moves by Φ, but for a pair that is shared.
+    With T = B⁻, T (A - B K) = Φ T + Ψ N: the states T x follow Φ, and Ψ is zero except for a pair
+    that is shared by two levels.
     """
     levels = _levels(A.T, C.T)
     K = np.zeros((levels[-1].U.shape[1], 0))
@@ -274,11 +376,12 @@ def _placed(A: FloatArray, C: FloatArray, poles: ComplexArray) -> FloatArray:
 def _dynamics(
     share: _Share, below: FloatArray, into_below: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Φ (r, r) and Ψ (r, k) of a level of r states, k below it, and the direction of an open half.
+    """Compute Φ (r, r), Ψ (r, k) and the direction (r,) of an open half, for a level of r states.
 
-    Half of a pair σ ± jω is a real σ at the level below: `below` (k,) moves by σ, and by
-    `into_below` (r,) of this level's states. Given σ along that direction here, and -ω² over its
-    length back from below, the two make [σ, g; -ω²/g, σ], whose eigenvalues are σ ± jω.
+    Half of a pair σ ± jω is a real σ at the level below, where the coordinate `below` (k,) has the
+    dynamics σ and is driven by `into_below` (r,) from the states of this level. With σ along that
+    direction here and the feedback -ω² over its length from below, the two form
+    [σ, g; -ω²/g, σ], whose eigenvalues are σ ± jω.
     """
     r = len(into_below)
     frame, Psi = np.eye(r), np.zeros((r, len(below)))

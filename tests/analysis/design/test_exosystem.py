@@ -72,7 +72,7 @@ SAID["psi"] = "'psi' by a sensor of its own"
 
 
 @pytest.mark.parametrize(("ship", "disturbances", "ambiguous", "mode", "remedies"), TABLE)
-def test_what_can_be_observed_and_what_would_cure_the_rest(
+def test_ambiguities_and_their_remedies(
     ship: Plant, disturbances: list, ambiguous: list | None, mode: complex, remedies: list
 ) -> None:
     if ambiguous is None:
@@ -87,20 +87,20 @@ def test_what_can_be_observed_and_what_would_cure_the_rest(
     assert list(ambiguity.remedies) == [SAID[cure] for cure in remedies]
     with pytest.raises(UsageError) as raised:
         disturbance_observer(ship, disturbances, frequency=0.1)
-    said = str(raised.value)
+    message = str(raised.value)
     for word in (*map(repr, ambiguous), *ambiguity.remedies, "0 ± 0.6j" if mode else "mode 0 "):
-        assert word in said
-    assert "\n" not in said
+        assert word in message
+    assert "\n" not in message
 
 
-def test_the_cures_cure() -> None:
+def test_remedies_remove_the_ambiguity() -> None:
     both = [moment(CONSTANT), bias()]
     second_gyro = plant([[-1 / 20]], [[1], [1]], "w", "gyro second")
     assert ambiguities(NOMOTO, both) != ()
     assert ambiguities(second_gyro, both) == ambiguities(HEADING_AND_RATE, both) == ()
 
 
-def test_a_disturbance_that_none_of_the_states_shows_is_named_too() -> None:
+def test_indistinguishable_disturbances_are_named() -> None:
     twice = [moment(CONSTANT), moment(CONSTANT, "again")]
     with pytest.raises(
         UsageError, match="'moment' and 'again' cannot be distinguished; measure 'mom"
@@ -123,7 +123,7 @@ def roll(inertia: float) -> tuple[Plant, list[DisturbanceInput]]:
         ("binomial", [0.15, 7.5, 0.125], [-0.05, -0.05, -0.05]),
     ],
 )
-def test_the_roll_example(spectrum: str, gain: list, poles: list) -> None:
+def test_gains_and_poles_of_the_roll_example(spectrum: str, gain: list, poles: list) -> None:
     observer = disturbance_observer(*roll(1000.0), spectrum, frequency=0.05)
     assert pytest.approx(np.array([[0, 1e-3, 0], [0, 0, 1], [0, 0, 0]])) == observer.A
     assert observer.L[:, 0] == pytest.approx(gain, abs=1e-9)
@@ -142,7 +142,7 @@ def test_the_roll_example(spectrum: str, gain: list, poles: list) -> None:
         (100, [-0.00041987, -0.0264498, -0.00032335]),
     ],
 )
-def test_the_errors_of_the_roll_example(secs: float, error: list) -> None:
+def test_estimation_errors_of_the_roll_example(secs: float, error: list) -> None:
     observer = disturbance_observer(*roll(1000.0), frequency=0.05)
     F = observer.A - observer.L @ observer.C
     assert expm(F * secs) @ [0, 0.25, 0.005] == pytest.approx(error, abs=1e-8)
@@ -152,7 +152,7 @@ def test_the_errors_of_the_roll_example(secs: float, error: list) -> None:
     ("spectrum", "of_the_moment_then", "of_the_first", "noise"),
     [("butterworth", 94.7, 108.5, (1, 1)), ("binomial", 46.7, 96.3, (1.08, 0.75))],
 )
-def test_how_long_the_roll_example_takes_to_settle(
+def test_settling_time_of_the_roll_example(
     spectrum: str, of_the_moment_then: float, of_the_first: float, noise: tuple
 ) -> None:
     times = np.arange(0, 400, 0.05)
@@ -170,14 +170,14 @@ def test_how_long_the_roll_example_takes_to_settle(
     assert stds[spectrum] / stds["butterworth"] == pytest.approx(noise, abs=0.005)
 
 
-def test_an_inertia_of_1e12_does_not_break_it() -> None:
+def test_design_with_an_inertia_of_1e12() -> None:
     observer = disturbance_observer(*roll(1e12), frequency=0.05)
     assert observer.L[:, 0] == pytest.approx([0.1, 5e9, 1.25e8], rel=1e-12)
     specific = disturbance_observer(*roll(1.0), frequency=0.05)
     assert specific.L[:, 0] == pytest.approx([0.1, 5e-3, 1.25e-4], rel=1e-12)
 
 
-def test_a_ramp_moment_and_a_wave_of_yaw() -> None:
+def test_observer_of_yaw_with_ramp_moment_and_wave() -> None:
     poles = [*butterworth_poles(3, 0.1), *butterworth_poles(2, 0.4)]
     observer = disturbance_observer(NOMOTO, [moment(RAMP), moment(WAVE, "wave")], poles)
     assert observer.L[:, 0] == pytest.approx(
@@ -186,7 +186,7 @@ def test_a_ramp_moment_and_a_wave_of_yaw() -> None:
     assert observer.names == ("moment", "wave")
 
 
-def test_yaw_and_surge_are_channels_of_their_own() -> None:
+def test_yaw_and_surge_are_separate_channels() -> None:
     both = disturbance_observer(YAW_AND_SURGE, [moment(RAMP), FORCE], frequency=[0.05, 0.1])
     assert both.channels == ((0, 2, 3), (1, 4))
     assert both.L[[1, 4], 1] == pytest.approx([0.13742136, 0.01], abs=1e-8)
@@ -202,7 +202,7 @@ def test_yaw_and_surge_are_channels_of_their_own() -> None:
     assert pytest.approx(both.L, rel=1e-12) == same.L
 
 
-def test_the_kalman_gain_is_that_of_the_augmented_system() -> None:
+def test_kalman_design_equals_the_kalman_gain_of_the_augmented_plant() -> None:
     Q, R = [0, 1e-9, 1e-6, 1e-8], [1e-5, 2e-4]
     observer = disturbance_observer(
         HEADING_AND_RATE, [moment(CONSTANT), bias()], "kalman", state_noise=Q, sensor_noise=R
@@ -212,14 +212,14 @@ def test_the_kalman_gain_is_that_of_the_augmented_system() -> None:
     assert np.sort_complex(observer.poles) == pytest.approx(np.sort_complex(poles), rel=1e-6)
 
 
-def test_a_constant_that_no_noise_moves_has_no_kalman_gain() -> None:
+def test_kalman_design_of_a_constant_without_noise_raises_an_error() -> None:
     with pytest.raises(UsageError, match=r"mode at 0.* no noise drives it"):
         disturbance_observer(
             NOMOTO, [moment(CONSTANT)], "kalman", state_noise=[1.0, 0], sensor_noise=[1.0]
         )
 
 
-def test_a_disturbance_may_act_on_state_and_sensor_at_once() -> None:
+def test_disturbance_on_state_and_sensor() -> None:
     sea = DisturbanceInput("sea", WAVE, on_state={"w": 0.5}, on_sensor={"gyro": 2.0})
     observer = disturbance_observer(NOMOTO, [sea], frequency=0.3)
     assert observer.A[0].tolist() == [-1 / 20, 0.5, 0]
@@ -233,7 +233,7 @@ def test_a_disturbance_may_act_on_state_and_sensor_at_once() -> None:
     st.integers(0, 3),
     st.lists(st.floats(-3, 3), min_size=8, max_size=8),
 )
-def test_an_exosystem_puts_out_an_exponential_times_a_polynomial(
+def test_output_of_an_exosystem_is_an_exponential_times_a_polynomial(
     sigma: float, omega: float, degree: int, start: list
 ) -> None:
     exosystem = Exosystem.exponential(complex(sigma, omega), degree)
@@ -248,7 +248,7 @@ def test_an_exosystem_puts_out_an_exponential_times_a_polynomial(
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"A": np.eye(1, 2)}, r"A is of shape \(1, 2\); expected a square matrix"),
         ({"B": np.ones((2, 1))}, r"B is of shape \(2, 1\); expected \(1, any\)"),
@@ -258,7 +258,7 @@ def test_an_exosystem_puts_out_an_exponential_times_a_polynomial(
         ({"sensors": ()}, "sensors are ; expected 1 different names"),
         (
             {"disturbances": [bias("compass")]},
-            "'compass error' acts on the sensor 'compass'; the",
+            "'compass error' acts on the sensor 'compass'; the pl",
         ),
         ({"disturbances": [moment(RAMP)] * 2}, "disturbances are moment, moment; expected differ"),
         ({"disturbances": [moment(Exosystem(np.eye(2), np.ones((1, 3))))]}, "Cc of 'moment' is of"),
@@ -280,18 +280,18 @@ def test_an_exosystem_puts_out_an_exponential_times_a_polynomial(
         ),
     ],
 )
-def test_what_does_not_fit_is_refused_in_one_line(change: dict, said: str) -> None:
+def test_invalid_arguments_raise_a_one_line_error(change: dict, message: str) -> None:
     fields = {name: getattr(NOMOTO, name) for name in ("A", "B", "C", "states", "sensors")}
     ship = Plant(**{name: change.get(name, value) for name, value in fields.items()})
     request = {"disturbances": [moment(CONSTANT)], "frequency": 0.1}
     request |= {name: value for name, value in change.items() if name not in fields}
-    with pytest.raises(UsageError, match=said) as raised:
+    with pytest.raises(UsageError, match=message) as raised:
         disturbance_observer(ship, **request)
     assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda: Exosystem.polynomial(-1), "degree is -1; expected a whole number from 0"),
         (lambda: Exosystem.polynomial(0.5), "degree is 0.5"),
@@ -299,14 +299,14 @@ def test_what_does_not_fit_is_refused_in_one_line(change: dict, said: str) -> No
         (lambda: Exosystem.exponential(np.nan), "rate.*NaN"),
     ],
 )
-def test_an_exosystem_that_is_none_is_refused(make: object, said: str) -> None:
-    with pytest.raises(UsageError, match=said):
+def test_invalid_exosystem_raises_an_error(make: object, message: str) -> None:
+    with pytest.raises(UsageError, match=message):
         make()
 
 
 @pytest.mark.parametrize("I", [1.0, 1000.0])
 @pytest.mark.parametrize("omega", [0.02, 0.05, 0.3])
-def test_the_gains_of_the_roll_example_are_the_pages_formulas(I: float, omega: float) -> None:
+def test_gains_of_the_roll_example_in_closed_form(I: float, omega: float) -> None:
     formulas = {
         "butterworth": [2 * omega, 2 * I * omega**2, I * omega**3],
         "binomial": [3 * omega, 3 * I * omega**2, I * omega**3],
@@ -319,7 +319,7 @@ def test_the_gains_of_the_roll_example_are_the_pages_formulas(I: float, omega: f
         assert polynomial == pytest.approx(expected, rel=1e-9)
 
 
-def test_of_an_inertia_of_1e12_a_rank_test_in_its_units_fails_and_ours_does_not() -> None:
+def test_unscaled_rank_test_fails_for_an_inertia_of_1e12() -> None:
     """Of 1e16 even one to the last bit."""
     for inertia, tolerance in ((1e12, 1e-10), (1e16, None)):
         ship, disturbances = roll(inertia)
@@ -330,7 +330,7 @@ def test_of_an_inertia_of_1e12_a_rank_test_in_its_units_fails_and_ours_does_not(
         assert ambiguities(ship, disturbances) == ()
 
 
-def test_a_complex_rate_turns_in_two_by_two_blocks() -> None:
+def test_complex_rate_gives_two_by_two_blocks() -> None:
     """Ac = λI + N of size d + 1, Cc = [1 0 …]."""
     ramp = Exosystem.exponential(-0.3, 2)
     assert ramp.Ac.tolist() == (-0.3 * np.eye(3) + np.eye(3, k=1)).tolist()
@@ -342,7 +342,7 @@ def test_a_complex_rate_turns_in_two_by_two_blocks() -> None:
 
 @settings(derandomize=True, max_examples=60, deadline=None)
 @given(st.floats(0.01, 0.5), st.floats(0.2, 1.5), st.floats(0.05, 0.5), st.integers(0, 4))
-def test_whatever_the_plant_and_the_wave_the_poles_are_those_asked_for(
+def test_poles_match_the_request_for_any_plant_and_wave(
     decay: float, wave: float, frequency: float, which: int
 ) -> None:
     ship = plant([[-decay]], [[1]], "w", "gyro")

@@ -83,7 +83,7 @@ def errors_along_the_flight(observer: TickObserver, guess: np.ndarray, count: in
     return np.array(errors)
 
 
-def test_the_jacobian_of_the_test_is_that_of_its_equations() -> None:
+def test_jacobian_of_the_test_model() -> None:
     h = 1e-6
     steps = np.eye(6) * h
     J = [
@@ -92,14 +92,14 @@ def test_the_jacobian_of_the_test_is_that_of_its_equations() -> None:
     assert spacecraft_jacobian(POINT, NO_INPUT) == pytest.approx(np.array(J).T, abs=1e-9)
 
 
-def test_the_gains_of_the_spacecraft() -> None:
+def test_gains_of_the_spacecraft() -> None:
     L = observer_of_the_spacecraft("full").gain(POINT)
     assert L[0] == pytest.approx(ROW_1, abs=1e-9)
     assert L[3] == pytest.approx(ROW_4, abs=1e-9)
     assert observer_of_the_spacecraft("reduced").gain(POINT) == pytest.approx(np.array(N), abs=1e-9)
 
 
-def test_the_closed_form_is_the_multi_level_one() -> None:
+def test_closed_form_equals_multilevel_placement() -> None:
     gains = block_gains(spacecraft_jacobian(POINT, NO_INPUT), -0.5 * np.eye(3), -0.5 * np.eye(3))
     assert pytest.approx(np.array(N), abs=1e-9) == gains.N
     assert gains.L1[0] == pytest.approx(ROW_1, abs=1e-9)
@@ -108,7 +108,7 @@ def test_the_closed_form_is_the_multi_level_one() -> None:
     assert np.vstack((gains.L1, gains.L2)) == pytest.approx(L, abs=1e-12)
 
 
-def test_the_reduced_observers_error_falls_as_its_poles_say() -> None:
+def test_error_of_the_reduced_observer_decays_with_its_poles() -> None:
     errors = errors_along_the_flight(observer_of_the_spacecraft("reduced"), np.zeros(6), 40)
     # methods, section 3, to the digits given; the largest of POINT's rates is 0.06
     assert errors[0] == 0.06
@@ -118,7 +118,7 @@ def test_the_reduced_observers_error_falls_as_its_poles_say() -> None:
     assert errors[40] == pytest.approx(1.4e-10, abs=5e-12)
 
 
-def test_the_full_observer_finds_the_rates_from_nothing() -> None:
+def test_full_observer_converges_from_zero_rates() -> None:
     guess = np.r_[POINT[:3], np.zeros(3)]
     errors = errors_along_the_flight(observer_of_the_spacecraft("full"), guess, 40)
     assert errors[10] < 0.05 * errors[0]
@@ -127,7 +127,7 @@ def test_the_full_observer_finds_the_rates_from_nothing() -> None:
 
 @pytest.mark.parametrize("order", ["full", "reduced"])
 @pytest.mark.parametrize("theta", [np.pi / 2, -np.pi / 2])
-def test_at_cos_theta_zero_it_says_so(order: str, theta: float) -> None:
+def test_singular_euler_angles_raise_an_error(order: str, theta: float) -> None:
     there, at_rest = np.array([[0.1, theta, 0.3, 0.05, -0.04, 0.06], [0.1, theta, 0, 0, 0, 0]])
     for x in (there, at_rest):
         with pytest.raises(UsageError, match=r"singular there.*cos θ = 0.*other coordinates"):
@@ -142,7 +142,7 @@ def test_at_cos_theta_zero_it_says_so(order: str, theta: float) -> None:
             broken.gain(x)
 
 
-def test_the_closed_form_says_so_too() -> None:
+def test_closed_form_raises_an_error_for_a_singular_block() -> None:
     A = block_diag(np.zeros((2, 2)), np.eye(2))
     with pytest.raises(UsageError, match=r"A12, \(2, 2\), of A \(4, 4\) is singular.*cos θ = 0"):
         block_gains(A, -np.eye(2), -np.eye(2))
@@ -150,7 +150,7 @@ def test_the_closed_form_says_so_too() -> None:
 
 @settings(derandomize=True, max_examples=40, deadline=None)
 @given(st.integers(1, 3), st.integers(0, 2**32 - 1))
-def test_the_closed_form_gives_both_orders_their_poles(m: int, seed: int) -> None:
+def test_closed_form_places_the_poles_of_both_orders(m: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     A, Phi0, Phi1 = rng.standard_normal((2 * m, 2 * m)), *rng.standard_normal((2, m, m))
     A[:m, m:] = np.linalg.qr(A[:m, m:])[0]  # well observable
@@ -193,7 +193,7 @@ SHIP_POINT, SHIP_INPUT = np.array([0.01, 1e-4, 7.0]), np.array([0.35, 0.0, 36.0]
 RATE_AND_SPEED = np.eye(3)[[0, 2]]
 
 
-def test_the_gain_of_the_identification_papers_ship() -> None:
+def test_gain_of_the_ship_of_the_identification_paper() -> None:
     assert ship_jacobian(SHIP_POINT, SHIP_INPUT) == pytest.approx(
         np.array([[0, 1, 0], [-1.608e-4, -0.0266666667, 6.9373026368e-7], [-0.002, 0, -0.0042]]),
         abs=1e-9,
@@ -207,7 +207,7 @@ def test_the_gain_of_the_identification_papers_ship() -> None:
 
 
 @pytest.mark.parametrize("order", ["full", "reduced"])
-def test_the_ships_unmeasured_rate_is_found(order: str) -> None:
+def test_unmeasured_rate_of_the_ship_is_estimated(order: str) -> None:
     observer = tick_observer(
         ship, ship_jacobian, RATE_AND_SPEED, [-0.1] * (3 if order == "full" else 1), order=order
     )
@@ -220,7 +220,7 @@ def test_the_ships_unmeasured_rate_is_found(order: str) -> None:
     assert x == pytest.approx(run[400], abs=1e-9)
 
 
-def test_inputs_may_change_within_a_tick() -> None:
+def test_inputs_that_change_within_a_tick() -> None:
     observer = tick_observer(ship, ship_jacobian, RATE_AND_SPEED, [-0.1] * 3)
     y = np.tile([0.01, 7.0], (3, 1))
     held = observer.step(SHIP_POINT, y, SHIP_INPUT, tick_secs=1.0)
@@ -229,7 +229,7 @@ def test_inputs_may_change_within_a_tick() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"C": np.ones(6)}, r"C is of shape \(6,\)"),
         ({"C": [[np.nan] * 6]}, r"C, \(1, 6\), has NaN"),
@@ -242,15 +242,15 @@ def test_inputs_may_change_within_a_tick() -> None:
         ({"order": "reduced", "C": ANGLES[[0, 0, 1]], "poles": [-1] * 3}, "mixes states"),
     ],
 )
-def test_an_observer_that_does_not_fit_is_refused(change: dict, said: str) -> None:
+def test_invalid_observer_raises_an_error(change: dict, message: str) -> None:
     request = {"C": ANGLES, "poles": [-0.5] * 6} | change
-    with pytest.raises(UsageError, match=said) as raised:
+    with pytest.raises(UsageError, match=message) as raised:
         tick_observer(spacecraft, spacecraft_jacobian, **request)
     assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"y": np.zeros((2, 3))}, r"y is of shape \(2, 3\); expected an odd number of rows"),
         ({"y": np.zeros((3, 2))}, r"y is of shape \(3, 2\); expected \(any, 3\)"),
@@ -261,14 +261,14 @@ def test_an_observer_that_does_not_fit_is_refused(change: dict, said: str) -> No
     ],
 )
 @pytest.mark.parametrize("order", ["full", "reduced"])
-def test_a_tick_that_does_not_fit_is_refused(order: str, change: dict, said: str) -> None:
+def test_invalid_tick_raises_an_error(order: str, change: dict, message: str) -> None:
     request = {"x": POINT, "y": np.tile(POINT[:3], (3, 1)), "tick_secs": 1.0} | change
-    with pytest.raises(UsageError, match=said):
+    with pytest.raises(UsageError, match=message):
         observer_of_the_spacecraft(order).step(**request)
 
 
 @pytest.mark.parametrize(("order", "count"), [("full", 6), ("reduced", 3)])
-def test_an_estimate_that_runs_away_within_a_tick_is_refused(order: str, count: int) -> None:
+def test_diverging_estimate_raises_an_error(order: str, count: int) -> None:
     def away(x: np.ndarray, _: np.ndarray) -> np.ndarray:
         return np.exp(1e3 * np.abs(x))
 
@@ -277,7 +277,7 @@ def test_an_estimate_that_runs_away_within_a_tick_is_refused(order: str, count: 
         observer.step(POINT, np.tile(POINT[:3], (3, 1)), tick_secs=1.0)
 
 
-def test_a_jacobian_that_does_not_fit_or_shows_nothing_is_refused() -> None:
+def test_invalid_or_unobservable_jacobian_raises_an_error() -> None:
     wide = tick_observer(spacecraft, lambda _x, _u: np.eye(3, 6), ANGLES, [-0.5] * 6)
     with pytest.raises(UsageError, match=r"jacobian is of shape \(3, 6\); expected \(6, 6\)"):
         wide.gain(POINT)
@@ -290,7 +290,7 @@ def test_a_jacobian_that_does_not_fit_or_shows_nothing_is_refused() -> None:
             blind.gain(POINT)
 
 
-def test_on_the_ship_a_frozen_gain_is_hardly_to_be_told_from_one_found_at_each_tick() -> None:
+def test_frozen_gain_of_the_ship_is_as_good_as_one_per_tick() -> None:
     """Her rudder swings by 20°, the estimate starts far off."""
     tick, turn = 2.0, 2 * np.pi / 120
     times = np.arange(401) * tick / 4

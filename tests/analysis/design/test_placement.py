@@ -45,7 +45,7 @@ def systems(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 @SYSTEMS
 @given(systems())
-def test_the_poles_are_those_asked_for_repeated_ones_too(
+def test_placed_poles_match_the_request_even_if_repeated(
     system: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> None:
     A, C, poles = system
@@ -54,7 +54,7 @@ def test_the_poles_are_those_asked_for_repeated_ones_too(
 
 @SYSTEMS
 @given(systems())
-def test_all_poles_equal_are_placed_where_scipy_refuses(
+def test_equal_poles_are_placed_where_scipy_raises(
     system: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> None:
     A, C, _ = system
@@ -67,7 +67,7 @@ def test_all_poles_equal_are_placed_where_scipy_refuses(
 
 @SYSTEMS
 @given(systems(), st.integers(0, 2**32 - 1))
-def test_the_gain_is_the_same_observer_in_whatever_units_the_states_are(
+def test_gain_does_not_depend_on_the_units_of_the_states(
     system: tuple[np.ndarray, np.ndarray, np.ndarray], seed: int
 ) -> None:
     A, C, poles = system
@@ -79,7 +79,7 @@ def test_the_gain_is_the_same_observer_in_whatever_units_the_states_are(
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5])
 @pytest.mark.parametrize("seed", range(5))
-def test_one_measurement_has_one_gain_and_the_libraries_find_it_too(n: int, seed: int) -> None:
+def test_gain_of_one_measurement_matches_scipy_and_control(n: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     A, C = rng.standard_normal((n, n)), rng.standard_normal((1, n))
     poles = butterworth_poles(n, 2.0)  # every pair straddles two levels
@@ -90,7 +90,7 @@ def test_one_measurement_has_one_gain_and_the_libraries_find_it_too(n: int, seed
 
 @pytest.mark.parametrize(("n", "m"), [(4, 2), (6, 3), (8, 3)])
 @pytest.mark.filterwarnings("ignore:Convergence was not reached")
-def test_it_is_nearer_to_the_poles_than_scipy(n: int, m: int) -> None:
+def test_placement_is_more_accurate_than_scipy(n: int, m: int) -> None:
     rng, ours, theirs = np.random.default_rng(0), [], []
     for _ in range(30):
         A, C, poles = (
@@ -109,7 +109,9 @@ def test_it_is_nearer_to_the_poles_than_scipy(n: int, m: int) -> None:
     ("sizes", "pairs"),
     [((3, 3), 3), ((1, 1), 1), ((1, 1, 1, 1), 2), ((3, 2, 1), 3), ((3, 2, 2, 1), 4), ((2, 2), 2)],
 )
-def test_pairs_that_do_not_fit_the_levels_straddle_them(sizes: tuple[int, ...], pairs: int) -> None:
+def test_complex_pairs_are_shared_between_levels_of_odd_size(
+    sizes: tuple[int, ...], pairs: int
+) -> None:
     rng = np.random.default_rng(1)
     # chains of integrators as long as there are levels: level k has one state of each that long
     lengths = [sum(size > i for size in sizes) for i in range(sizes[0])]
@@ -121,13 +123,13 @@ def test_pairs_that_do_not_fit_the_levels_straddle_them(sizes: tuple[int, ...], 
         assert polynomial_error(A - place_multilevel(A, C, poles) @ C, poles) < 1e-12
 
 
-def test_the_ship_of_the_identification_paper() -> None:
+def test_gain_of_the_ship_of_the_identification_paper() -> None:
     L = place_multilevel(SHIP, SHIP_C, [-0.1] * 3)
     assert pytest.approx(np.array(SHIP_GAIN), abs=1e-9) == L
     assert np.poly(SHIP - L @ SHIP_C) == pytest.approx([1, 0.3, 0.03, 0.001], abs=1e-9)
 
 
-def test_an_inertia_of_1e12_hides_nothing() -> None:
+def test_an_inertia_of_1e12_leaves_every_mode_observable() -> None:
     I = 1e12
     roll = np.array([[0, 1 / I, 0], [0, 0, 1], [0, 0, 0]])
     C = np.array([[1.0, 0, 0]])
@@ -148,7 +150,9 @@ def test_an_inertia_of_1e12_hides_nothing() -> None:
         (np.kron(np.eye(2), [[0, 1], [-1, 0]]) + np.eye(4, k=2), [1j]),  # a defective pair
     ],
 )
-def test_hidden_modes_are_named_defective_or_not(hidden: object, modes: list, seed: int) -> None:
+def test_unobservable_modes_are_detected_even_if_defective(
+    hidden: object, modes: list, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     own = np.asarray(hidden, dtype=float)
     k = len(own)
@@ -162,7 +166,7 @@ def test_hidden_modes_are_named_defective_or_not(hidden: object, modes: list, se
     assert unobservable_modes(seen, C[:, :3]) == ()
 
 
-def test_only_the_states_that_move_in_a_hidden_mode_are_named() -> None:
+def test_states_of_an_unobservable_mode_are_those_with_a_component_in_it() -> None:
     A = block_diag([[-0.05, 1], [0, 0]], [[-1e-3]], [[-0.2]])
     (mode,) = unobservable_modes(A, [[1, 0, 0, 0], [0, 0, 0, 1]])
     assert (mode.value, mode.states) == (-1e-3, (2,))
@@ -172,7 +176,7 @@ GOOD_A, GOOD_C = [[0, 1], [0, 0]], [[1, 0]]
 
 
 @pytest.mark.parametrize(
-    ("A", "C", "poles", "said"),
+    ("A", "C", "poles", "message"),
     [
         ([[0, 1]], GOOD_C, [-1, -1], r"A is of shape \(1, 2\); expected a square matrix"),
         (GOOD_A, [[1, 0, 0]], [-1, -1], r"C is of shape \(1, 3\); expected \(any, 2\)"),
@@ -185,22 +189,22 @@ GOOD_A, GOOD_C = [[0, 1], [0, 0]], [[1, 0]]
         (GOOD_A, GOOD_C, [-1 + 1j, -1], r"poles, \(2,\), have -1\+1j without its conjugate"),
         (GOOD_A, GOOD_C, [-1 - 1j, -1], r"poles, \(2,\), have -1-1j without its conjugate"),
         (GOOD_A, GOOD_C, [-1 + 1j] * 2, r"without its conjugate"),
-        (GOOD_A, GOOD_C, "fast", r"poles are no numbers"),
+        (GOOD_A, GOOD_C, "fast", r"poles are not numbers"),
         (GOOD_A, [[0, 1]], [-1, -2], r"A \(2, 2\) and C \(1, 2\): the mode at 0 cannot be seen"),
         ([[0, 2], [-2, 0]], [[0, 0]], [-1, -2], r"the mode at 0 ± 2j cannot be seen"),
     ],
 )
-def test_what_does_not_fit_is_refused_in_one_line(
-    A: object, C: object, poles: object, said: str
+def test_invalid_arguments_raise_a_one_line_error(
+    A: object, C: object, poles: object, message: str
 ) -> None:
-    with pytest.raises(UsageError, match=said) as raised:
+    with pytest.raises(UsageError, match=message) as raised:
         place_multilevel(A, C, poles)
     assert "\n" not in str(raised.value)
 
 
-def test_poles_that_rounding_moves_are_refused() -> None:
+def test_poles_moved_by_rounding_raise_an_error() -> None:
     A = np.diag(np.linspace(1, 1.05, 8))
-    with pytest.raises(UsageError, match="rounding leaves"):
+    with pytest.raises(UsageError, match="rounding changes"):
         place_multilevel(A, np.ones((1, 8)), -np.arange(1, 9))
 
 
@@ -214,7 +218,7 @@ def test_poles_that_rounding_moves_are_refused() -> None:
         (10, 2, 7e-11, 1e-1, 1e-8),  # the last our own: the page's 2e-10 holds of 97 in 100
     ],
 )
-def test_of_100_random_systems_it_is_as_near_as_the_page_says(
+def test_accuracy_over_100_random_systems(
     n: int, m: int, median: float, worst: float, equal: float
 ) -> None:
     rng, off, of_equal = np.random.default_rng(0), [], []
@@ -230,9 +234,7 @@ def test_of_100_random_systems_it_is_as_near_as_the_page_says(
 
 
 @pytest.mark.parametrize(("n", "m"), [(3, 1), (3, 2), (4, 2), (5, 2), (6, 3), (8, 3), (10, 2)])
-def test_a_system_of_full_ranks_has_as_many_levels_as_measurements_go_into_states(
-    n: int, m: int
-) -> None:
+def test_number_of_levels_of_a_system_of_full_ranks(n: int, m: int) -> None:
     """J = ceil(n / m) - 1, the first level being the zeroth."""
     rng = np.random.default_rng(2)
     levels = _levels(rng.standard_normal((n, n)), rng.standard_normal((n, m)))
@@ -241,7 +243,7 @@ def test_a_system_of_full_ranks_has_as_many_levels_as_measurements_go_into_state
     assert last == n - m * (len(levels) - 1)  # and so large is the last Φ
 
 
-def test_channels_placed_together_make_the_yaw_rate_hundreds_of_times_worse() -> None:
+def test_placing_channels_together_amplifies_the_noise_of_the_yaw_rate() -> None:
     """At identical poles: 170 times, says the page, of noises it does not tell."""
     yaw, surge = np.array([[-0.05, 1, 0], [0, 0, 1], [0, 0, 0]]), np.array([[-0.004, 1], [0, 0]])
     of_yaw, of_surge = butterworth_poles(3, 0.05), butterworth_poles(2, 0.1)
@@ -259,7 +261,7 @@ def test_channels_placed_together_make_the_yaw_rate_hundreds_of_times_worse() ->
     assert stds[1] > 170 * stds[0]
 
 
-def test_what_the_library_refuses_is_placed_here() -> None:
+def test_poles_that_scipy_rejects_are_placed() -> None:
     A, C = np.array([[0.0, 1], [0, 0]]), np.array([[1.0, 0]])
     with pytest.raises(ValueError, match="repeated"):  # beyond the rank of C
         control.place(A.T, C.T, [-1.0, -1.0])

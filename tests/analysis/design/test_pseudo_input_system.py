@@ -27,7 +27,7 @@ def derivative(x: np.ndarray, delta: float, rate: float, n: float, n_dot: float)
     return A @ x + B @ pseudo_inputs(x, delta, rate, n, n_dot, TABLE1.alpha3)
 
 
-def test_the_point_check_of_the_corrected_pseudo_inputs() -> None:
+def test_corrected_pseudo_inputs_at_one_point() -> None:
     w, w_dot, v, delta, rate, n, n_dot = 0.3, 0.01, 9.0, 20.0, 2.5, 80.0, 0.5
     w_ddot = yaw_acceleration_rate(TABLE1, w, w_dot, v, n, delta, rate)
     v_dot = surge_acceleration(TABLE1, w, v, n)
@@ -38,7 +38,7 @@ def test_the_point_check_of_the_corrected_pseudo_inputs() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_x_plus_b_u_is_the_derivative_of_the_equations_themselves(seed: int) -> None:
+def test_a_x_plus_b_u_is_the_derivative_of_the_ship_model(seed: int) -> None:
     rng = np.random.default_rng(seed)
     w, w_dot, v = rng.uniform([-0.6, -0.02, 3], [0.6, 0.02, 12])
     delta, rate, n, n_dot = rng.uniform([-35, -2.5, 40, -1], [35, 2.5, 120, 1])
@@ -63,7 +63,7 @@ def test_a_x_plus_b_u_is_the_derivative_of_the_equations_themselves(seed: int) -
     assert x_dot[[2, 4]] == pytest.approx(jerks, rel=1e-5, abs=1e-9)
 
 
-def test_the_papers_printed_covariance_is_the_riccati_equations_at_378_s() -> None:
+def test_printed_covariance_is_the_riccati_solution_at_378_s() -> None:
     A, _ = pseudo_input_matrices(TABLE1, 1.0)
     C = np.eye(5)[[0, 3]]
 
@@ -80,7 +80,7 @@ def test_the_papers_printed_covariance_is_the_riccati_equations_at_378_s() -> No
     assert [P[3, 3], P[4, 4]] == pytest.approx([2.06180082, 13.78], abs=1e-6)
 
 
-def test_discretised_noise_is_the_integral_it_stands_for(vessel: Vessel) -> None:
+def test_discretised_noise_equals_its_integral(vessel: Vessel) -> None:
     A, _ = pseudo_input_matrices(vessel.coefficients, 1.0)
     Q, dt = np.diag([1.0, 0.3, 0.1, 2.0, 0.5]), 5.0
     F, Qd = discretise(A, Q, dt)
@@ -93,12 +93,12 @@ def test_discretised_noise_is_the_integral_it_stands_for(vessel: Vessel) -> None
     assert Qd == pytest.approx(summed, rel=1e-10)
 
 
-def test_butterworth_poles_are_the_roots_of_their_polynomial() -> None:
+def test_butterworth_poles_are_roots_of_the_butterworth_polynomial() -> None:
     assert np.poly(butterworth_poles(3, 0.05)) == pytest.approx([1, 0.1, 0.005, 0.000125])
     assert np.poly(butterworth_poles(2, 2.0)) == pytest.approx([1, 2 * np.sqrt(2), 4])
 
 
-def test_a_discrete_observer_has_the_poles_asked_for_and_says_its_noise() -> None:
+def test_poles_and_noise_gain_of_a_discrete_observer() -> None:
     A = np.array([[0, 1, 0], [-1e-4, -0.03, 1], [0, 0, 0]])
     C, poles, dt = np.array([[1.0, 0, 0]]), butterworth_poles(3, 0.05), 0.5
     observer = discrete_observer(A, C, poles, dt)
@@ -134,7 +134,7 @@ MOTION_ROWS = [
 ]
 
 
-def test_the_matrices_are_the_pages_row_by_row() -> None:
+def test_matrices_row_by_row() -> None:
     A, B = pseudo_input_matrices(TABLE1, 1.0)
     assert pytest.approx(np.array(MOTION_ROWS), rel=1e-15) == A
     for found, row in zip(B, INPUT_ROWS, strict=True):
@@ -145,7 +145,7 @@ def test_the_matrices_are_the_pages_row_by_row() -> None:
     assert {(int(i) + 1, int(j) + 1) for i, j in np.argwhere(port != B)} == changed
 
 
-def test_the_five_states_are_shown_but_for_w_ddot_which_decays_and_v_dot_which_does_not() -> None:
+def test_unobservable_states_of_the_five_state_model() -> None:
     A, _ = pseudo_input_matrices(TABLE1, 1.0)
     C = np.eye(5)[[0, 3]]
     seen = np.vstack([C @ np.linalg.matrix_power(A, k) for k in range(5)])
@@ -156,7 +156,7 @@ def test_the_five_states_are_shown_but_for_w_ddot_which_decays_and_v_dot_which_d
         kalman_gain(A, np.eye(5), C, 0.01 * np.eye(5), 400 * np.eye(2))
 
 
-def test_the_printed_covariance_is_stationary_in_yaw_and_still_on_its_way_in_surge() -> None:
+def test_printed_covariance_is_stationary_in_yaw_but_not_in_surge() -> None:
     A, _ = pseudo_input_matrices(TABLE1, 1.0)
     yaw = kalman_gain(A[:2, :2], np.eye(2), [[1, 0]], 0.01 * np.eye(2), 400).covariance
     surge = kalman_gain([[0]], [[1]], [[1]], 0.01, 400).covariance
@@ -165,7 +165,7 @@ def test_the_printed_covariance_is_stationary_in_yaw_and_still_on_its_way_in_sur
     assert pytest.approx(13.78, abs=1e-12) == 10 + 0.01 * 378  # v' has no other noise and no end
 
 
-def test_the_libraries_discretise_alike(vessel: Vessel) -> None:
+def test_discretisation_matches_scipy_and_control(vessel: Vessel) -> None:
     A, B = pseudo_input_matrices(vessel.coefficients, 1.0)
     C, D, dt = np.eye(5)[[0, 3]], np.zeros((2, 20)), 0.5
     F, _ = discretise(A, np.eye(5), dt)

@@ -41,26 +41,26 @@ TWO_DECAYS, BOTH = np.diag([-2, -0.2]), np.array([[1.0], [1]])
         (0.2, (1e-8, 0), [0.3695245931, 0.0312150865]),
     ],
 )
-def test_the_ships_filters(shift: float, G: tuple[float, float], gain: list[float]) -> None:
+def test_gains_of_the_ship_filters(shift: float, G: tuple[float, float], gain: list[float]) -> None:
     found = quality_filter(SHIP, RATE, R1, R2, G=np.diag(G), shift=shift)
     assert found.gain[:, 0] == pytest.approx(gain, abs=1e-8)
     assert found.residual < 1e-12
 
 
-def test_three_cycles_of_the_double_integrator() -> None:
+def test_three_design_cycles_of_the_double_integrator() -> None:
     last = cycle_regulator(DOUBLE, PUSH, np.eye(2), 1, 3)[-1]
     expected = [-np.sqrt(3), -np.sqrt(3 + 2 * np.sqrt(3))]
     assert last.gain[0] == pytest.approx(expected, abs=1e-8)
 
 
-def test_the_double_integrator_with_shift_and_weight_on_the_rates() -> None:
+def test_double_integrator_with_shift_and_weight_on_the_rates() -> None:
     found = quality_regulator(DOUBLE, PUSH, np.eye(2), 1, G=np.diag([0.5, 2]), shift=1)
     assert found.gain[0] == pytest.approx([-1.7532528806, -2.5631300883], abs=1e-8)
     expected = [-1.2815650442 - 0.3329323028j, -1.2815650442 + 0.3329323028j]
     assert found.poles == pytest.approx(np.array(expected), abs=1e-8)
 
 
-def test_the_scalars_cycles_go_towards_minus_two() -> None:
+def test_cycles_of_a_scalar_system_converge_to_minus_two() -> None:
     done = cycle_regulator([[0.5]], [[1]], 1, 1, 60, G=0.25)
     poles = [step.poles[0].real for step in done]
     assert poles[:3] == pytest.approx([-1, -1.2649110641, -1.4422205102], abs=1e-8)
@@ -71,7 +71,9 @@ def test_the_scalars_cycles_go_towards_minus_two() -> None:
     ("shift", "settling", "noise"),
     [(0, 30.5, 1), (0.1, 22.7, 1.07), (0.2, 17.0, 1.23), (0.4, 10.1, 1.64), (0.8, 5.1, 2.34)],
 )
-def test_the_knob_of_speed(shift: float, settling: float, noise: float) -> None:
+def test_shift_trades_settling_time_against_noise(
+    shift: float, settling: float, noise: float
+) -> None:
     optimal = kalman_gain(SHIP, np.eye(2), RATE, R1, R2).covariance[0, 0]
     K = quality_filter(SHIP, RATE, R1, R2, shift=shift).gain
     of_it = error_covariance(SHIP, K, RATE, R1, R2)[0, 0]
@@ -87,7 +89,7 @@ def test_the_knob_of_speed(shift: float, settling: float, noise: float) -> None:
 @pytest.mark.parametrize(
     ("G", "noise", "slowest"), [(1e-10, 1.034, -0.1313), (1e-9, 1.387, -0.0316)]
 )
-def test_the_knob_of_damping(G: float, noise: float, slowest: float) -> None:
+def test_rate_weight_trades_damping_against_noise(G: float, noise: float, slowest: float) -> None:
     optimal = kalman_gain(SHIP, np.eye(2), RATE, R1, R2).covariance[0, 0]
     found = quality_filter(SHIP, RATE, R1, R2, G=np.diag([0, G]))
     of_it = error_covariance(SHIP, found.gain, RATE, R1, R2)[0, 0]
@@ -96,7 +98,7 @@ def test_the_knob_of_damping(G: float, noise: float, slowest: float) -> None:
     assert found.poles[-1].real == pytest.approx(slowest, abs=5e-5)
 
 
-def test_different_shifts_that_destabilise_are_refused_by_the_poles_name() -> None:
+def test_destabilising_shifts_raise_an_error_with_the_pole() -> None:
     projectors = decay_projectors(TWO_DECAYS, 1.0)
     assert_allclose(projectors, [np.diag([1, 0]), np.diag([0, 1])])
     with pytest.raises(UsageError, match=r"poles left of -0\.5, and one is at 0\.2164316;"):
@@ -107,7 +109,7 @@ def test_different_shifts_that_destabilise_are_refused_by_the_poles_name() -> No
         quality_filter(TWO_DECAYS, BOTH.T, np.zeros((2, 2)), 1, shift=(6, 1), projectors=projectors)
 
 
-def test_the_gain_that_is_refused_is_the_pages() -> None:
+def test_gain_of_the_destabilising_shifts() -> None:
     shifted = TWO_DECAYS + np.diag([6, 1]) / 2
     L = quality_regulator(shifted, BOTH, np.zeros((2, 2)), 1).gain
     assert L[0] == pytest.approx([-3.7142857, 1.1142857], abs=5e-8)
@@ -122,7 +124,7 @@ def test_the_gain_that_is_refused_is_the_pages() -> None:
         (1e-4, [2.91, 1.27, 2.09, 2.97, 3.84], 2),  # taken for ten thousand times less noisy
     ],
 )
-def test_the_cascade_repairs_a_first_stage_that_is_too_fast_and_nothing_else(
+def test_cascade_improves_only_a_first_stage_that_is_too_fast(
     factor: float, errors: list[float], best: int
 ) -> None:
     first = quality_filter(SHIP, RATE, R1, factor * R2).gain
@@ -133,7 +135,7 @@ def test_the_cascade_repairs_a_first_stage_that_is_too_fast_and_nothing_else(
     assert f"stage {best} of 5 is the best" in found.verdict
 
 
-def test_a_cascade_says_where_it_helped() -> None:
+def test_summary_of_a_cascade() -> None:
     first = quality_filter(SHIP, RATE, R1, 1e-4 * R2).gain
     found = cascade(SHIP, RATE, R1, R2, first, stages=2, correlation_secs=10)
     assert found.verdict == (
@@ -159,7 +161,7 @@ def random_regulator(
 
 @FEW
 @given(SEEDS, st.floats(0, 3))
-def test_every_pole_is_left_of_the_bound_and_the_equation_holds(seed: int, c: float) -> None:
+def test_poles_meet_the_bound_and_the_riccati_equation_holds(seed: int, c: float) -> None:
     A, B, P, R, G = random_regulator(seed)
     found = quality_regulator(A, B, P, R, G=G, shift=c)
     Q, heavier = found.cost, R + B.T @ G @ B
@@ -180,7 +182,7 @@ def test_every_pole_is_left_of_the_bound_and_the_equation_holds(seed: int, c: fl
 
 @FEW
 @given(SEEDS, st.floats(0, 3))
-def test_the_filter_is_the_regulators_dual(seed: int, c: float) -> None:
+def test_filter_is_the_dual_of_the_regulator(seed: int, c: float) -> None:
     A, B, P, R, G = random_regulator(seed)
     L = quality_regulator(A.T, B, P, R, G=G, shift=c).gain
     assert_allclose(quality_filter(A, B.T, P, R, G=G, shift=c).gain, -L.T, rtol=1e-8, atol=1e-10)
@@ -188,7 +190,7 @@ def test_the_filter_is_the_regulators_dual(seed: int, c: float) -> None:
 
 @FEW
 @given(SEEDS)
-def test_without_shift_and_weight_they_are_controls(seed: int) -> None:
+def test_without_shift_and_weight_the_gains_match_control(seed: int) -> None:
     A, B, P, R, _ = random_regulator(seed)
     P, R = (P + P.T) / 2, (R + R.T) / 2
     K, _, _ = control.lqr(A, B, P, R)
@@ -200,7 +202,7 @@ def test_without_shift_and_weight_they_are_controls(seed: int) -> None:
 
 @FEW
 @given(SEEDS, st.floats(0.01, 3))
-def test_one_shift_is_the_ordinary_design_of_a_shifted_system(seed: int, c: float) -> None:
+def test_one_shift_equals_the_lq_design_of_a_shifted_system(seed: int, c: float) -> None:
     A, B, P, R, _ = random_regulator(seed)
     shifted = A + c / 2 * np.eye(len(A))
     L = quality_regulator(A, B, P, R, shift=c).gain
@@ -209,7 +211,7 @@ def test_one_shift_is_the_ordinary_design_of_a_shifted_system(seed: int, c: floa
 
 @FEW
 @given(SEEDS, st.floats(0, 2))
-def test_without_weights_a_slow_eigenvalue_is_mirrored_and_a_fast_one_stays(
+def test_without_weights_slow_eigenvalues_are_mirrored_and_fast_ones_kept(
     seed: int, c: float
 ) -> None:
     A, B, P, R, _ = random_regulator(seed)
@@ -222,9 +224,7 @@ def test_without_weights_a_slow_eigenvalue_is_mirrored_and_a_fast_one_stays(
 
 @FEW
 @given(SEEDS, st.integers(1, 6))
-def test_cycles_without_weight_on_the_rates_are_one_design_with_j_times_p(
-    seed: int, cycles: int
-) -> None:
+def test_cycles_without_rate_weight_equal_one_design_with_j_times_p(seed: int, cycles: int) -> None:
     A, B, P, R, _ = random_regulator(seed)
     done = cycle_regulator(A, B, P, R, cycles)
     assert len(done) == cycles
@@ -235,9 +235,7 @@ def test_cycles_without_weight_on_the_rates_are_one_design_with_j_times_p(
 
 @FEW
 @given(SEEDS, st.integers(1, 6))
-def test_cycles_of_one_input_with_weight_are_one_design_with_a_smaller_r(
-    seed: int, cycles: int
-) -> None:
+def test_cycles_with_rate_weight_equal_one_design_with_a_smaller_r(seed: int, cycles: int) -> None:
     A, B, P, R, G = random_regulator(seed)
     B, R = B[:, :1], R[:1, :1]
     weight = (B.T @ G @ B).item()
@@ -252,7 +250,7 @@ def test_cycles_of_one_input_with_weight_are_one_design_with_a_smaller_r(
 
 @FEW
 @given(SEEDS, st.floats(-1, 2))
-def test_the_projectors_split_the_motions(seed: int, border: float) -> None:
+def test_projectors_separate_fast_and_slow_modes(seed: int, border: float) -> None:
     A = random_regulator(seed)[0]
     values = np.linalg.eigvals(A)
     assume(np.abs(values.real + border).min() > 0.02)
@@ -282,17 +280,17 @@ UNFIT: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("changed", "said"), UNFIT)
-def test_a_regulator_of_what_does_not_fit_is_refused_in_one_line(
-    changed: dict[str, ArrayLike], said: str
+@pytest.mark.parametrize(("changed", "message"), UNFIT)
+def test_invalid_regulator_arguments_raise_a_one_line_error(
+    changed: dict[str, ArrayLike], message: str
 ) -> None:
     arguments: dict[str, Any] = {"A": DOUBLE, "B": PUSH, "P": np.eye(2), "R": 1}
-    with pytest.raises(UsageError, match=said) as caught:
+    with pytest.raises(UsageError, match=message) as caught:
         quality_regulator(**(arguments | changed))
     assert "\n" not in str(caught.value)
 
 
-def test_a_filter_of_what_does_not_fit_is_refused() -> None:
+def test_invalid_filter_arguments_raise_an_error() -> None:
     with pytest.raises(UsageError, match=r"S is of shape \(1, 3\); expected \(any, 2\)"):
         quality_filter(SHIP, [[1, 0, 0]], R1, R2)
     with pytest.raises(UsageError, match=r"R2, .* expected a positive definite"):
@@ -301,9 +299,9 @@ def test_a_filter_of_what_does_not_fit_is_refused() -> None:
         quality_filter(np.diag([-1, -1.0]), RATE, np.eye(2), 1, shift=3)
 
 
-def test_cycles_and_stages_are_counted() -> None:
-    for cycles, said in ((0, "not below 1"), (1.5, "expected a whole number")):
-        with pytest.raises(UsageError, match=f"cycles is {cycles}; expected .*{said[-6:]}"):
+def test_invalid_cycles_and_stages_raise_an_error() -> None:
+    for cycles, message in ((0, "not below 1"), (1.5, "expected a whole number")):
+        with pytest.raises(UsageError, match=f"cycles is {cycles}; expected .*{message[-6:]}"):
             cycle_regulator(DOUBLE, PUSH, np.eye(2), 1, cycles)
     with pytest.raises(UsageError, match="stages is 0; expected"):
         cascade(SHIP, RATE, R1, R2, [[0.2], [0.01]], stages=0, correlation_secs=10)
@@ -313,7 +311,7 @@ def test_cycles_and_stages_are_counted() -> None:
         cascade(SHIP, RATE, R1, R2, [[-1], [0]], stages=2, correlation_secs=10)
 
 
-# ---- methods, section 2, what is said there without a table
+# ---- methods, section 2, what is message there without a table
 
 
 def equation_of(
@@ -329,7 +327,7 @@ def equation_of(
 
 @FEW
 @given(SEEDS, st.floats(0, 3))
-def test_the_equation_is_one_standard_riccati_equation(seed: int, c: float) -> None:
+def test_gain_matches_the_standard_riccati_equation(seed: int, c: float) -> None:
     A, B, P, R, G = random_regulator(seed)
     Q, L = equation_of(A, B, P, R, G, c)
     assume(np.linalg.norm(L) < 1e3)
@@ -340,7 +338,7 @@ def test_the_equation_is_one_standard_riccati_equation(seed: int, c: float) -> N
 
 @FEW
 @given(SEEDS)
-def test_a_weight_on_the_rates_is_controls_cross_term(seed: int) -> None:
+def test_rate_weight_equals_the_cross_term_of_control(seed: int) -> None:
     A, B, P, R, G = random_regulator(seed)
     weight, heavier = P + A.T @ G @ A, R + B.T @ G @ B
     K, _, _ = control.lqr(A, B, (weight + weight.T) / 2, (heavier + heavier.T) / 2, A.T @ G @ B)
@@ -350,7 +348,7 @@ def test_a_weight_on_the_rates_is_controls_cross_term(seed: int) -> None:
 
 @FEW
 @given(SEEDS, st.floats(0, 3))
-def test_the_dual_equation_has_its_quadratic_term(seed: int, c: float) -> None:
+def test_filter_equation_has_its_quadratic_term(seed: int, c: float) -> None:
     """J21 + P J11 + J11* P - P J12 P = 0, K = (P S' + A G S') (R2 + S G S')⁻¹."""
     A, B, R1, R2, G = random_regulator(seed)
     S = B.T
@@ -369,7 +367,7 @@ def test_the_dual_equation_has_its_quadratic_term(seed: int, c: float) -> None:
 
 
 @pytest.mark.parametrize("weighted", [False, True])
-def test_of_300_random_systems_every_one_keeps_the_bound(weighted: bool) -> None:
+def test_bound_holds_for_300_random_systems(weighted: bool) -> None:
     for seed in range(300):
         A, B, P, R, G = random_regulator(seed)
         c = 0.01 * seed
@@ -378,7 +376,7 @@ def test_of_300_random_systems_every_one_keeps_the_bound(weighted: bool) -> None
         assert found.residual < 1e-12
 
 
-def test_without_weight_on_the_rates_the_cycles_add_up_without_end() -> None:
+def test_gain_grows_without_bound_over_cycles_without_rate_weight() -> None:
     """The increments fall as 1/√j."""
     done = cycle_regulator(DOUBLE, PUSH, np.eye(2), 1, 100)
     j = np.arange(1, 101)
@@ -388,14 +386,14 @@ def test_without_weight_on_the_rates_the_cycles_add_up_without_end() -> None:
     assert increments[-1] == pytest.approx([0.5, 0.5], abs=0.05)
 
 
-def test_with_weight_on_the_rates_increments_fall_as_a_geometric_progression() -> None:
+def test_gain_increments_fall_geometrically_with_rate_weight() -> None:
     R, weight = 1.0, 0.25
     done = cycle_regulator([[0.5]], [[1]], 1, R, 40, G=weight)
     increments = np.diff([step.gain.item() for step in done])
     assert (increments[1:] / increments[:-1])[-1] == pytest.approx(R / (R + weight), abs=1e-4)
 
 
-def test_a_first_stage_that_is_too_slow_no_cascade_repairs() -> None:
+def test_cascade_does_not_improve_a_first_stage_that_is_too_slow() -> None:
     """Taken for ten thousand times noisier, as the page's words are, not its numbers."""
     first = quality_filter(SHIP, RATE, R1, 1e4 * R2).gain
     found = cascade(SHIP, RATE, R1, R2, first, stages=5, correlation_secs=10)

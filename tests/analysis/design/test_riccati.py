@@ -31,7 +31,7 @@ def system(seed: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, F
 
 @FEW
 @given(SEEDS)
-def test_the_gain_is_controls(seed: int) -> None:
+def test_gain_matches_control(seed: int) -> None:
     A, G, C, Q, R = system(seed)
     found = kalman_gain(A, G, C, Q, R)
     W = G @ Q @ G.T  # control wants it symmetric to the bit
@@ -42,7 +42,7 @@ def test_the_gain_is_controls(seed: int) -> None:
 
 @FEW
 @given(SEEDS)
-def test_the_riccati_equation_holds_the_loop_is_stable_and_the_slowest_pole_last(seed: int) -> None:
+def test_riccati_equation_holds_and_the_slowest_pole_is_last(seed: int) -> None:
     A, G, C, Q, R = system(seed)
     found = kalman_gain(A, G, C, Q, R)
     P, sharp = found.covariance, C.T @ np.linalg.solve(R, C)
@@ -57,7 +57,7 @@ def test_the_riccati_equation_holds_the_loop_is_stable_and_the_slowest_pole_last
 
 @FEW
 @given(SEEDS)
-def test_no_other_gain_has_a_smaller_error(seed: int) -> None:
+def test_any_other_gain_has_a_larger_error(seed: int) -> None:
     A, G, C, Q, R = system(seed)
     found, W = kalman_gain(A, G, C, Q, R), G @ Q @ G.T
     best = error_covariance(A, found.gain, C, W, R)
@@ -71,7 +71,7 @@ def test_no_other_gain_has_a_smaller_error(seed: int) -> None:
 
 @FEW
 @given(SEEDS)
-def test_correlated_noise_is_an_uncorrelated_system_in_disguise(seed: int) -> None:
+def test_correlated_noise_equals_an_uncorrelated_system(seed: int) -> None:
     A, G, C, Q, R = system(seed)
     rng = np.random.default_rng(seed)
     spread = rng.uniform(-1, 1, (len(Q), len(R)))
@@ -87,12 +87,12 @@ def test_correlated_noise_is_an_uncorrelated_system_in_disguise(seed: int) -> No
 
 @FEW
 @given(SEEDS)
-def test_the_residual_stays_when_the_units_are_a_ships(seed: int) -> None:
+def test_residual_is_small_in_the_units_of_a_ship(seed: int) -> None:
     A, G, C, Q, R = system(seed)
     assert kalman_gain(A, 1e-6 * G, C, Q, 1e-9 * R).residual < 1e-12
 
 
-def test_samples_every_dt_are_noise_of_intensity_r_dt() -> None:
+def test_samples_every_dt_have_noise_intensity_r_dt() -> None:
     A, C = np.array([[0, 1], [-1 / 7500, -200 / 7500]]), np.array([[1.0, 0]])
     q, r, dt = 1e-12, 2.5e-7, 0.01
     Qd = q * dt * np.array([[dt**2 / 3, dt / 2], [dt / 2, 1]])
@@ -102,13 +102,13 @@ def test_samples_every_dt_are_noise_of_intensity_r_dt() -> None:
     assert found.covariance == pytest.approx(P, rel=2e-3)
 
 
-def test_control_returns_the_discrete_predictors_gain() -> None:
+def test_control_returns_the_gain_of_the_discrete_predictor() -> None:
     A, C = np.array([[0.9, 0.1], [0, 0.8]]), np.array([[1.0, 0]])
     L, P, _ = control.dlqe(A, np.eye(2), C, np.eye(2), [[2.0]])
     assert pytest.approx(A @ P @ C.T / (C @ P @ C.T + 2.0)) == L
 
 
-def test_what_control_does_not_do_is_the_reason_for_scipy() -> None:
+def test_cases_that_control_does_not_solve() -> None:
     with pytest.raises(control.ControlNotImplemented):
         control.lqe(np.eye(1), np.eye(1), np.eye(1), np.eye(1), np.eye(1), 0.5 * np.eye(1))
 
@@ -117,7 +117,7 @@ A2, G2, C2 = np.array([[0.0, 1], [0, -1]]), np.array([[0.0], [1]]), np.array([[1
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "message"),
     [
         ({"A": [[1, 2, 3], [4, 5, 6]]}, r"A is of shape \(2, 3\); expected a square matrix"),
         ({"A": [1, 2]}, r"A is of shape \(2,\); expected a square matrix"),
@@ -142,21 +142,23 @@ A2, G2, C2 = np.array([[0.0, 1], [0, -1]]), np.array([[0.0], [1]]), np.array([[1
         ({"G": [[0], [0]]}, r"A \(2, 2\) and the noise: the mode at 0 neither grows nor decays"),
     ],
 )
-def test_what_does_not_fit_is_refused_in_one_line(changed: dict[str, ArrayLike], said: str) -> None:
+def test_invalid_arguments_raise_a_one_line_error(
+    changed: dict[str, ArrayLike], message: str
+) -> None:
     arguments = {"A": A2, "G": G2, "C": C2, "Q": 1, "R": 1} | changed
-    with pytest.raises(UsageError, match=said) as caught:
+    with pytest.raises(UsageError, match=message) as caught:
         kalman_gain(**arguments)
     assert "\n" not in str(caught.value)
 
 
-def test_the_error_of_a_gain_that_does_not_hold_is_refused() -> None:
+def test_error_covariance_of_an_unstable_gain_raises_an_error() -> None:
     with pytest.raises(UsageError, match="a pole at 0; expected a stable L"):
         error_covariance(A2, [[0], [0]], C2, np.eye(2), 1)
     with pytest.raises(UsageError, match=r"L is of shape \(2,\); expected \(2, 1\)"):
         error_covariance(A2, [0, 0], C2, np.eye(2), 1)
 
 
-def test_units_far_apart_hide_nothing() -> None:
+def test_units_of_different_magnitude_leave_modes_observable() -> None:
     for inertia in (1e-12, 1.0, 1e12):
         A = np.array([[0, 1 / inertia, 0], [0, 0, 1], [0, 0, 0]])
         assert len(unobservable_eigenvalues(A, np.array([[1.0, 0, 0]]))) == 0
@@ -165,7 +167,7 @@ def test_units_far_apart_hide_nothing() -> None:
 
 @FEW
 @given(SEEDS)
-def test_hidden_modes_are_found_in_any_coordinates(seed: int) -> None:
+def test_unobservable_modes_are_detected_in_any_coordinates(seed: int) -> None:
     rng = np.random.default_rng(seed)
     hidden, shown, n = np.array([0.3, -0.2]), 3, 5
     A = np.zeros((n, n))
@@ -182,7 +184,7 @@ def test_hidden_modes_are_found_in_any_coordinates(seed: int) -> None:
 
 @FEW
 @given(SEEDS)
-def test_a_cross_covariance_is_scipys_cross_term(seed: int) -> None:
+def test_cross_covariance_matches_the_cross_term_of_scipy(seed: int) -> None:
     A, G, C, Q, R = system(seed)
     rng = np.random.default_rng(seed)
     N = 0.1 * np.linalg.cholesky(Q) @ rng.uniform(-1, 1, (len(Q), len(R))) @ np.linalg.cholesky(R).T

@@ -60,17 +60,17 @@ RUDDER, RATE = np.array([[0], [1 / 2.5]]), np.array([[1.0, 0]])
 SENSOR, WAVE, OMEGA = 2e-4**2 * 0.1, 2e-4**2, 0.6
 
 
-def test_the_dryden_spectrums_factor() -> None:
+def test_spectral_factor_of_the_dryden_spectrum() -> None:
     H = spectral_factor(*DRYDEN)
     assert H.numerator == pytest.approx([13.1118179813, 2.1690864301], abs=1e-8)
     assert H.denominator == pytest.approx([1, 0.5730659026, 0.0821011322], abs=1e-8)
 
 
-def test_white_noise_of_unit_two_sided_intensity_comes_out_with_twice_sigma_squared() -> None:
+def test_variance_of_the_dryden_filter_is_twice_sigma_squared() -> None:
     assert shaped_variance(spectral_factor(*DRYDEN)) == pytest.approx(2 * SIGMA**2, abs=1e-8)
 
 
-def test_the_filter_of_the_papers_example() -> None:
+def test_kalman_filter_of_the_paper() -> None:
     plant = augment_with_shaping(A0, B0, C0, G0, spectral_factor(*DRYDEN))
     found = kalman_gain(plant.A, plant.G, plant.C, 1, R)
     gain = found.gain[PAPERS_ORDER]
@@ -86,13 +86,13 @@ def test_the_filter_of_the_papers_example() -> None:
     assert plant.B[PAPERS_ORDER, 0] == pytest.approx([0, 0, 0, 0, 20.2])
 
 
-def test_its_covariance_is_of_rank_four_for_nothing_drives_the_actuator() -> None:
+def test_covariance_has_rank_four_because_the_actuator_has_no_noise() -> None:
     plant = augment_with_shaping(A0, B0, C0, G0, spectral_factor(*DRYDEN))
     P = kalman_gain(plant.A, plant.G, plant.C, 1, R).covariance
     assert np.linalg.matrix_rank(P) == 4
 
 
-def test_a_wave_filter_lowers_the_error_of_the_best_white_one_by_24_percent() -> None:
+def test_wave_filter_lowers_the_error_of_the_white_noise_design_by_24_percent() -> None:
     plant = augment_with_shaping(YAW, RUDDER, RATE, [1, 0], wave_filter(WAVE, OMEGA))
     shaped = np.sqrt(kalman_gain(plant.A, plant.G, plant.C, 1, SENSOR).covariance[0, 0])
 
@@ -110,7 +110,7 @@ def test_a_wave_filter_lowers_the_error_of_the_best_white_one_by_24_percent() ->
     assert 1 - shaped / best == pytest.approx(0.24, abs=5e-3)
 
 
-def test_a_wave_in_the_output_is_a_notch() -> None:
+def test_wave_in_the_output_gives_a_notch() -> None:
     drift, wandering = np.array([[1.0], [0]]), 1e-10
     plant = augment_with_shaping(
         YAW, RUDDER, RATE, [1], wave_filter(WAVE, OMEGA), at="output", noise=drift
@@ -126,11 +126,11 @@ def test_a_wave_in_the_output_is_a_notch() -> None:
     assert passed(plant.A, plant.C, notch, 1e-3) == pytest.approx(0.60, abs=0.01)
 
 
-def test_a_wave_filter_has_the_variance_asked_for() -> None:
+def test_wave_filter_has_the_requested_variance() -> None:
     assert shaped_variance(wave_filter(0.3, OMEGA, 0.07)) == pytest.approx(0.3, rel=1e-12)
 
 
-def test_what_passes_white_noise_enters_the_state_as_it_is() -> None:
+def test_direct_feedthrough_drives_the_state_with_white_noise() -> None:
     plant = augment_with_shaping(
         [[-1]], [[1]], [[1]], [3], TransferFunction(np.array([2.0, 5]), np.array([1.0, 4]))
     )
@@ -138,7 +138,7 @@ def test_what_passes_white_noise_enters_the_state_as_it_is() -> None:
     assert_allclose(plant.A, [[-1, 3 * (5 - 2 * 4)], [0, -4]])
 
 
-def test_two_disturbances_are_augmented_one_after_the_other() -> None:
+def test_two_disturbances_are_added_in_turn() -> None:
     one = augment_with_shaping(YAW, RUDDER, RATE, [1, 0], wave_filter(WAVE, 0.6))
     two = augment_with_shaping(
         one.A, one.B, one.C, [1], wave_filter(WAVE, 0.9), at="output", noise=one.G
@@ -167,7 +167,7 @@ def spectrum_of(H: TransferFunction) -> tuple[np.ndarray, np.ndarray]:
     notch=st.sampled_from([None, 0.0, 0.6]),
     gain=st.floats(1e-6, 1e6),
 )
-def test_the_factor_of_a_stable_minimum_phase_filters_spectrum_is_that_filter(
+def test_spectral_factor_recovers_a_stable_minimum_phase_filter(
     zeros: list[float], pairs: list[tuple[float, float]], notch: float | None, gain: float
 ) -> None:
     denominator = np.array([1.0, 0.7])
@@ -189,7 +189,7 @@ def test_the_factor_of_a_stable_minimum_phase_filters_spectrum_is_that_filter(
 
 
 @pytest.mark.parametrize(
-    ("numerator", "denominator", "said"),
+    ("numerator", "denominator", "message"),
     [
         ([1, 0], [1, 0, 1], r"numerator, \(2,\), has odd powers"),
         ([1], [1, 1, 1], r"denominator, \(3,\), has odd powers"),
@@ -202,10 +202,10 @@ def test_the_factor_of_a_stable_minimum_phase_filters_spectrum_is_that_filter(
         ([0], [1, 0, 1], "numerator is of shape .* not all zero"),
     ],
 )
-def test_what_is_no_spectrum_is_refused(
-    numerator: ArrayLike, denominator: ArrayLike, said: str
+def test_invalid_spectrum_raises_an_error(
+    numerator: ArrayLike, denominator: ArrayLike, message: str
 ) -> None:
-    with pytest.raises(UsageError, match=said):
+    with pytest.raises(UsageError, match=message):
         spectral_factor(numerator, denominator)
 
 
@@ -214,7 +214,7 @@ UNSTABLE = TransferFunction(np.array([1.0]), np.array([1.0, -1]))
 IMPROPER = TransferFunction(np.array([1.0, 0, 0]), np.array([1.0, 1]))
 
 
-def test_a_shaping_filter_that_does_not_fit_is_refused() -> None:
+def test_invalid_shaping_filter_raises_an_error() -> None:
     def to_output(H: TransferFunction) -> None:
         augment_with_shaping(YAW, RUDDER, RATE, [1], H, at="output")
 
@@ -234,7 +234,7 @@ def test_a_shaping_filter_that_does_not_fit_is_refused() -> None:
         wave_filter(1, -1)
 
 
-def test_the_factor_is_the_one_the_page_writes_down() -> None:
+def test_dryden_factor_in_closed_form() -> None:
     """H(s) = σ√(6/L)·(s + 1/(L√3))/(s + 1/L)²."""
     H = spectral_factor(*DRYDEN)
     size = SIGMA * np.sqrt(6 / L)
@@ -242,7 +242,7 @@ def test_the_factor_is_the_one_the_page_writes_down() -> None:
     assert H.denominator == pytest.approx([1, 2 / L, 1 / L**2], rel=1e-12)
 
 
-def test_the_papers_two_misprints_are_off_by_a_whole_number_and_nothing_else() -> None:
+def test_two_misprints_of_the_paper_differ_by_whole_numbers() -> None:
     plant = augment_with_shaping(A0, B0, C0, G0, spectral_factor(*DRYDEN))
     found = kalman_gain(plant.A, plant.G, plant.C, 1, R)
     assert found.gain[PAPERS_ORDER][3, 1] - 2 == pytest.approx(-2.2457, abs=5e-5)

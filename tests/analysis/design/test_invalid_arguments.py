@@ -69,41 +69,41 @@ of_each_argument = pytest.mark.parametrize(
 def refusal(of: Callable[..., object], name: str, value: object) -> str:
     with pytest.raises(UsageError) as caught:
         of(**(FITTING[of] | {name: value}))
-    said = str(caught.value)
-    assert "\n" not in said
-    assert name in said
-    assert "expected" in said
-    return said
+    message = str(caught.value)
+    assert "\n" not in message
+    assert name in message
+    assert "expected" in message
+    return message
 
 
 @pytest.mark.parametrize("of", FITTING, ids=lambda of: of.__name__)
-def test_what_fits_is_taken(of: Callable[..., object]) -> None:
+def test_valid_arguments_are_accepted(of: Callable[..., object]) -> None:
     of(**FITTING[of])
 
 
 @of_each_argument
 @pytest.mark.parametrize("wrong", [(5,), (3, 5), (2, 2, 2), (0, 0), (3, 1)], ids=str)
-def test_a_wrong_shape_is_refused_by_its_name(
+def test_wrong_shape_raises_an_error_with_the_argument(
     of: Callable[..., object], name: str, wrong: tuple[int, ...]
 ) -> None:
-    said = refusal(of, name, np.ones(wrong))
-    assert f"of shape ({wrong[0]}," in said
+    message = refusal(of, name, np.ones(wrong))
+    assert f"of shape ({wrong[0]}," in message
 
 
 @of_each_argument
 @pytest.mark.parametrize("hole", [np.nan, np.inf])
-def test_nan_and_infinity_are_refused_with_the_shape(
+def test_nan_and_infinity_raise_an_error_with_the_shape(
     of: Callable[..., object], name: str, hole: float
 ) -> None:
     given = np.array(FITTING[of][name], dtype=float)
     given.flat[-1] = hole
-    said = refusal(of, name, given)
-    assert str(given.shape) in said
-    assert "NaN or infinities; expected finite numbers" in said
+    message = refusal(of, name, given)
+    assert str(given.shape) in message
+    assert "NaN or infinities; expected finite numbers" in message
 
 
 @of_each_argument
-def test_what_are_no_numbers_is_refused(of: Callable[..., object], name: str) -> None:
+def test_values_that_are_not_numbers_raise_an_error(of: Callable[..., object], name: str) -> None:
     for nothing in ("fast", [[1, 2], [3]], None):
         if nothing is not None or name not in ("N", "G", "noise"):  # these may be left out
             refusal(of, name, nothing)
@@ -112,21 +112,23 @@ def test_what_are_no_numbers_is_refused(of: Callable[..., object], name: str) ->
 @pytest.mark.parametrize(
     ("of", "name"), [(of, name) for of, names in WEIGHTS.items() for name in names]
 )
-def test_an_asymmetric_or_indefinite_weight_is_refused_with_the_shape(
+def test_asymmetric_or_indefinite_weight_raises_an_error_with_the_shape(
     of: Callable[..., object], name: str
 ) -> None:
     n = len(np.array(FITTING[of][name]))
     indefinite = -np.eye(n)
     indefinite[0, 0] = 1.0 if n > 1 else -1.0
-    said = refusal(of, name, indefinite)
-    assert f"{name}, ({n}, {n}), has the eigenvalue -1; expected a positive" in said
+    message = refusal(of, name, indefinite)
+    assert f"{name}, ({n}, {n}), has the eigenvalue -1; expected a positive" in message
     if n > 1:
-        said = refusal(of, name, np.eye(n) + np.triu(np.ones((n, n)), 1))
-        assert f"{name}, ({n}, {n}), differs from its transpose by 1; expected a symmetric" in said
+        message = refusal(of, name, np.eye(n) + np.triu(np.ones((n, n)), 1))
+        assert (
+            f"{name}, ({n}, {n}), differs from its transpose by 1; expected a symmetric" in message
+        )
 
 
 @pytest.mark.parametrize(
-    ("of", "change", "said"),
+    ("of", "change", "message"),
     [
         (kalman_gain, {"A": np.eye(2)}, r"A \(2, 2\) and C: the mode at 1 does not decay"),
         (quality_filter, {"A": np.eye(2)}, r"A \(2, 2\) and S: the mode at 1 does not decay"),
@@ -136,10 +138,10 @@ def test_an_asymmetric_or_indefinite_weight_is_refused_with_the_shape(
         (observed, {"A": np.diag([-1.0, -2])}, r"at the mode -2 the state \"w'\" cannot be seen"),
     ],
 )
-def test_a_pair_that_is_not_observable_is_refused_by_its_mode_and_with_a_cure(
-    of: Callable[..., object], change: dict[str, Any], said: str
+def test_unobservable_pair_raises_an_error_with_mode_and_remedy(
+    of: Callable[..., object], change: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(UsageError, match=said) as caught:
+    with pytest.raises(UsageError, match=message) as caught:
         of(**(FITTING[of] | change))
     assert any(cure in str(caught.value) for cure in ("measure ", "add an input"))
 
@@ -147,7 +149,7 @@ def test_a_pair_that_is_not_observable_is_refused_by_its_mode_and_with_a_cure(
 @pytest.mark.parametrize(
     "poles", [[-1 + 1j, -1], [-1 + 1j, -1 + 1j], [-1 + 1j, -1.001 - 1j], [-1 - 1j, -2]]
 )
-def test_a_pole_without_its_conjugate_is_refused(poles: list[complex]) -> None:
-    said = refusal(place_multilevel, "poles", poles)
-    assert "poles, (2,), have -1" in said
-    assert "without its conjugate; expected both" in said
+def test_pole_without_its_conjugate_raises_an_error(poles: list[complex]) -> None:
+    message = refusal(place_multilevel, "poles", poles)
+    assert "poles, (2,), have -1" in message
+    assert "without its conjugate; expected both" in message
