@@ -1,6 +1,6 @@
-"""The identifier's methods side by side, on the same segments of a ship that is known."""
+"""The methods of identification compared on the same trials of a simulated ship."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -19,102 +19,115 @@ from shiplog.ships import ship_model
 from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
 
-SEEDS = range(1000, 1008)
-OFF = 0.3  # of the truth: the priors of those methods that have one
-BOUND = "Cramér and Rao's bound, free"
+PRIOR_ERROR = 0.3  # relative, of the priors of those methods that need one
+BOUND = "Cramér-Rao bound, free"
 MANOEUVRES = ("zigzag-20-20", "turning-circle-35")
 TEXT = """
-## The methods side by side
+## The methods compared
 
-The same ship and noise, {seeds} seeds, the α's known: the median of the errors, in per cent; last
-the rms by which the found model, sailed under the run's rudder, is off the true one; a dash where
-in a seed nothing is told, or the model found runs away. The paper's
-scheme takes ẅ and v̇ from a filter that holds a model of the ship, so that it must be given one
-before it can find one: with the truth in it, it finds roughly the truth, and with a prior
-{off:.0f} % off it finds neither. The extended Kalman filter with the parameters among its states
-starts from the same priors and forgets them in one pass; the equations in integral form and output
-error have none."""
+The same ship and noise, {seeds} seeds, the α's given: the median error of each coefficient, in per
+cent of the true value; in the last two columns the rms difference between the trajectories of the
+estimated and of the true model under the rudder of the trial. A dash marks a method that in some
+seed does not determine the coefficient, or whose model diverges.
 
-Found = Mapping[str, float]
+The paper's scheme takes ẅ and v̇ from a filter that contains a model of the ship, and so needs a
+prior: given the true values it returns roughly the true values, given a prior wrong by
+{error:.0f} % it returns neither. The extended Kalman filter with the parameters among its states
+starts from the same wrong priors and corrects them in one pass. The equations in integral form and
+output error need no prior."""
+
+Errors = Mapping[str, float]  # per cent of each coefficient, and the rms of the trajectory
 
 
-def methods(
-    sail: Callable[[str, int], Segment], bound: Callable[[str], FloatArray], truth: Coefficients
+def compare_methods(
+    simulate: Callable[[str, int], Segment],
+    bound: Callable[[str], FloatArray],
+    truth: Coefficients,
+    seeds: Sequence[int],
 ) -> None:
-    """Print the section.
+    """Print the section of the page.
 
-    `sail` gives the trial of a manoeuvre and a seed, `bound` that of a manoeuvre's, (9,) stds.
+    Parameters
+    ----------
+    simulate
+        Returns the trial of a manoeuvre and a seed.
+    bound
+        Returns the Cramér-Rao bound of a manoeuvre, (9,) standard deviations.
+    truth
+        The coefficients of the simulated ship.
+    seeds
+        Those of the trials.
     """
-    print(TEXT.format(seeds=len(SEEDS), off=100 * OFF))
+    print(TEXT.format(seeds=len(seeds), error=100 * PRIOR_ERROR))
     for manoeuvre in MANOEUVRES:
-        least = 100 * bound(manoeuvre) / np.abs(truth[:9])
-        every: dict[str, list[Found]] = {
-            BOUND: [dict(zip(IDENTIFIED_NAMES, least.tolist(), strict=True))]
+        relative = 100 * bound(manoeuvre) / np.abs(truth[:9])
+        errors: dict[str, list[Errors]] = {
+            BOUND: [dict(zip(IDENTIFIED_NAMES, relative.tolist(), strict=True))]
         }
-        for seed in SEEDS:
-            trial = sail(manoeuvre, seed)
-            for name, found in _by_each(trial, truth, seed):
-                every.setdefault(name, []).append(found)
+        for seed in seeds:
+            trial = simulate(manoeuvre, seed)
+            for name, of_method in _method_errors(trial, truth, seed):
+                errors.setdefault(name, []).append(of_method)
         print(f"\n**{manoeuvre}**\n")
         print(f"| % | {' | '.join(IDENTIFIED_NAMES)} | rms w (°/s) | rms v (m/s) |")
         print("|---" * (len(IDENTIFIED_NAMES) + 3) + "|")
-        for name, founds in every.items():
-            print(f"| {name} | {' | '.join(_row(founds))} |")
+        for name, of_seeds in errors.items():
+            print(f"| {name} | {' | '.join(_row(of_seeds))} |")
 
 
-def _row(founds: list[Found]) -> Iterator[str]:
+def _row(of_seeds: list[Errors]) -> Iterator[str]:
     for key in (*IDENTIFIED_NAMES, "rms w", "rms v"):
-        median = np.median([abs(found.get(key, np.nan)) for found in founds])
+        median = np.median([abs(errors.get(key, np.nan)) for errors in of_seeds])
         yield f"{median:.2g}" if np.isfinite(median) else "–"
 
 
-def _by_each(trial: Segment, truth: Coefficients, seed: int) -> Iterator[tuple[str, Found]]:
-    """Each method's name, and its errors of this trial in per cent of the truth."""
+def _method_errors(trial: Segment, truth: Coefficients, seed: int) -> Iterator[tuple[str, Errors]]:
+    """Yield the name of each method, and its errors in this trial."""
     model = ship_model("burylin")
     free, true = output_error([trial], model), np.array(truth[:9])
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], len(true))
-    wrong = true * (1 + OFF * signs)
-    yield "the paper's scheme, the truth for a prior", _errors(trial, truth, _paper(trial, truth))
-    misled = truth._replace(**dict(zip(IDENTIFIED_NAMES, wrong.tolist(), strict=True)))
-    yield "the paper's scheme, a prior off", _errors(trial, truth, _paper(trial, misled))
-    priors = np.array([wrong, true * (1 - OFF * signs)])
+    wrong = true * (1 + PRIOR_ERROR * signs)
+    yield "paper's scheme, true prior", _errors(trial, truth, _paper_scheme(trial, truth))
+    wrong_prior = truth._replace(**dict(zip(IDENTIFIED_NAMES, wrong.tolist(), strict=True)))
+    yield "paper's scheme, wrong prior", _errors(trial, truth, _paper_scheme(trial, wrong_prior))
+    priors = np.array([wrong, true * (1 - PRIOR_ERROR * signs)])
     yield (
-        "extended Kalman filter, a prior off",
+        "extended Kalman filter, wrong prior",
         _errors(trial, truth, parameter_ekf(free, priors).values[0, -1]),
     )
-    yield "integral form, no prior", _errors(trial, truth, _integral(trial, truth))
-    yield "output error, no prior", _errors(trial, truth, _nine(free))
+    yield "integral form, no prior", _errors(trial, truth, _integral_form(trial, truth))
+    yield "output error, no prior", _errors(trial, truth, _nine_coefficients(free))
     tied = output_error([trial], ship_model("burylin-tied"), fixed={"T3": truth.e / truth.d})
-    yield "output error, tied, T3 known", _errors(trial, truth, _nine(tied))
+    yield "output error, tied, T3 fixed", _errors(trial, truth, _nine_coefficients(tied))
 
 
-def _paper(trial: Segment, prior: Coefficients) -> FloatArray:
+def _paper_scheme(trial: Segment, prior: Coefficients) -> FloatArray:
     states = paper_states(trial.signals, prior)
     return np.concatenate(
         [solve_window(rows) for rows in regression_rows(trial.signals, prior, states)]
     )
 
 
-def _integral(trial: Segment, truth: Coefficients) -> FloatArray:
-    found: dict[str, Coefficient] = {}
-    for rows in weak_form(trial.signals, truth):  # of the truth the alphas alone are used
-        found |= fit_coefficients(rows)[0].coefficients
-    return np.array([found[name].value for name in IDENTIFIED_NAMES])
+def _integral_form(trial: Segment, truth: Coefficients) -> FloatArray:
+    fitted: dict[str, Coefficient] = {}
+    for rows in weak_form(trial.signals, truth):  # only the alphas of `truth` are used
+        fitted |= fit_coefficients(rows)[0].coefficients
+    return np.array([fitted[name].value for name in IDENTIFIED_NAMES])
 
 
-def _nine(fit: OutputError) -> FloatArray:
+def _nine_coefficients(fit: OutputError) -> FloatArray:
     return np.array(fit.problem.model.coefficients(fit.parameters)[:9])
 
 
-def _errors(trial: Segment, truth: Coefficients, found: FloatArray) -> Found:
-    """In per cent of the truth, and how far the found model's run is off the true one's."""
+def _errors(trial: Segment, truth: Coefficients, estimates: FloatArray) -> Errors:
+    """Return the errors in per cent, and the rms differences of the simulated trajectories."""
     true, model = np.array(truth[:9]), ship_model("burylin")
     speed = float(np.sqrt(-truth.h * trial.signals["rpm"][0] / truth.g))
     initial = np.array([0.0, 0.0, speed, 0.0])
     runs = [
         model.simulate(np.append(nine, truth[9:]), initial, trial.path, len(trial))
-        for nine in (found, true)
+        for nine in (estimates, true)
     ]
-    off = np.sqrt(np.mean((runs[0] - runs[1]) ** 2, axis=0))
-    errors = dict(zip(IDENTIFIED_NAMES, 100 * (found / true - 1), strict=True))
-    return errors | {"rms w": float(np.degrees(off[0])), "rms v": float(off[1])}
+    rms = np.sqrt(np.mean((runs[0] - runs[1]) ** 2, axis=0))
+    errors = dict(zip(IDENTIFIED_NAMES, 100 * (estimates / true - 1), strict=True))
+    return errors | {"rms w": float(np.degrees(rms[0])), "rms v": float(rms[1])}

@@ -294,19 +294,22 @@ def test_every_folder_and_module_of_a_stage_exists() -> None:
 # ---- the accuracy of identification
 
 
-def test_a_study_prints_its_table_and_tells_its_numbers(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_study_prints_its_table_and_returns_its_numbers(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     tied = ship_model("burylin-tied")
-    found = identification.study("tied", "zigzag-20-20", tied, {"T3": 0.5}, 2, off=0.5)
-    assert found.names == ("a", "b2", "b3", "d", "f", "g", "h")
-    assert found.median["d"] < 0.2
-    assert np.all(found.over_bound < 4)
-    assert "| rms error over bound (1) |" in capsys.readouterr().out
+    result = identification.study("tied", "zigzag-20-20", tied, {"T3": 0.5}, 2, start_error=0.5)
+    assert result.names == ("a", "b2", "b3", "d", "f", "g", "h")
+    assert result.median["d"] < 0.2
+    assert np.all(result.over_bound < 4)
+    assert "| rms error / bound (1) |" in capsys.readouterr().out
 
 
-def test_the_straightforward_fit_finds_what_ours_does() -> None:
-    trial = identification.known_trial("zigzag-20-20", 1, 100.0, "white")
-    ours = identification_speed._ours(trial)
+def test_the_fit_by_scipy_agrees_with_ours() -> None:
+    trial = identification.simulated_trial("zigzag-20-20", 1, 100.0, "white")
+    ours = identification_speed.fit_without_nuisance(trial)
     z = ours.minimum.unknowns.copy()
-    z[:12] = identification_speed.peer(trial, ours)
-    apart = ours.problem.predicted(z, 0) - ours.problem.predicted(ours.minimum.unknowns, 0)
-    assert np.max(np.abs(apart / ours.residual_stds[0].typical)) < 0.2  # of the noise of one sample
+    z[:12] = identification_speed.peer_fit(trial, ours)
+    difference = ours.problem.predicted(z, 0) - ours.problem.predicted(ours.minimum.unknowns, 0)
+    noise = ours.residual_stds[0].typical  # of a single sample
+    assert np.max(np.abs(difference / noise)) < 0.2
