@@ -17,7 +17,7 @@ from pathlib import Path
 from . import files, filters, ranking, replays, start_up, windows
 from .bench import Bench
 from .logs import day_of_trial, write_repeated
-from .measure import Line, LineResult, compare, machine
+from .measure import Comparison, ComparisonResult, compare_with_peer, machine
 from .report import BenchmarkReport, print_report, report_as_markdown
 from .stages import our_stages
 
@@ -112,7 +112,7 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> BenchmarkReport:
         if theme not in arguments.only:
             continue
         for line in lines():
-            report.results.append(compare(line, sizes.rounds, judged=judged))
+            report.results.append(compare_with_peer(line, sizes.rounds, judged=judged))
             _print_result(report.results[-1])
         dependence = windows.length_dependence(report.results, judged=judged)
         if theme == "windows" and dependence:
@@ -124,7 +124,7 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> BenchmarkReport:
     return report
 
 
-def _themes(bench: Bench, report: BenchmarkReport) -> dict[str, Callable[[], Iterable[Line]]]:
+def _themes(bench: Bench, report: BenchmarkReport) -> dict[str, Callable[[], Iterable[Comparison]]]:
     """Return the functions that make the lines of each theme."""
     return {
         "files": lambda: files.file_lines(bench),
@@ -137,7 +137,7 @@ def _themes(bench: Bench, report: BenchmarkReport) -> dict[str, Callable[[], Ite
     }
 
 
-def _print_result(result: LineResult) -> None:
+def _print_result(result: ComparisonResult) -> None:
     ratio = f"skipped: {result.skipped}" if result.ratio is None else f"{result.ratio:.3g} x"
     print(f"{result.work}, against {result.against}: {ratio}", flush=True)
 

@@ -16,14 +16,14 @@ from shiplog.mcap.writer import channel_metadata
 
 from .bench import Bench
 from .logs import require_disk_space, write_repeated
-from .measure import Limit, Line, run, timed
+from .measure import Comparison, Limit, run, timed
 
 
-def file_lines(bench: Bench) -> list[Line]:
+def file_lines(bench: Bench) -> list[Comparison]:
     """Return the comparisons of reading and writing."""
     ours, theirs = bench.folder / "ours.mcap", bench.folder / "theirs.mcap"
     return [
-        Line(
+        Comparison(
             "read to arrays, CRCs on",
             "mcap's reader, and decode",
             timed(partial(read, bench.path)),
@@ -31,14 +31,14 @@ def file_lines(bench: Bench) -> list[Line]:
             Limit(at_least=80),
             verify=partial(_verify_read, bench),
         ),
-        Line(
+        Comparison(
             "read to arrays, CRCs on",
             "zstd alone",
             timed(partial(read, bench.path)),
             timed(partial(decompress_chunks, bench.path)),
             Limit(at_most=2.5),
         ),
-        Line(
+        Comparison(
             "write",
             "mcap's writer",
             timed(partial(write_columns, bench.log, ours)),
@@ -49,7 +49,7 @@ def file_lines(bench: Bench) -> list[Line]:
     ]
 
 
-def info_lines(bench: Bench) -> list[Line]:
+def info_lines(bench: Bench) -> list[Comparison]:
     """Return the comparison of `shiplog info`: whole processes, the start of Python included."""
     days = f"{bench.info_hours / 24:.3g} days"
     path = bench.folder / "info.mcap"
@@ -59,7 +59,7 @@ def info_lines(bench: Bench) -> list[Line]:
         write_repeated(bench.log, bench.info_hours, path)
 
     return [
-        Line(
+        Comparison(
             f"`shiplog info` of {days}",
             '`python -c "import numpy"`',
             lambda: run([sys.executable, "-m", "shiplog", "info", str(path)]).secs,

@@ -9,13 +9,13 @@ import numpy as np
 from analysis.filters.factory import filter_states
 
 from .bench import NOISE, VESSEL, Bench, share_note
-from .measure import Limit, Line, SkippedError, timed
+from .measure import Comparison, Limit, SkippedError, timed
 from .textbook import FilterResult, filter_in_numpy
 
 RELATIVE_TOLERANCE = 1e-9  # of each column's largest value
 
 
-def filter_lines(bench: Bench) -> list[Line]:
+def filter_lines(bench: Bench) -> list[Comparison]:
     """Return the comparisons of the filter, one for each peer."""
     return [
         _line(bench, "the same in a numpy loop", filter_in_numpy, 15),
@@ -38,9 +38,11 @@ def verify_filter(bench: Bench, peer: Callable[..., FilterResult]) -> None:
         np.testing.assert_allclose(other / size, one / size, rtol=0, atol=RELATIVE_TOLERANCE)
 
 
-def _line(bench: Bench, against: str, peer: Callable[..., FilterResult], at_least: float) -> Line:
+def _line(
+    bench: Bench, against: str, peer: Callable[..., FilterResult], at_least: float
+) -> Comparison:
     model = VESSEL.paper_coefficients
-    return Line(
+    return Comparison(
         "Kalman filter, five states",
         against,
         timed(partial(filter_states, bench.signals, model, NOISE)),

@@ -70,7 +70,7 @@ NO_LIMIT = Limit()
 
 
 @dataclass(frozen=True)
-class Line:
+class Comparison:
     """A comparison of our work with a peer's: one line of the table.
 
     Attributes
@@ -103,13 +103,13 @@ class Line:
 
 
 @dataclass(frozen=True)
-class LineResult:
+class ComparisonResult:
     """The result of a comparison.
 
     Attributes
     ----------
     work, against, limit, note
-        As in the `Line`.
+        As in the `Comparison`.
     ours_secs, peer_secs
         Medians over the rounds, s; None if skipped.
     ratio
@@ -148,7 +148,7 @@ def timed(work: Callable[[], object], scale: float = 1.0) -> Callable[[], float]
     return measured
 
 
-def compare(line: Line, rounds: int, *, judged: bool = True) -> LineResult:
+def compare_with_peer(line: Comparison, rounds: int, *, judged: bool = True) -> ComparisonResult:
     """Verify that both results agree, then time both in turn, and return the median ratio.
 
     Parameters
@@ -168,11 +168,13 @@ def compare(line: Line, rounds: int, *, judged: bool = True) -> LineResult:
             line.ours()
         times = tuple((line.ours(), line.peer()) for _ in range(rounds))
     except SkippedError as reason:
-        return LineResult(line.work, line.against, line.limit, note=line.note, skipped=str(reason))
+        return ComparisonResult(
+            line.work, line.against, line.limit, note=line.note, skipped=str(reason)
+        )
     inverse = line.limit.of_ours_over_peer
     ratio = median(ours / peer if inverse else peer / ours for ours, peer in times)
     ours_secs = median(ours for ours, _ in times)
-    return LineResult(
+    return ComparisonResult(
         line.work,
         line.against,
         line.limit,

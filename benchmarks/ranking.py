@@ -11,7 +11,7 @@ from shiplog import read
 from shiplog.ships import Model, loadable_models, ship_model
 
 from .bench import Bench
-from .measure import Line, SkippedError, timed
+from .measure import Comparison, SkippedError, timed
 from .start_up import SAMPLE
 
 LOGS = (SAMPLE, SAMPLE.with_name("turning_circle_35.mcap"))
@@ -19,7 +19,7 @@ SHORT_MODELS = ("burylin-tied", "nomoto")
 SHORT_SECS = 60.0  # of each log in a short run
 
 
-def ranking_lines(bench: Bench) -> list[Line]:
+def ranking_lines(bench: Bench) -> list[Comparison]:
     """Return the comparison of the ranking that ``identify --model auto`` makes of two logs.
 
     In a short run, two models on the first minutes of the logs.
@@ -27,7 +27,7 @@ def ranking_lines(bench: Bench) -> list[Line]:
     segments, models = ranking_input(short=bench.short)
     rank = partial(rank_models, segments, models)
     return [
-        Line(
+        Comparison(
             f"rank {len(models)} ship models on two logs, two threads",
             "one thread",
             timed(partial(rank, threads=2)),

@@ -13,7 +13,7 @@ from shiplog import TrialLog
 from .bench import VESSEL, Bench, share_note
 from .filters import require_filterpy
 from .logs import NAMES, RATE_HZ, require_disk_space, write_repeated
-from .measure import Limit, Line, Process, SkippedError, run
+from .measure import Comparison, Limit, Process, SkippedError, run
 
 MAX_MEMORY_BYTES = 1.5 * 2**30  # resident, however long the log
 MAX_GROWTH_EXPONENT = 1.05  # of time over length
@@ -21,7 +21,7 @@ MIN_PEER_SECS = 240.0  # of the log for the straightforward replay, whose window
 STEADY_HOURS = 24.0  # from this length on the start of Python hardly counts
 
 
-def replay_lines(bench: Bench, stages: dict[str, float]) -> list[Line]:
+def replay_lines(bench: Bench, stages: dict[str, float]) -> list[Comparison]:
     """Return the comparisons of the whole replay.
 
     Our review is reduced to what a screen shows unless ``--full`` is given; the peer's holds every
@@ -38,7 +38,7 @@ def replay_lines(bench: Bench, stages: dict[str, float]) -> list[Line]:
     out = bench.folder / "ours.rrd"
     note = "; ".join(filter(None, ("ours a whole process", share_note(bench.share))))
     return [
-        Line(
+        Comparison(
             "the whole `replay`, to .rrd",
             "mcap, filterpy, pinv and rr.log, the straightforward way",
             lambda: replay_process(bench.path, out).secs,
@@ -47,7 +47,7 @@ def replay_lines(bench: Bench, stages: dict[str, float]) -> list[Line]:
             note=note,
             verify=require_filterpy,
         ),
-        Line(
+        Comparison(
             "the same with --full, every sample drawn",
             "the same",
             lambda: replay_process(bench.path, out, "--full").secs,

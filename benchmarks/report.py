@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from .measure import LineResult
+from .measure import ComparisonResult
 from .replays import MAX_GROWTH_EXPONENT, MAX_MEMORY_BYTES, Growth, ReplayCost
 
 FILE_WIDTH = 140  # characters, where the output is not a terminal
@@ -37,7 +37,7 @@ class BenchmarkReport:
     machine: dict[str, str]
     hours: float
     rounds: int
-    results: list[LineResult]
+    results: list[ComparisonResult]
     our_stages: dict[str, float] = field(default_factory=dict)
     peer_stages: dict[str, float] = field(default_factory=dict)
     growth: Growth | None = None

@@ -5,13 +5,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from .bench import Bench
-from .measure import Limit, Line, SkippedError, run
+from .measure import Comparison, Limit, SkippedError, run
 
 SAMPLE = Path(__file__).resolve().parents[1] / "sample_data" / "zigzag_20_20.mcap"
 REPLAY = "`shiplog replay` of 10 min"
 
 
-def start_up_lines(bench: Bench) -> list[Line]:
+def start_up_lines(bench: Bench) -> list[Comparison]:
     """Return the comparisons of a replay of the ten-minute sample log, as whole processes."""
     out = str(bench.folder / "start_up.rrd")
     command = [sys.executable, "-m", "shiplog", "replay", str(SAMPLE), "-o", out]
@@ -20,7 +20,7 @@ def start_up_lines(bench: Bench) -> list[Line]:
         return run(command).secs
 
     return [
-        Line(
+        Comparison(
             f"{REPLAY}, to .rrd",
             '`python -c "import numba, rerun"`',
             replay,
@@ -28,7 +28,7 @@ def start_up_lines(bench: Bench) -> list[Line]:
             Limit(at_most=2.0),
             note="whole processes, loops in the cache",
         ),
-        Line(
+        Comparison(
             f"{REPLAY}, first run on a machine",
             "a later run",
             lambda: first_run_secs(command, bench.folder),

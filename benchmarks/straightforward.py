@@ -129,7 +129,7 @@ def straightforward_replay(
         disturbance = observe_disturbances(signals, c)
         stage.done, stage.whole = len(signals), whole
     with _stage(stages, "coefficients") as stage:
-        coefficients, stds = window_coefficients(signals, filtered.states, c)
+        coefficients, stds = regression_in_windows(signals, filtered.states, c)
         stage.done, stage.whole = len(coefficients), window_count(whole)
     result = StraightforwardReplay(signals, filtered, disturbance, coefficients, stds, stages)
     with _stage(stages, "review") as stage:
@@ -239,7 +239,7 @@ def model_accelerations(
     return hull + ks * (c.d * delta + c.e * delta_dot), c.f * w * w + c.g * v * v + c.h * n
 
 
-def window_coefficients(
+def regression_in_windows(
     signals: Signals, states: FloatArray, c: Coefficients
 ) -> tuple[FloatArray, FloatArray]:
     """Solve Burylin's eq. (7) in every window, with w'' and v' from the filter as in the paper.

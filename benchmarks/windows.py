@@ -9,7 +9,7 @@ from analysis.regression.window_qr import sliding_least_squares
 from shiplog.types import FloatArray
 
 from .bench import Bench
-from .measure import NO_LIMIT, Limit, Line, LineResult, timed
+from .measure import NO_LIMIT, Comparison, ComparisonResult, Limit, timed
 
 WINDOW_LENGTHS = (100, 500, 2000, 8000)  # samples
 LIMITED_LENGTH = 500  # the one length whose ratio is held to a limit
@@ -20,7 +20,7 @@ MAX_SHORT_PEER_ROWS = 200_000
 VERIFIED_WINDOWS = 200
 
 
-def window_lines(bench: Bench) -> list[Line]:
+def window_lines(bench: Bench) -> list[Comparison]:
     """Return a comparison for each window length, of as many rows as the log has samples.
 
     A log shorter than two of the longest windows counts as that long.
@@ -30,7 +30,9 @@ def window_lines(bench: Bench) -> list[Line]:
     return [_line(X, y, length, peer_rows) for length in WINDOW_LENGTHS]
 
 
-def length_dependence(results: Sequence[LineResult], *, judged: bool) -> LineResult | None:
+def length_dependence(
+    results: Sequence[ComparisonResult], *, judged: bool
+) -> ComparisonResult | None:
     """Return our time at the slowest length over that at the shortest; None without two lengths.
 
     The time must not depend on the window's length.
@@ -41,7 +43,7 @@ def length_dependence(results: Sequence[LineResult], *, judged: bool) -> LineRes
         return None
     slowest, limit = max(measured[1:]), Limit(at_most=MAX_LENGTH_RATIO)
     ratio = slowest / measured[0]
-    return LineResult(
+    return ComparisonResult(
         "sliding window, the slowest N",
         f"our own time at N = {WINDOW_LENGTHS[0]}",
         limit,
@@ -87,11 +89,11 @@ def verify_windows(X: FloatArray, y: FloatArray, length: int) -> None:
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
 
 
-def _line(X: FloatArray, y: FloatArray, length: int, peer_rows: int) -> Line:
+def _line(X: FloatArray, y: FloatArray, length: int, peer_rows: int) -> Comparison:
     windows = len(y) - length + 1
     solved = min(windows, max(50, peer_rows // length))
     rows, verified_rows = solved + length - 1, min(windows, VERIFIED_WINDOWS) + length - 1
-    return Line(
+    return Comparison(
         f"sliding window, N = {length}, p = {COLUMNS}",
         "np.linalg.pinv a window",
         timed(partial(sliding_least_squares, X, y, length)),

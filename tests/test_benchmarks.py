@@ -205,7 +205,9 @@ def test_a_process_that_fails_is_skipped_with_its_last_error_line() -> None:
     def failing() -> float:
         return measure.run([sys.executable, "-c", "raise SystemExit('no such thing')"]).secs
 
-    result = measure.compare(measure.Line("work", "peer", failing, failing, Limit(at_least=2)), 1)
+    result = measure.compare_with_peer(
+        measure.Comparison("work", "peer", failing, failing, Limit(at_least=2)), 1
+    )
     assert result.ratio is None
     assert result.met is None
     assert "no such thing" in result.skipped
@@ -215,8 +217,10 @@ def test_a_line_without_filterpy_is_skipped_with_a_reason(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(filters, "find_spec", lambda _: None)
-    line = measure.Line("filter", "filterpy", lambda: 1.0, lambda: 1.0, verify=require_filterpy)
-    assert "pip install filterpy" in measure.compare(line, 1).skipped
+    line = measure.Comparison(
+        "filter", "filterpy", lambda: 1.0, lambda: 1.0, verify=require_filterpy
+    )
+    assert "pip install filterpy" in measure.compare_with_peer(line, 1).skipped
 
 
 def require_filterpy() -> None:
@@ -237,24 +241,26 @@ def test_a_log_too_long_for_the_disk_is_skipped_with_a_reason(
 
 def test_a_ratio_is_the_median_of_the_rounds_and_is_held_to_its_limit() -> None:
     ours, peer = iter([9.0, 1.0, 1.0, 1.0]), iter([10.0, 30.0, 20.0])
-    line = measure.Line("work", "peer", lambda: next(ours), lambda: next(peer), Limit(at_least=20))
-    result = measure.compare(line, 3)
+    line = measure.Comparison(
+        "work", "peer", lambda: next(ours), lambda: next(peer), Limit(at_least=20)
+    )
+    result = measure.compare_with_peer(line, 3)
     assert result.ratio == 20
     assert result.met
-    most = measure.Line("work", "peer", lambda: 3.0, lambda: 1.0, Limit(at_most=2.5))
-    result = measure.compare(most, 3)
+    most = measure.Comparison("work", "peer", lambda: 3.0, lambda: 1.0, Limit(at_most=2.5))
+    result = measure.compare_with_peer(most, 3)
     assert result.ratio == 3
     assert result.met is False
 
 
 def test_a_limit_in_seconds_applies_to_our_time_whatever_the_ratio() -> None:
-    line = measure.Line("work", "peer", lambda: 11.0, lambda: 2.0, Limit(at_most_secs=12))
-    result = measure.compare(line, 3)
+    line = measure.Comparison("work", "peer", lambda: 11.0, lambda: 2.0, Limit(at_most_secs=12))
+    result = measure.compare_with_peer(line, 3)
     assert result.ratio == 5.5
     assert result.met
     assert str(line.limit) == "at most 12 s"
     slow = replace(line, ours=lambda: 13.0)
-    assert measure.compare(slow, 3).met is False
+    assert measure.compare_with_peer(slow, 3).met is False
 
 
 def test_a_first_run_finds_an_empty_cache_which_is_deleted_afterwards(tmp_path: Path) -> None:

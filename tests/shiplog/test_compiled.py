@@ -1,3 +1,5 @@
+"""Machine code is cached for later runs, by the sources it was compiled from."""
+
 import os
 import shutil
 import subprocess
@@ -6,6 +8,7 @@ from pathlib import Path
 
 import shiplog
 
+# prints which packages have machine code before and after a loop of shiplog is called
 CODE = """
 from shiplog.compiled import is_compiled
 print(is_compiled("shiplog"), is_compiled("analysis"), end=" ")
@@ -15,7 +18,8 @@ print(rudder_effect(c, 0.0, 2.0), is_compiled("shiplog"), is_compiled("analysis"
 """
 
 
-def printed_by_run(cache: Path, cwd: Path) -> list[str]:
+def words_printed(cache: Path, cwd: Path) -> list[str]:
+    """Run `CODE` with the given cache folder and return the words it prints."""
     done = subprocess.run(
         [sys.executable, "-c", CODE],
         env=os.environ | {"NUMBA_CACHE_DIR": str(cache)},
@@ -28,31 +32,31 @@ def printed_by_run(cache: Path, cwd: Path) -> list[str]:
 
 
 def test_machine_code_is_cached_for_later_runs_and_a_first_run_is_detected(tmp_path: Path) -> None:
-    first, second = printed_by_run(tmp_path, tmp_path), printed_by_run(tmp_path, tmp_path)
+    first, second = words_printed(tmp_path, tmp_path), words_printed(tmp_path, tmp_path)
     assert first == ["False", "False", "2.0", "True", "False"]
     assert second == ["True", "False", "2.0", "True", "False"]
 
 
 def test_machine_code_of_other_sources_is_not_used(tmp_path: Path) -> None:
-    """A loop may call functions of another file, which numba does not check."""
-    home = Path(shiplog.__file__).parents[1]
+    """A loop may call functions of another file, whose changes numba does not detect."""
+    project = Path(shiplog.__file__).parents[1]
     for package in ("shiplog", "analysis", "recorders"):
         shutil.copytree(
-            home / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
+            project / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
         )
-    cache = tmp_path / "kept"
-    assert printed_by_run(cache, tmp_path)[0] == "False"
-    assert printed_by_run(cache, tmp_path)[0] == "True"
-    other = tmp_path / "analysis" / "signals" / "signal_stats.py"  # compiles nothing
-    other.write_text(other.read_text(encoding="utf-8") + "\n", encoding="utf-8")
-    assert printed_by_run(cache, tmp_path)[0] == "False"
+    cache = tmp_path / "cache"
+    assert words_printed(cache, tmp_path)[0] == "False"
+    assert words_printed(cache, tmp_path)[0] == "True"
+    changed = tmp_path / "analysis" / "signals" / "signal_stats.py"  # compiles nothing
+    changed.write_text(changed.read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    assert words_printed(cache, tmp_path)[0] == "False"
 
 
-def test_outdated_machine_code_is_deleted_and_recent_is_kept(tmp_path: Path) -> None:
+def test_machine_code_of_old_sources_is_deleted_after_a_day(tmp_path: Path) -> None:
     old, recent = tmp_path / "shiplog-0123", tmp_path / "shiplog-4567"
     for folder in (old, recent):
         folder.mkdir()
     os.utime(old, (0, 0))
-    printed_by_run(tmp_path, tmp_path)
+    words_printed(tmp_path, tmp_path)
     assert not old.exists()
     assert recent.exists()
