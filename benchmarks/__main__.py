@@ -44,7 +44,7 @@ class Sizes:
 
 
 DEFAULT = Sizes(24.0, 5, (1.0, 24.0), 240.0, 15.0)
-SHORT = Sizes(0.07, 1, (0.02, 0.05), 0.15, 4.0)  # the peer of the replay needs four minutes
+SHORT = Sizes(0.06, 1, (0.02, 0.05), 0.15, 3.5)  # the peer of the replay needs 205 s
 
 
 def main() -> None:
