@@ -1,4 +1,8 @@
-"""One equation's coefficients: over the whole trial, and window by window as they settled."""
+"""Coefficients of one equation over the whole trial and over sliding windows.
+
+Combines the two passes of `sliding` over the rows of a trial: `WholeTrialRegression` for the first,
+`CoefficientStage` for the second. `fit_coefficients` does both where all rows are available.
+"""
 
 from dataclasses import dataclass
 
@@ -18,12 +22,27 @@ from .sliding import (
 )
 from .weak_form import Equation, Rows, with_constant
 
-CHUNK_ROWS = 1 << 13  # a chunk
+CHUNK_ROWS = 1 << 13  # rows processed at once by `fit_coefficients`
 
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One coefficient, with its standard deviation and its unit."""
+    """One coefficient with its standard deviation.
+
+    Attributes
+    ----------
+    value
+        The estimate; NaN if the rows do not determine it.
+    std
+        Its standard deviation; NaN likewise.
+    unit
+        The unit of both, such as ``1/s²``.
+
+    Examples
+    --------
+    >>> Coefficient(-3.0, 1.0, "1/s").determined
+    True
+    """
 
     value: float
     std: float
@@ -31,26 +50,45 @@ class Coefficient:
 
     @property
     def determined(self) -> bool:
-        """Whether the data tell at least its sign, at two standard deviations."""
+        """Whether the sign is determined: the value is over two standard deviations from zero."""
         return bool(np.isfinite(self.std) and abs(self.value) > 2 * self.std)
 
 
 @dataclass(frozen=True, eq=False)
 class CoefficientFit:
-    """One equation's coefficients from the whole trial, and how well its windows could tell."""
+    """One equation's coefficients over the whole trial, and the quality of its windows.
+
+    Attributes
+    ----------
+    coefficients
+        The coefficients by name.
+    condition
+        Condition number of the column-scaled regressors over the whole trial.
+    window_ends_secs
+        (k,) the end of each window, s since the signals' start.
+    window_conditions
+        (k,) condition number of the column-scaled regressors of each window.
+    blank_windows
+        The number of windows that determine no coefficient.
+    """
 
     coefficients: dict[str, Coefficient]
-    condition: float  # of the column-scaled regressors over the whole trial
-    window_ends_secs: FloatArray  # (k,) since the signals' start
-    window_conditions: FloatArray  # (k,) of the column-scaled regressors
-    blank_windows: int  # that tell no coefficient
+    condition: float
+    window_ends_secs: FloatArray
+    window_conditions: FloatArray
+    blank_windows: int
 
 
 class WholeTrialRegression:
-    """Least squares over a whole trial's rows of one equation, which come in chunks.
+    """First pass: least squares over the rows of a whole trial, which come in chunks.
 
-    With `constant`, a constant is estimated beside the coefficients: a steady moment, or the
-    rudder's zero. A gyro's bias it takes up in part only, for that stands in w|w| and w^3 too.
+    Parameters
+    ----------
+    equation
+        The equation, without a constant.
+    constant
+        Whether to estimate a constant in addition: a steady moment, or the zero offset of the
+        rudder. It compensates a gyro's bias only in part, since that also enters w|w| and w^3.
     """
 
     def __init__(self, equation: Equation, *, constant: bool = False) -> None:
@@ -62,29 +100,26 @@ class WholeTrialRegression:
         self._regression.add(with_constant(rows) if self._constant else rows)
 
     def solution(self, names: tuple[str, ...] | None = None) -> RegressionSolution:
-        """Solve for all coefficients, or for `names` alone, over the rows added so far."""
+        """Solve for all coefficients, or only for `names`, over the rows added so far."""
         if names is None:
             return self._regression.solve()
         return self._regression.solve((*names, "constant") if self._constant else names)
 
 
 class CoefficientStage:
-    """One equation's coefficients: errors over the whole trial, and the history over windows.
-
-    The rows come in chunks a second time; `solution` is what `WholeTrialRegression` found of them
-    the first time.
+    """Second pass over the rows, in chunks: standard errors and the history over windows.
 
     Parameters
     ----------
     equation
         The equation, without the constant.
     count
-        The number of rows in all.
+        The number of rows of the whole trial.
     solution
-        The whole trial's solution; it is not changed.
+        The result of the first pass, from `WholeTrialRegression`; it is not changed.
     constant
-        Whether the solution has a constant beside the coefficients. Within one window no constant
-        can be told from the rest, so the windows never have one.
+        Whether the solution contains a constant. The windows never do, since a single window
+        cannot distinguish it from the other regressors.
     window_secs
         The length of a window, s.
     """
@@ -115,9 +150,9 @@ class CoefficientStage:
         return history
 
     def result(self) -> CoefficientFit:
-        """Return the whole trial's coefficients with their errors, once all rows have come."""
+        """Return the whole trial's coefficients and errors, after all rows have been added."""
         whole = self._errors.result()
-        coefficients = {  # a constant after them is left out
+        coefficients = {  # without the constant that may follow them
             name: Coefficient(float(value), float(std), COEFFICIENT_UNITS[name])
             for name, value, std in zip(self._names, whole.values, whole.stds, strict=False)
         }
@@ -133,9 +168,34 @@ class CoefficientStage:
 def fit_coefficients(
     rows: Rows, *, constant: bool = False, window_secs: float = WINDOW_SECS
 ) -> tuple[CoefficientFit, CoefficientHistory]:
-    """The coefficients over the whole trial and over each window, of rows that are all there.
+    """Fit the coefficients of an equation over the whole trial and over each window.
 
-    A trial shorter than the window is one window.
+    Parameters
+    ----------
+    rows
+        All rows of the equation.
+    constant
+        Whether to estimate a constant in addition over the whole trial.
+    window_secs
+        The length of a window, s. A shorter trial is one window.
+
+    Returns
+    -------
+    fit
+        The coefficients over the whole trial.
+    history
+        The coefficients over the windows.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from .weak_form import Equation
+    >>> t = np.arange(600.0)
+    >>> X = np.column_stack((np.sin(t / 25), np.cos(t / 40)))
+    >>> rows = Rows(Equation(("a", "d"), 1.0, 20.0), t, X @ [2.0, -1.0], X, X[:, 0], 0.1)
+    >>> fit, history = fit_coefficients(rows)
+    >>> round(fit.coefficients["a"].value, 6), history.values.shape
+    (2.0, (420, 2))
     """
     count = len(rows.target)
     regression = WholeTrialRegression(rows.equation, constant=constant)

@@ -1,4 +1,4 @@
-"""A first model, from the log itself, for a ship of which nothing is known."""
+"""First model of a ship without a vessel file, fitted to the log itself."""
 
 from analysis.signals.signal_stats import SignalStats
 from shiplog.errors import LogError
@@ -7,8 +7,8 @@ from shiplog.vessel.vessel import Vessel
 
 from .coefficients import WholeTrialRegression
 
-# The rudder works in proportion to the speed: without a model nothing is known of the
-# slipstream, and d and e take the factor up.
+# Without a model, nothing is known of the slipstream: the rudder's effectiveness is taken as
+# proportional to the speed, and d and e contain its factor.
 SPEED_PROPORTIONAL_RUDDER = Coefficients(
     a=0.0, b1=0.0, b2=0.0, b3=0.0, d=0.0, e=0.0, f=0.0, g=0.0, h=0.0,
     alpha1=1.0, alpha2=0.0, alpha3=0.0,
@@ -21,29 +21,49 @@ SURGE_FORMS = (SURGE_COEFFICIENTS, ("f", "h"))
 def fit_first_model(
     yaw: WholeTrialRegression, surge: WholeTrialRegression, stats: SignalStats, name: str
 ) -> Vessel:
-    """A vessel whose coefficients are those of the whole log, by least squares in weak form.
+    """Fit a vessel's coefficients to the whole log, by least squares in weak form.
 
-    b3 is left out, for on a real ship it cannot be told from b2; and b2 and b1 where the log
-    cannot tell them either. A constant takes up the rudder's zero. `yaw` and `surge` were given
-    the rows of `BARE`. Raises `LogError` where the log is too short or
-    too quiet to tell even so much.
+    b3 is always zero, since on a real ship it cannot be distinguished from b2; b2 and b1 are zero
+    where the log does not determine them. A constant compensates the rudder's zero offset.
+
+    Parameters
+    ----------
+    yaw, surge
+        The regressions of both equations, after the rows of `SPEED_PROPORTIONAL_RUDDER` have been
+        added; that of yaw with a constant.
+    stats
+        The statistics of the log's signals; the median revolutions are the approach revolutions.
+    name
+        The log's name, for the vessel's name and for messages.
+
+    Returns
+    -------
+    vessel
+        A vessel with these coefficients.
+
+    Raises
+    ------
+    LogError
+        The log is too short or moves too little to determine even the simplest form.
     """
-    found = _richest(yaw, YAW_FORMS) | _richest(surge, SURGE_FORMS)
-    unknown = [part for part, key in (("yaw", "a"), ("surge", "f")) if key not in found]
-    if unknown:
+    estimates = _fit_largest_form(yaw, YAW_FORMS) | _fit_largest_form(surge, SURGE_FORMS)
+    missing = [part for part, key in (("yaw", "a"), ("surge", "f")) if key not in estimates]
+    if missing:
         raise LogError(
             f"the log carries no model, and too little moves in it to fit one of "
-            f"{' and '.join(unknown)}; give the ship's with --vessel: {name}"
+            f"{' and '.join(missing)}; give the ship's with --vessel: {name}"
         )
     return Vessel(
         f"fitted to {name}",
-        SPEED_PROPORTIONAL_RUDDER._replace(**found),
+        SPEED_PROPORTIONAL_RUDDER._replace(**estimates),
         approach_rpm=stats.median_rpm,
     )
 
 
-def _richest(rows: WholeTrialRegression, forms: tuple[tuple[str, ...], ...]) -> dict[str, float]:
-    """The coefficients of the first of the forms that the rows can tell; none if they cannot."""
+def _fit_largest_form(
+    rows: WholeTrialRegression, forms: tuple[tuple[str, ...], ...]
+) -> dict[str, float]:
+    """Return the coefficients of the first form that the rows determine; empty if none."""
     for names in forms:
         solution = rows.solution(names)
         if solution.determined[: len(names)].all():

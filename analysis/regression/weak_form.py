@@ -18,8 +18,8 @@ regression.
 References
 ----------
 Ya. V. Burylin: see `shiplog.ships.paper` and ``examples/papers/continuous_identification.py``.
-Ya. V. Burylin: see `shiplog.ships.paper` and "examples/papers/continuous_identification.py".
-Modeling and Simulation 19, 2021: test functions (1 - s^2)^p for regression in weak form.
+D. A. Messenger and D. M. Bortz, "Weak SINDy: Galerkin-based data-driven model selection",
+Multiscale Modeling and Simulation 19, 2021: test functions (1 - s^2)^p for regression in weak form.
 """
 
 from collections.abc import Sequence
