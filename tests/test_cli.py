@@ -7,13 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fitted_runs import identify_auto
 from places import KVLCC2, LAYOUTS, PROJECT
 
 from recorders.record import record
 from recorders.simulated.simulate import SimulatedTrial
-from shiplog import Channel, LogWriter, TrialLog, load_vessel, read, write
+from shiplog import Channel, LogWriter, TrialLog, read, write
 from shiplog.cli.main import main
 from shiplog.cli.verb import ExitCode
+from shiplog.vessel.vessel_parser import parse_vessel
 
 OK, FAILURE, USAGE, DATA_LOST = ExitCode
 
@@ -558,19 +560,19 @@ def test_a_ship_of_another_model_is_identified_written_simulated_and_replayed(
     assert "has only a model 'norrbin'" in output.err
 
 
-def test_the_best_model_is_chosen_on_the_command_line(
-    two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    capsys.readouterr()
-    assert main(["identify", *two_runs, "--model", "auto", "--json", "-", "-o", "best.toml"]) == OK
-    output = capsys.readouterr()
-    result = json.loads(output.out)
+@pytest.mark.xdist_group("auto")
+def test_the_best_model_is_chosen_on_the_command_line() -> None:
+    run = identify_auto()
+    assert run.exit_code == OK
+    result = json.loads(run.stdout)
+    assert result["model"]["name"] == run.ship.model.name
     assert result["model"]["name"] in ("burylin", "burylin-tied")
-    assert [each["score"] for each in result["models"]] == sorted(
-        each["score"] for each in result["models"]
-    )
-    assert "Models by cross-validation" in output.err
-    assert load_vessel("best.toml")[0].model is None  # the paper's model needs no section [model]
+    scores = [each["score"] for each in result["models"]]
+    assert scores == sorted(scores)
+    assert "Models by cross-validation" in run.stderr
+    assert "model 1 of 7" in run.stderr
+    vessel = parse_vessel(run.vessel_toml, "best.toml")
+    assert vessel.model is None  # the paper's model needs no section [model]
 
 
 @pytest.mark.parametrize(

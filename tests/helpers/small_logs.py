@@ -4,7 +4,7 @@ import numpy as np
 
 from shiplog.types import Channel, TrialLog
 
-ODD = np.array([np.nan, -0.0, 0.0, 5e-324, -1.7976931348623157e308])
+EXTREME_VALUES = np.array([np.nan, -0.0, 0.0, 5e-324, -1.7976931348623157e308])
 LAYOUT = """
 [time]
 column = 1
@@ -22,7 +22,16 @@ def trial() -> TrialLog:
     return TrialLog(
         "trial.mcap",
         (
-            Channel("yaw_rate", "gyro, main", "rad/s", stamps, stamps + 7, ODD, (), {"a": 'b,"\n'}),
+            Channel(
+                "yaw_rate",
+                "gyro, main",
+                "rad/s",
+                stamps,
+                stamps + 7,
+                EXTREME_VALUES,
+                (),
+                {"a": 'b,"\n'},
+            ),
             Channel("position", "gps", "m", stamps, stamps, places, ("north", "east")),
             Channel("speed", "log", "m/s", empty, empty, empty.astype(float)),
             Channel("yaw_rate", "mems", "rad/s", stamps[::-1], stamps, np.arange(5) / 7),
@@ -43,5 +52,5 @@ def require_same(one: TrialLog, other: TrialLog) -> None:
         assert a.received_ns.tolist() == b.received_ns.tolist()
         assert a.values.shape == b.values.shape
         assert np.array_equal(a.values, b.values, equal_nan=True)
-        there = ~np.isnan(a.values)
-        assert np.array_equal(np.signbit(a.values[there]), np.signbit(b.values[there]))
+        finite = ~np.isnan(a.values)
+        assert np.array_equal(np.signbit(a.values[finite]), np.signbit(b.values[finite]))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fitted_runs import identify_auto
 from trial_logs import as_log
 
 from analysis.identification.identified_ship import IdentifiedShip
@@ -43,7 +44,7 @@ def a_log(
 
 
 @cache
-def known_ship() -> IdentifiedShip:
+def tied_ship() -> IdentifiedShip:
     validation_logs = [
         a_log("turning-circle-35", 7, seconds=500.0),
         a_log("zigzag-10-10", 8, seconds=600),
@@ -69,8 +70,9 @@ def with_values(log: TrialLog, **values: float) -> TrialLog:
 # ---- results
 
 
+@pytest.mark.xdist_group("tied ship")
 def test_intervals_from_several_logs_contain_the_true_parameters() -> None:
-    ship, truth = known_ship(), VESSEL.coefficients._asdict()
+    ship, truth = tied_ship(), VESSEL.coefficients._asdict()
     for name, (low, high) in zip(ship.uncertainty.names, ship.uncertainty.interval, strict=True):
         middle = (low + high) / 2
         assert abs(truth[name] - middle) < 1.6 * (high - low) / 2, name
@@ -81,37 +83,35 @@ def test_intervals_from_several_logs_contain_the_true_parameters() -> None:
     assert ship.warnings == ()
 
 
+@pytest.mark.xdist_group("tied ship")
 def test_validation_logs_are_predicted_with_manoeuvring_indices() -> None:
-    circle, zigzag = known_ship().validations
+    circle, zigzag = tied_ship().validations
     assert circle.rms["yaw_rate"] < radians(0.02)
     assert circle.rms["track"] < 15
     errors = {f.name: 100 * abs(f.error / f.measured) for f in circle.indices}
     assert set(errors) == {"advance", "transfer", "tactical diameter", "time to 90°",
                         "time to 180°", "steady yaw rate", "steady speed"}  # fmt: skip
     assert max(errors.values()) < 2
-    figures = {f.name: f for f in zigzag.indices}
+    indices = {f.name: f for f in zigzag.indices}
     # heading extrema of 24.159 at 133.0 s and -18.093 at 275.8: from an independent simulation
-    assert degrees(figures["overshoot 1"].measured) == pytest.approx(14.159, abs=0.15)
-    assert degrees(figures["overshoot 2"].measured) == pytest.approx(8.093, abs=0.15)
-    assert abs(degrees(figures["overshoot 1"].error)) < 1
-    assert figures["period"].measured == pytest.approx(2 * (406.2 - 275.8), abs=10)
+    assert degrees(indices["overshoot 1"].measured) == pytest.approx(14.159, abs=0.15)
+    assert degrees(indices["overshoot 2"].measured) == pytest.approx(8.093, abs=0.15)
+    assert abs(degrees(indices["overshoot 1"].error)) < 1
+    assert indices["period"].measured == pytest.approx(2 * (406.2 - 275.8), abs=10)
 
 
-@cache
-def ranked() -> IdentifiedShip:
-    return identify([a_log(seconds=300.0), a_log("zigzag-10-10-port", 2, seconds=300.0)], "auto")
-
-
+@pytest.mark.xdist_group("auto")
 def test_auto_takes_the_model_that_best_predicts_the_run_left_out() -> None:
-    ship = ranked()
+    ship = identify_auto().ship
     assert ship.candidates[0].model is ship.model
     assert ship.model.name in ("burylin", "burylin-tied")
     assert len(ship.candidates) == 7
     assert "Models by cross-validation" in identification_tables(ship)[0].title
 
 
+@pytest.mark.xdist_group("auto")
 def test_the_best_model_whose_simulation_does_not_diverge_is_taken() -> None:
-    first, second, *others = ranked().candidates
+    first, second, *others = identify_auto().ship.candidates
     assert _best_fit([first, second, *others]) is first.fit
     assert _best_fit([replace(first, fit=None), second, *others]) is second.fit
     with pytest.raises(LogError, match="simulation of every model diverges"):
@@ -123,25 +123,26 @@ def test_a_fixed_t3_selects_the_tied_form() -> None:
     assert identify([a_log()]).model.name == "burylin"
 
 
-def test_ties_are_consistent_where_they_hold_and_contradicted_where_they_do_not() -> None:
+def test_ties_are_consistent_with_data_of_a_tied_ship_and_contradicted_by_others() -> None:
     ties = identify([a_log(noise="white"), a_log("zigzag-10-10", 3, noise="white")]).ties
     assert ties is not None
     assert not ties.contradicted
     assert "consistent with the data" in ties.advice(tied=False)
-    loose = parse_vessel(TOML, "x")
-    loose = replace(loose, coefficients=loose.coefficients._replace(b1=-2.6e-4))
-    trial = simulate(loose, "zigzag-20-20", duration_secs=500.0, sensors=suite("white"))
-    against = identify([as_log(trial)], "burylin-tied", vessel=VESSEL).ties
-    assert against is not None
-    assert "contradicted by the data" in against.advice(tied=False)
+    untied = parse_vessel(TOML, "x")
+    untied = replace(untied, coefficients=untied.coefficients._replace(b1=-2.6e-4))
+    trial = simulate(untied, "zigzag-20-20", duration_secs=500.0, sensors=suite("white"))
+    contradicted = identify([as_log(trial)], "burylin-tied", vessel=VESSEL).ties
+    assert contradicted is not None
+    assert "contradicted by the data" in contradicted.advice(tied=False)
     assert identify([a_log()], "nomoto").ties is None
 
 
 # ---- vessel file
 
 
+@pytest.mark.xdist_group("tied ship")
 def test_the_vessel_file_holds_the_identified_ship() -> None:
-    ship = known_ship()
+    ship = tied_ship()
     text = vessel_toml(ship)
     written = parse_vessel(text, "v.toml")
     c = ship.model.expand(ship.fit.parameters.astype(complex))
@@ -150,7 +151,7 @@ def test_the_vessel_file_holds_the_identified_ship() -> None:
     assert (written.rudder_max, written.rudder_rate) == (VESSEL.rudder_max, VESSEL.rudder_rate)
     assert "± " in text
     assert "tied: b1 = -d" in text
-    # and its simulation is the prediction of the fit
+    # its simulation equals the prediction of the fit
     trial = simulate(written, "zigzag-20-20", duration_secs=300.0, sensors=suite("none"))
     (simulated,) = run_from_log(as_log(trial)).segments
     outputs = predict(ship.fit, simulated)
@@ -172,18 +173,18 @@ def test_a_parameter_that_is_not_identifiable_has_no_value_in_tables_and_json() 
 # ---- rejected input, and warnings
 
 
-def runs() -> Iterator[tuple[TrialLog, str]]:
+def useless_logs() -> Iterator[tuple[TrialLog, str]]:
     log = a_log()
     yield with_values(log, rudder=0.0), r"the rudder moves by 0\.0° in all"
     yield with_values(log, rudder=radians(5)), r"the rudder moves by 0\.0° in all"
     yield a_log(seconds=10.0), "less than 60 s at a time, too short"
     yield without(log, "rudder"), "no channel 'rudder'.*an identification needs"
-    yield with_values(log, rpm=0.0), "at 0 rpm, and a model is of a ship under way"
+    yield with_values(log, rpm=0.0), "at 0 rpm, but the models describe a ship under way"
 
 
 @pytest.mark.parametrize("number", range(5))
-def test_logs_that_cannot_identify_anything_are_refused(number: int) -> None:
-    log, message = list(runs())[number]
+def test_logs_that_identify_no_parameter_are_rejected(number: int) -> None:
+    log, message = list(useless_logs())[number]
     for model in ("burylin", "three-dof"):
         with pytest.raises(LogError, match=message):
             identify([log], model)
@@ -217,20 +218,20 @@ def test_logs_of_different_ships_under_one_vessel_file_give_a_warning() -> None:
     other = TOML.replace("T1 = 150.0", "T1 = 90.0").replace("T2 = 50.0", "T2 = 40.0")
     mixed = identify([a_log(), a_log(toml=other)], vessel=VESSEL)
     assert any("another ship" in warning for warning in mixed.warnings)
-    (slow, _) = a_log(), None
-    speed = slow["speed"]
-    quick = replace(speed, values=3 * speed.values)
-    scaled = replace(slow, channels=tuple(quick if c is speed else c for c in slow.channels))
-    flagged = identify([a_log(seed=1), replace(scaled, name="scaled.mcap")])
-    assert any("scaled.mcap starts with" in warning for warning in flagged.warnings)
+    log = a_log()
+    speed = log["speed"]
+    faster = replace(speed, values=3 * speed.values)
+    scaled = replace(log, channels=tuple(faster if c is speed else c for c in log.channels))
+    inconsistent = identify([a_log(seed=1), replace(scaled, name="scaled.mcap")])
+    assert any("scaled.mcap starts with" in warning for warning in inconsistent.warnings)
 
 
 def test_a_rudder_of_opposite_sign_gives_a_warning() -> None:
     log = a_log()
     rudder = log["rudder"]
     turned = replace(rudder, values=-rudder.values)
-    contrary = replace(log, channels=tuple(turned if c is rudder else c for c in log.channels))
-    assert any("rudder" in w and "port" in w for w in identify([contrary]).warnings)
+    reversed_log = replace(log, channels=tuple(turned if c is rudder else c for c in log.channels))
+    assert any("rudder" in w and "port" in w for w in identify([reversed_log]).warnings)
 
 
 def test_an_assumed_length_gives_a_warning_and_a_given_one_is_used() -> None:
@@ -281,7 +282,7 @@ def test_a_slow_speed_log_widens_intervals_only_by_its_fewer_samples(rate: float
     assert 0.09 < speed.white < 0.14  # 0.2 m/s, uniform
 
 
-def test_a_swell_is_found_in_one_log_although_another_is_calm() -> None:
+def test_a_swell_is_detected_in_one_log_although_another_has_none() -> None:
     ship = identify([a_log(), a_log(seed=1, noise="white")], "burylin")
     assert [len(run.wave_secs) for run in ship.runs] == [1, 0]
     assert ship.runs[0].wave_secs[0] == pytest.approx(62.8, rel=0.02)
@@ -290,7 +291,7 @@ def test_a_swell_is_found_in_one_log_although_another_is_calm() -> None:
 def test_the_same_data_under_two_names_are_rejected() -> None:
     copy = replace(a_log(), name="copy.mcap")
     for fitted, validation_logs in (([a_log(), copy], []), ([a_log()], [copy])):
-        with pytest.raises(UsageError, match=r"same data twice.*zigzag-20-20-0.*copy"):
+        with pytest.raises(UsageError, match=r"hold the same data.*zigzag-20-20-0.*copy"):
             identify(fitted, validation_logs=validation_logs)
 
 
@@ -392,8 +393,9 @@ def test_a_fixed_parameter_must_lie_within_the_model_s_limits() -> None:
 # ---- the public function
 
 
+@pytest.mark.xdist_group("tied ship")
 def test_a_result_pickles_and_copies() -> None:
-    ship = known_ship()
+    ship = tied_ship()
     for again in (pickle.loads(pickle.dumps(ship)), deepcopy(ship)):  # noqa: S301 - our own
         assert again.parameters == ship.parameters
         assert again.model.name == ship.model.name

@@ -36,19 +36,19 @@ def a_log(manoeuvre: str, seconds: float, noise_deg: float = 0.0, seed: int = 0)
 
 
 @cache
-def the_ship() -> OutputError:
+def exact_fit() -> OutputError:
     """Return a fit whose parameters are exactly those of the simulated ship."""
     (trial,) = run_from_log(a_log("zigzag-20-20", 300.0)).segments
     return output_error([trial], ship_model("burylin"), fixed=VESSEL.coefficients._asdict())
 
 
 def validated(log: TrialLog) -> Validation:
-    (found,) = validate(the_ship(), run_from_log(log))
-    return found
+    (validation,) = validate(exact_fit(), run_from_log(log))
+    return validation
 
 
-def figures(log: TrialLog) -> dict[str, ManoeuvreIndex]:
-    return {figure.name: figure for figure in validated(log).indices}
+def indices_of(log: TrialLog) -> dict[str, ManoeuvreIndex]:
+    return {index.name: index for index in validated(log).indices}
 
 
 def without(log: TrialLog, *names: str) -> TrialLog:
@@ -73,7 +73,7 @@ def circle(noise_deg: float = 0.0, seed: int = 0) -> TrialLog:
     return a_log("turning-circle-35", CIRCLE_SECS, noise_deg, seed)
 
 
-def steered(log: TrialLog, secs: list[float], rudder_deg: list[float]) -> TrialLog:
+def with_rudder(log: TrialLog, secs: list[float], rudder_deg: list[float]) -> TrialLog:
     """Return the log with another rudder, piecewise linear, which the ship did not follow."""
     rudder = log["rudder"]
     time = (rudder.measured_ns - rudder.measured_ns[0]) * 1e-9
@@ -85,10 +85,10 @@ def steered(log: TrialLog, secs: list[float], rudder_deg: list[float]) -> TrialL
 
 
 @pytest.mark.parametrize("course_deg", [0.0, 90.0, -150.0])
-def test_without_heading_the_initial_one_is_found_from_the_fixes(course_deg: float) -> None:
-    found = validated(without(fixes(circle(), course_deg=course_deg), "heading"))
-    assert found.rms["track"] < 5
-    indices = {figure.name: figure.measured for figure in found.indices}
+def test_without_heading_the_initial_one_is_estimated_from_the_fixes(course_deg: float) -> None:
+    validation = validated(without(fixes(circle(), course_deg=course_deg), "heading"))
+    assert validation.rms["track"] < 5
+    indices = {index.name: index.measured for index in validation.indices}
     assert indices["advance"] == pytest.approx(ADVANCE, rel=0.005)
     assert indices["tactical diameter"] == pytest.approx(DIAMETER, rel=0.005)
 
@@ -106,14 +106,14 @@ def test_without_heading_fixes_that_determine_no_heading_are_not_used() -> None:
 
 
 def test_late_fixes_are_shifted_onto_the_track_where_they_begin() -> None:
-    found = validated(fixes(a_log("zigzag-20-20", 300.0), after_secs=60.0))
-    assert found.rms["track"] < 5
-    assert np.isnan(found.measured_track[0]).all()
+    validation = validated(fixes(a_log("zigzag-20-20", 300.0), after_secs=60.0))
+    assert validation.rms["track"] < 5
+    assert np.isnan(validation.measured_track[0]).all()
 
 
 @pytest.mark.parametrize("after_secs", [5.0, 60.0])
 def test_indices_of_a_track_are_right_or_absent(after_secs: float) -> None:
-    whole, late = figures(circle()), figures(fixes(circle(), after_secs=after_secs))
+    whole, late = indices_of(circle()), indices_of(fixes(circle(), after_secs=after_secs))
     on_track = {"advance", "transfer", "tactical diameter"}
     expected = set(whole) if after_secs < 10 else set(whole) - on_track
     assert set(late) == expected
@@ -122,20 +122,20 @@ def test_indices_of_a_track_are_right_or_absent(after_secs: float) -> None:
 
 
 def test_a_run_without_heading_and_position_is_validated() -> None:
-    found = validated(without(circle(), "heading", "position"))
-    assert "heading" not in found.rms
-    indices = {figure.name: figure for figure in found.indices}
+    validation = validated(without(circle(), "heading", "position"))
+    assert "heading" not in validation.rms
+    indices = {index.name: index for index in validation.indices}
     assert indices["advance"].measured == pytest.approx(ADVANCE, rel=0.02)
     assert abs(indices["tactical diameter"].error) < 0.02 * indices["tactical diameter"].measured
 
 
 def test_a_diverging_simulation_is_reported() -> None:
-    fit = the_ship()
+    fit = exact_fit()
     fast = replace(fit.problem, values=fit.problem.values * -40.0)
-    (found,) = validate(replace(fit, problem=fast), run_from_log(circle()))
-    assert found.diverged
-    assert found.indices == ()
-    assert np.isfinite(found.measured_track).all()
+    (validation,) = validate(replace(fit, problem=fast), run_from_log(circle()))
+    assert validation.diverged
+    assert validation.indices == ()
+    assert np.isfinite(validation.measured_track).all()
 
 
 def test_the_rms_is_of_the_finite_values() -> None:
@@ -156,9 +156,9 @@ def test_the_first_order_is_where_the_rudder_departs_from_its_rest() -> None:
 
 
 def test_heading_noise_hardly_changes_the_indices_of_a_zigzag() -> None:
-    clean, errors = figures(a_log("zigzag-10-10", 700.0)), []
+    clean, errors = indices_of(a_log("zigzag-10-10", 700.0)), []
     for seed in range(6):
-        noisy = figures(a_log("zigzag-10-10", 700.0, NOISE_DEG, seed))
+        noisy = indices_of(a_log("zigzag-10-10", 700.0, NOISE_DEG, seed))
         assert list(noisy) == list(clean)
         errors.append([noisy[name].measured - clean[name].measured for name in clean])
     turning, *overshoots, period = np.array(errors).T
@@ -171,17 +171,17 @@ def test_heading_noise_hardly_changes_the_indices_of_a_zigzag() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_heading_noise_hardly_changes_the_indices_of_a_circle(seed: int) -> None:
-    clean, noisy = figures(circle()), figures(circle(NOISE_DEG, seed))
-    for name, figure in noisy.items():
-        assert figure.measured == pytest.approx(clean[name].measured, rel=0.01), name
+    clean, noisy = indices_of(circle()), indices_of(circle(NOISE_DEG, seed))
+    for name, index in noisy.items():
+        assert index.measured == pytest.approx(clean[name].measured, rel=0.01), name
 
 
 def test_the_indices_of_a_zigzag_are_those_of_an_independent_simulation() -> None:
-    found = figures(a_log("zigzag-10-10", 700.0))
+    validation = indices_of(a_log("zigzag-10-10", 700.0))
     # heading extrema of 24.159 at 133.0 s and -18.093 at 275.8, then at 406.2
-    assert degrees(found["overshoot 1"].measured) == pytest.approx(14.159, abs=0.02)
-    assert degrees(found["overshoot 2"].measured) == pytest.approx(8.093, abs=0.02)
-    assert found["period"].measured == pytest.approx(2 * (406.2 - 275.8), abs=10)
+    assert degrees(validation["overshoot 1"].measured) == pytest.approx(14.159, abs=0.02)
+    assert degrees(validation["overshoot 2"].measured) == pytest.approx(8.093, abs=0.02)
+    assert validation["period"].measured == pytest.approx(2 * (406.2 - 275.8), abs=10)
 
 
 def test_the_initial_turning_time_ends_at_the_first_execute_heading() -> None:
@@ -190,8 +190,8 @@ def test_the_initial_turning_time_ends_at_the_first_execute_heading() -> None:
     secs = (heading.measured_ns - heading.measured_ns[0]) * 1e-9
     first = int(np.argmax(heading.values > radians(10)))
     at = np.interp(radians(10), heading.values[first - 1 : first + 1], secs[first - 1 : first + 1])
-    found = figures(log)["initial turning time"]
-    assert found.measured == pytest.approx(at - 10.0, abs=0.4)  # the rudder moves at 10 s
+    validation = indices_of(log)["initial turning time"]
+    assert validation.measured == pytest.approx(at - 10.0, abs=0.4)  # the rudder moves at 10 s
 
 
 def tanker(path: str) -> dict[str, float]:
@@ -200,7 +200,7 @@ def tanker(path: str) -> dict[str, float]:
     if not file.is_file():
         pytest.skip(f"the real recordings are not here: {file}")
     layout = load_layout(PROJECT / "sample_data" / "layouts" / f"simman_{file.parent.name}.toml")
-    indices = figures(read_table(file, layout))
+    indices = indices_of(read_table(file, layout))
     return {n: degrees(f.measured) if f.unit == "rad" else f.measured for n, f in indices.items()}
 
 
@@ -229,8 +229,8 @@ def test_a_late_reversal_is_counted_from_the_nominal_heading(rudder: str) -> Non
 
 def test_a_ship_simulated_by_its_own_equations_has_no_error_in_any_index() -> None:
     for log in (circle(), a_log("zigzag-10-10", 700.0)):
-        for figure in figures(log).values():
-            assert abs(figure.error) < 2e-3 * abs(figure.measured), figure
+        for index in indices_of(log).values():
+            assert abs(index.error) < 2e-3 * abs(index.measured), index
 
 
 # ---- recognition of manoeuvres
@@ -238,48 +238,48 @@ def test_a_ship_simulated_by_its_own_equations_has_no_error_in_any_index() -> No
 
 @pytest.mark.parametrize("seed", range(8))
 def test_a_pseudo_random_run_has_no_indices(seed: int) -> None:
-    assert figures(a_log("pseudo-random", 600.0, seed=seed)) == {}
+    assert indices_of(a_log("pseudo-random", 600.0, seed=seed)) == {}
 
 
 @pytest.mark.parametrize("manoeuvre", ["spiral", "pull-out-5"])
 def test_spirals_and_pull_outs_have_no_indices(manoeuvre: str) -> None:
-    assert figures(a_log(manoeuvre, 900.0)) == {}
+    assert indices_of(a_log(manoeuvre, 900.0)) == {}
 
 
-def test_a_circle_has_a_rudder_held_over() -> None:
-    held = steered(circle(), [10, 24, 500], [0, 35, 35])
-    assert "advance" in figures(held)
-    eased = steered(circle(), [10, 24, 40, 50, 500], [0, 35, 35, 15, 15])
-    assert figures(eased) == {}
-    slow = steered(circle(), [10, 200], [0, 35])
-    assert figures(slow) == {}
-    begun_before = steered(circle(), [3.5, 5, 6, 8, 10, 24, 500], [0, 4, 4, 0, 0, 35, 35])
-    assert figures(begun_before) == {}
+def test_a_circle_requires_a_constant_rudder_angle() -> None:
+    held = with_rudder(circle(), [10, 24, 500], [0, 35, 35])
+    assert "advance" in indices_of(held)
+    reduced = with_rudder(circle(), [10, 24, 40, 50, 500], [0, 35, 35, 15, 15])
+    assert indices_of(reduced) == {}
+    slow = with_rudder(circle(), [10, 200], [0, 35])
+    assert indices_of(slow) == {}
+    deflected_before = with_rudder(circle(), [3.5, 5, 6, 8, 10, 24, 500], [0, 4, 4, 0, 0, 35, 35])
+    assert indices_of(deflected_before) == {}
 
 
-def test_the_indices_of_a_circle_end_where_the_rudder_is_eased() -> None:
-    quarter = figures(circle())["time to 90°"].measured
-    eased = 10 + quarter + 5
-    indices = figures(steered(circle(), [10, 24, eased, eased + 15, 500], [0, 35, 35, 0, 0]))
+def test_the_indices_of_a_circle_end_where_the_rudder_angle_is_reduced() -> None:
+    quarter = indices_of(circle())["time to 90°"].measured
+    end = 10 + quarter + 5
+    indices = indices_of(with_rudder(circle(), [10, 24, end, end + 15, 500], [0, 35, 35, 0, 0]))
     assert indices["advance"].measured == pytest.approx(ADVANCE, rel=0.005)
     assert "tactical diameter" not in indices
 
 
 def test_a_zigzag_has_equal_rudder_angles_on_both_sides() -> None:
     log = a_log("zigzag-10-10", 700.0)
-    assert "overshoot 1" in figures(log)
+    assert "overshoot 1" in indices_of(log)
     rudder = log["rudder"]
     time = (rudder.measured_ns - rudder.measured_ns[0]) * 1e-9
     values = np.degrees(rudder.values)
-    shifted = figures(steered(log, time.tolist(), (values + 1.2).tolist()))
-    assert list(shifted) == list(figures(log))
+    shifted = indices_of(with_rudder(log, time.tolist(), (values + 1.2).tolist()))
+    assert list(shifted) == list(indices_of(log))
     uneven = np.where(values < 0, 0.6 * values, values)
-    assert figures(steered(log, time.tolist(), uneven.tolist())) == {}
+    assert indices_of(with_rudder(log, time.tolist(), uneven.tolist())) == {}
     halting = np.where((time > 50) & (time < 60), 0.0, values)
-    assert figures(steered(log, time.tolist(), halting.tolist())) == {}
+    assert indices_of(with_rudder(log, time.tolist(), halting.tolist())) == {}
 
 
-def test_reversals_at_several_headings_are_no_zigzag() -> None:
+def test_reversals_at_different_headings_are_not_a_zigzag() -> None:
     assert switch_heading(np.radians([10.4, -10.9, 10.1]), 0.0) == pytest.approx(radians(10))
     assert switch_heading(np.radians([9.2, -10.4]), 0.0) == pytest.approx(radians(10))
     assert switch_heading(np.radians([2.1, -1.8]), 0.0) == pytest.approx(radians(2))

@@ -27,6 +27,7 @@ from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.ship import ship_from_vessel
 from shiplog.vessel.vessel_parser import parse_vessel
 
+MODELS = [pytest.param(name, marks=pytest.mark.xdist_group(f"identified {name}")) for name in SHIPS]
 NOISE = {"yaw_rate.white": 1e-4, "speed.white": 0.03, "heading.white": 1e-3, "sway.white": 0.03}
 RUNS = ("zigzag-20-20", "pseudo-random", "turning-circle-35-port")
 SECOND_ORDER = ("slipstream", "drift-lag", "three-dof")
@@ -46,11 +47,12 @@ def logs_of(name: str) -> tuple[TrialLog, ...]:
 
 @cache
 def identified(name: str) -> tuple[IdentifiedShip, str]:
+    """Return the identified ship of a model, and the text of its vessel file."""
     ship = identify(logs_of(name), name)
     return ship, vessel_toml(ship)
 
 
-def truth(vessel: Vessel, run: str) -> dict[str, FloatArray]:
+def exact_motion(vessel: Vessel, run: str) -> dict[str, FloatArray]:
     trajectory = compute_trajectory(vessel, manoeuvre(run, 400.0, vessel.approach_rpm), 400.0)
     return trajectory.at(np.arange(400.0))
 
@@ -58,7 +60,7 @@ def truth(vessel: Vessel, run: str) -> dict[str, FloatArray]:
 # ---- round trip
 
 
-@pytest.mark.parametrize("name", SHIPS)
+@pytest.mark.parametrize("name", MODELS)
 def test_the_intervals_of_each_model_contain_the_true_parameters(name: str) -> None:
     ship, _ = identified(name)
     # in the true scale: the measured speed of the straight run contains noise
@@ -71,7 +73,7 @@ def test_the_intervals_of_each_model_contain_the_true_parameters(name: str) -> N
     assert set(estimates.unidentifiable) <= {"f2"}
 
 
-@pytest.mark.parametrize("name", SHIPS)
+@pytest.mark.parametrize("name", MODELS)
 def test_the_file_holds_the_identified_model(name: str) -> None:
     ship, text = identified(name)
     vessel = parse_vessel(text, "v.toml")
@@ -83,22 +85,22 @@ def test_the_file_holds_the_identified_model(name: str) -> None:
     assert f"a = {ship.parameters.get('a')!r}  # ± " in text or name == "three-dof"
 
 
-@pytest.mark.parametrize("name", SHIPS)
-def test_the_identified_ship_manoeuvres_as_the_true_one_does(name: str) -> None:
+@pytest.mark.parametrize("name", MODELS)
+def test_the_identified_ship_manoeuvres_like_the_true_one(name: str) -> None:
     _, text = identified(name)
     true = parse_vessel(toml_of(name) + GEAR, name)
     for run in ("zigzag-10-10", "turning-circle-25"):
-        expected, again = truth(true, run), truth(parse_vessel(text, "v.toml"), run)
+        expected, again = exact_motion(true, run), exact_motion(parse_vessel(text, "v.toml"), run)
         for channel, least in (("yaw_rate", 0), ("speed", 0), ("sway", 1e-6)):
             size = np.ptp(expected[channel]) + least
             assert np.abs(again[channel] - expected[channel]).max() < 0.01 * size, channel
         assert np.hypot(*(again["position"] - expected["position"]).T).max() < 15
 
 
-# ---- the paper's model beside it
+# ---- the paper's model in the same file
 
 
-@pytest.mark.parametrize("name", SECOND_ORDER)
+@pytest.mark.parametrize("name", [m for m in MODELS if m.values[0] in SECOND_ORDER])
 def test_the_papers_model_of_the_same_logs_is_written_for_replay(name: str) -> None:
     _, text = identified(name)
     paper = parse_vessel(text, "v.toml").paper_coefficients
@@ -108,19 +110,20 @@ def test_the_papers_model_of_the_same_logs_is_written_for_replay(name: str) -> N
     np.testing.assert_allclose(paper, alone, rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["nomoto", "norrbin"])
+@pytest.mark.parametrize("name", [m for m in MODELS if m.values[0] not in SECOND_ORDER])
 def test_the_papers_model_of_a_first_order_ship_is_stable_and_turns_or_is_absent(name: str) -> None:
     c = parse_vessel(identified(name)[1], "v.toml").coefficients
     assert c is None or (c.d > 0 > c.a)
 
 
+@pytest.mark.xdist_group("identified slipstream")
 def test_a_papers_model_with_a_rudder_of_opposite_sign_is_not_written() -> None:
-    contrary = with_rudder_turned(logs_of("slipstream")[0])
-    turned = replace(identified("slipstream")[0], fit=identify([contrary], "slipstream").fit)
+    reversed_log = with_rudder_reversed(logs_of("slipstream")[0])
+    turned = replace(identified("slipstream")[0], fit=identify([reversed_log], "slipstream").fit)
     assert parse_vessel(vessel_toml(turned), "v.toml").coefficients is None
 
 
-@pytest.mark.parametrize("name", SHIPS)
+@pytest.mark.parametrize("name", MODELS)
 def test_each_model_s_log_is_replayed_with_the_written_file(name: str) -> None:
     log = replace(logs_of(name)[0], vessel_toml=identified(name)[1])
     replayed = analyse(log)
@@ -131,12 +134,13 @@ def test_each_model_s_log_is_replayed_with_the_written_file(name: str) -> None:
         assert np.nanstd(error[len(error) // 4 :]) < 0.1 * np.nanstd(measured)
 
 
-def with_rudder_turned(log: TrialLog) -> TrialLog:
+def with_rudder_reversed(log: TrialLog) -> TrialLog:
     rudder = log["rudder"]
     turned = replace(rudder, values=-rudder.values)
     return replace(log, channels=tuple(turned if c is rudder else c for c in log.channels))
 
 
+@pytest.mark.xdist_group("identified slipstream")
 def test_the_papers_model_among_the_candidates_is_not_fitted_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -151,6 +155,7 @@ def diverges(*_: object, **__: object) -> None:
     raise LogError("the model burylin diverges on these segments")
 
 
+@pytest.mark.xdist_group("identified norrbin")
 def test_where_the_papers_model_diverges_the_identified_one_is_written_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -173,6 +178,7 @@ def test_where_the_papers_model_diverges_the_identified_one_is_written_alone(
     assert replayed.findings.plan.vessel.coefficients == without.findings.plan.vessel.coefficients
 
 
+@pytest.mark.xdist_group("identified three-dof")
 def test_length_gear_and_alphas_come_from_the_file_a_log_carries() -> None:
     _, text = identified("three-dof")
     carried = text.replace("alpha3 = 0.0654", "alpha3 = 0.05")
@@ -200,6 +206,7 @@ def without_length() -> IdentifiedShip:
     return identify([as_log(trial) for trial in segments], "three-dof")
 
 
+@pytest.mark.xdist_group("without length")
 def test_an_assumed_length_is_marked() -> None:
     text = vessel_toml(without_length())
     (line,) = [line for line in text.split("\n") if line.startswith("length")]
@@ -207,6 +214,7 @@ def test_an_assumed_length_is_marked() -> None:
     assert parse_vessel(text, "v.toml").length == 150.0
 
 
+@pytest.mark.xdist_group("without length")
 def test_values_that_are_not_identifiable_are_marked_with_their_origin() -> None:
     ship = without_length()  # no sway was measured
     estimates = ship.uncertainty
@@ -214,12 +222,13 @@ def test_values_that_are_not_identifiable_are_marked_with_their_origin() -> None
     text = vessel_toml(replace(ship, uncertainty=replace(estimates, prior_share=share)))
     own, _, _ = text.partition("[yaw]")
     lines = {line.split(" = ")[0]: line for line in own.split("\n")}
-    caution = "NOT IDENTIFIABLE from these logs"
-    assert lines["yv"].endswith(f"{caution}: mostly its prior")
+    remark = "NOT IDENTIFIABLE from these logs"
+    assert lines["yv"].endswith(f"{remark}: mostly its prior")
     for name in set(estimates.unidentifiable) - {"yv"}:
-        assert lines[name].endswith(f"{caution}: one of many values that fit them")
+        assert lines[name].endswith(f"{remark}: one of many values that fit them")
 
 
+@pytest.mark.xdist_group("identified nomoto")
 def test_an_equation_without_identifiable_parameters_is_not_written() -> None:
     ship, _ = identified("nomoto")
     estimates = ship.uncertainty
@@ -230,6 +239,7 @@ def test_an_equation_without_identifiable_parameters_is_not_written() -> None:
             vessel_toml(unidentifiable)
 
 
+@pytest.mark.xdist_group("identified nomoto")
 def test_a_model_that_does_not_fit_the_ship_is_written_with_a_caution() -> None:
     ship, _ = identified("nomoto")
     wide = replace(ship.uncertainty, std=np.full(len(ship.uncertainty.names), 100.0))

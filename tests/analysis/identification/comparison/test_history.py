@@ -12,7 +12,7 @@ from analysis.identification.comparison.history import (
     with_breaks,
 )
 
-ANYWHERE = np.full(5, -np.inf), np.full(5, np.inf)
+NO_BOUNDS = np.full(5, -np.inf), np.full(5, np.inf)
 
 
 def history(high: list[float], low: list[float]) -> ParameterHistory:
@@ -23,8 +23,8 @@ def history(high: list[float], low: list[float]) -> ParameterHistory:
 
 
 def test_the_share_of_prior_is_1_for_a_copy_and_0_where_both_estimates_agree() -> None:
-    found = history([1.3, 1.3, 1.15, 1.0], [0.7, 0.7, 0.85, 1.0])
-    np.testing.assert_allclose(found.prior_share[:, 0], [1.0, 1.0, 0.5, 0.0])
+    result = history([1.3, 1.3, 1.15, 1.0], [0.7, 0.7, 0.85, 1.0])
+    np.testing.assert_allclose(result.prior_share[:, 0], [1.0, 1.0, 0.5, 0.0])
 
 
 def test_amplified_errors_exceed_a_share_of_1() -> None:
@@ -32,15 +32,15 @@ def test_amplified_errors_exceed_a_share_of_1() -> None:
 
 
 def test_estimates_that_cross_and_part_again_are_mostly_prior() -> None:
-    found = history([1.3, 1.0, 1.4, 1.0], [0.7, 1.0, 0.6, 1.0])
-    assert found.mostly_prior[:, 0].tolist() == [True, True, True, False]
+    result = history([1.3, 1.0, 1.4, 1.0], [0.7, 1.0, 0.6, 1.0])
+    assert result.mostly_prior[:, 0].tolist() == [True, True, True, False]
 
 
 def test_a_gap_has_no_share_of_prior() -> None:
-    found = history([1.3, np.nan, 1.4, 1.0], [0.7, 1.0, 0.6, 1.0])
-    assert np.isnan(found.prior_share[1, 0])
-    assert found.mostly_prior[:3, 0].all()
-    assert found.median_prior_share[0] == np.median(found.prior_share[2:, 0])
+    result = history([1.3, np.nan, 1.4, 1.0], [0.7, 1.0, 0.6, 1.0])
+    assert np.isnan(result.prior_share[1, 0])
+    assert result.mostly_prior[:3, 0].all()
+    assert result.median_prior_share[0] == np.median(result.prior_share[2:, 0])
 
 
 def test_a_method_without_priors_has_no_share_of_prior() -> None:
@@ -54,14 +54,14 @@ def test_a_method_without_priors_has_no_share_of_prior() -> None:
 
 def test_priors_are_on_both_sides_and_further_apart_where_the_std_is_larger() -> None:
     estimates = SimpleNamespace(values=np.array([2.0, -1.0, 1.0]), std=np.array([0.01, 0.2, 50.0]))
-    high, low = two_priors(estimates, ANYWHERE)  # type: ignore[arg-type]
+    high, low = two_priors(estimates, NO_BOUNDS)  # type: ignore[arg-type]
     np.testing.assert_allclose((high + low) / 2, estimates.values)
     np.testing.assert_allclose(np.abs(high - low) / 2, [0.6, 0.6, 1.0])
 
 
 def test_a_value_of_zero_has_two_different_priors() -> None:
     estimates = SimpleNamespace(values=np.array([0.0]), std=np.array([0.1]))
-    high, low = two_priors(estimates, ANYWHERE)  # type: ignore[arg-type]
+    high, low = two_priors(estimates, NO_BOUNDS)  # type: ignore[arg-type]
     assert high[0] != low[0]
 
 

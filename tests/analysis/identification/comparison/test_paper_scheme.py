@@ -1,4 +1,4 @@
-"""The paper's own scheme: it is as printed, and its result is mostly its prior."""
+"""The paper's own scheme: it is as printed, and its estimates are mostly its prior."""
 
 import numpy as np
 import pytest
@@ -18,13 +18,15 @@ from analysis.regression.coefficients import fit_coefficients
 from analysis.regression.weak_form import weak_form
 from shiplog import load_vessel
 
+pytestmark = pytest.mark.xdist_group("fitted")  # these files share fits
+
 PRIOR = load_vessel("table1")[0].coefficients
 
 
 def test_a_window_is_the_least_squares_solution_of_its_rows() -> None:
     signals = a_trial().signals
     states = paper_states(signals, PRIOR)
-    ends, found = window_coefficients(signals, PRIOR, states)
+    ends, result = window_coefficients(signals, PRIOR, states)
     k = int(np.searchsorted(ends, 310.0))
     stop = round(ends[k] / 0.1)
     expected = []
@@ -34,14 +36,16 @@ def test_a_window_is_the_least_squares_solution_of_its_rows() -> None:
         expected += (
             np.linalg.lstsq(part[:, :-1] / size, part[:, -1], rcond=None)[0] / size
         ).tolist()
-    np.testing.assert_allclose(found[k], expected, rtol=1e-6)
+    np.testing.assert_allclose(result[k], expected, rtol=1e-6)
 
 
 def test_with_the_true_coefficients_as_prior_it_returns_them() -> None:
     signals = a_trial().signals
     states = paper_states(signals, PRIOR, as_printed=False)
-    found = np.concatenate([solve_window(rows) for rows in regression_rows(signals, PRIOR, states)])
-    error = dict(zip(IDENTIFIED_NAMES, found / np.array(PRIOR[:9]) - 1, strict=True))
+    result = np.concatenate(
+        [solve_window(rows) for rows in regression_rows(signals, PRIOR, states)]
+    )
+    error = dict(zip(IDENTIFIED_NAMES, result / np.array(PRIOR[:9]) - 1, strict=True))
     assert abs(error["a"]) < 0.05
     assert abs(error["d"]) < 0.05
     assert abs(error["h"]) < 0.05
@@ -49,12 +53,12 @@ def test_with_the_true_coefficients_as_prior_it_returns_them() -> None:
 
 def test_its_estimates_from_two_priors_stay_apart() -> None:
     fit, estimates = fitted()
-    found = paper_scheme(fit, two_priors(estimates, fit.problem.bounds))
-    assert found is not None
-    prior_share = dict(zip(found.names, found.median_prior_share, strict=True))
+    result = paper_scheme(fit, two_priors(estimates, fit.problem.bounds))
+    assert result is not None
+    prior_share = dict(zip(result.names, result.median_prior_share, strict=True))
     assert prior_share["d"] > 0.5
     assert prior_share["b1"] > 1.0
-    assert found.mostly_prior.mean() > 0.7
+    assert result.mostly_prior.mean() > 0.7
 
 
 def test_other_models_have_no_history() -> None:
@@ -70,14 +74,14 @@ def test_a_diverged_filter_gives_nan() -> None:
 @pytest.mark.parametrize("model", ["burylin", "burylin-tied"])
 def test_windows_in_weak_form_are_those_of_a_replay(model: str) -> None:
     fit, _ = fitted(model, runs=2)
-    found = window_estimates(fit)
-    assert found is not None
+    result = window_estimates(fit)
+    assert result is not None
     yaw = fit_coefficients(weak_form(a_trial().signals, PRIOR)[0])[1]
     first = len(yaw.time_secs)
     np.testing.assert_allclose(
-        found.values[0, :first, found.names.index("d")], yaw.values[:, yaw.names.index("d")]
+        result.values[0, :first, result.names.index("d")], yaw.values[:, yaw.names.index("d")]
     )
-    assert np.isnan(found.values[0, first]).all()  # the break between the runs
-    assert found.time_secs[first + 1] > 400.0
-    known = found.values[0, :, found.names.index("d")]
-    assert np.nanmedian(known) == pytest.approx(TRUE["d"], rel=0.02)
+    assert np.isnan(result.values[0, first]).all()  # the break between the runs
+    assert result.time_secs[first + 1] > 400.0
+    estimates = result.values[0, :, result.names.index("d")]
+    assert np.nanmedian(estimates) == pytest.approx(TRUE["d"], rel=0.02)

@@ -44,48 +44,52 @@ def mixed() -> IdentifiedShip:
 
 def test_runs_of_one_ship_agree_within_their_noise() -> None:
     fit = output_error([a_trial(*run) for run in RUNS], ship_model("burylin"))
-    found = assess_agreement(fit)
-    assert found.names == tuple(f"{manoeuvre}-{seed}.mcap" for manoeuvre, seed in RUNS)
-    for ratios in (found.by_own_noise, found.by_common_noise):
+    agreement = assess_agreement(fit)
+    assert agreement.names == tuple(f"{manoeuvre}-{seed}.mcap" for manoeuvre, seed in RUNS)
+    for ratios in (agreement.by_own_noise, agreement.by_common_noise):
         # sums of squares of some thirty Gaussian numbers, over their number
         assert 0.3 < np.mean(np.square(ratios)) * 3 / 2 < 2.0
-    assert (found.contradiction, found.enlargement) == (1.0, 1.0)
+    assert (agreement.contradiction, agreement.enlargement) == (1.0, 1.0)
 
 
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "turning-circle-35", "pseudo-random"])
-def test_the_halves_of_a_run_agree_too(manoeuvre: str) -> None:
+def test_the_halves_of_a_run_agree(manoeuvre: str) -> None:
     for seed in (0, 1):
-        found = assess_agreement(output_error([a_trial(manoeuvre, seed)], ship_model("burylin")))
-        assert found.names == ("first half", "second half")
-        assert found.contradiction == 1.0
+        agreement = assess_agreement(
+            output_error([a_trial(manoeuvre, seed)], ship_model("burylin"))
+        )
+        assert agreement.names == ("first half", "second half")
+        assert agreement.contradiction == 1.0
 
 
+@pytest.mark.xdist_group("mixed")
 def test_the_log_of_another_ship_is_named_and_nothing_is_identifiable() -> None:
-    found = mixed()
-    (said,) = [w for w in found.warnings if "contradict each other" in w]
-    assert "zigzag-20-20-port-2.mcap the others" in said
-    assert found.uncertainty.agreement.contradiction > 20
-    assert set(found.uncertainty.unidentifiable) == set(found.uncertainty.names)
+    ship = mixed()
+    (warning,) = [w for w in ship.warnings if "contradict each other" in w]
+    assert "most of all zigzag-20-20-port-2.mcap" in warning
+    assert ship.uncertainty.agreement.contradiction > 20
+    assert set(ship.uncertainty.unidentifiable) == set(ship.uncertainty.names)
 
 
+@pytest.mark.xdist_group("mixed")
 def test_contradicting_runs_do_not_inflate_the_noise_of_one_output() -> None:
-    """Reweighting without a limit would give up one output, the speed first."""
+    """Without a limit, reweighting would ignore one output, the speed first."""
     fit = mixed().fit
     speed = fit.problem.outputs.index("speed")
     measured = np.concatenate([t.measured[:, 1] for t in fit.problem.segments])
     assert fit.noises[speed].slow < 0.5 * np.nanstd(measured)
-    told = mixed().uncertainty
-    truth = np.array([C._asdict()[name] for name in told.names])
-    assert np.max(np.abs(told.values - truth) / told.std) < 2
+    estimates = mixed().uncertainty
+    truth = np.array([C._asdict()[name] for name in estimates.names])
+    assert np.max(np.abs(estimates.values - truth) / estimates.std) < 2
 
 
 def test_two_logs_have_no_outlier() -> None:
     fit = output_error(
         [a_trial(*RUNS[0]), a_trial(*RUNS[2], OTHER)], ship_model("burylin-tied"), fixed={"T3": 0.5}
     )
-    found = assess_agreement(fit)
-    assert found.outlier is None
-    assert found.contradiction > 20
+    agreement = assess_agreement(fit)
+    assert agreement.outlier is None
+    assert agreement.contradiction > 20
 
 
 def test_a_run_too_short_for_its_own_noise_is_ignored() -> None:
@@ -97,6 +101,8 @@ def test_four_logs_of_one_ship_do_not_contradict_each_other() -> None:
     manoeuvres = ("zigzag-20-20", "zigzag-10-10-port", "zigzag-20-20-port", "zigzag-10-10")
     for first in (100, 200):
         segments = [a_trial(m, first + i) for i, m in enumerate(manoeuvres)]
-        found = uncertainty(output_error(segments, ship_model("burylin-tied"), fixed={"T3": 0.5}))
-        assert found.agreement.contradiction == 1.0
-        assert np.isfinite(found.between_runs).all()
+        estimates = uncertainty(
+            output_error(segments, ship_model("burylin-tied"), fixed={"T3": 0.5})
+        )
+        assert estimates.agreement.contradiction == 1.0
+        assert np.isfinite(estimates.between_runs).all()

@@ -24,7 +24,7 @@ CHANNELS = ("yaw_rate", "speed", "rudder", "rpm")
 
 
 @cache
-def sailed(
+def simulated(
     manoeuvre: str = "zigzag-20-20", seed: int = 0, noise: str = "paper", seconds: float = 500.0
 ) -> Signals:
     trial = simulate(VESSEL, manoeuvre, duration_secs=seconds, seed=seed, sensors=suite(noise))
@@ -32,14 +32,14 @@ def sailed(
 
 
 def a_trial(*args: object, **settings: object) -> Segment:
-    name = f"{args}{settings}.mcap"  # pieces of one name are pieces of one run
-    return split_into_segments(sailed(*args, **settings), name)[0]  # type: ignore[arg-type]
+    name = f"{args}{settings}.mcap"  # segments of one name belong to one run
+    return split_into_segments(simulated(*args, **settings), name)[0]  # type: ignore[arg-type]
 
 
 def errors(fit: OutputError) -> dict[str, float]:
-    """In per cent of the truth."""
-    found = dict(zip(fit.problem.model.names, fit.parameters, strict=True))
-    return {name: 100 * abs(found[name] / TRUTH[name] - 1) for name in fit.problem.free_names}
+    """Return the errors of the free parameters, % of their true values."""
+    estimates = dict(zip(fit.problem.model.names, fit.parameters, strict=True))
+    return {name: 100 * abs(estimates[name] / TRUTH[name] - 1) for name in fit.problem.free_names}
 
 
 # ---- estimates
@@ -55,13 +55,13 @@ def test_noise_free_data_give_the_true_parameters_from_any_start(manoeuvre: str)
 def test_tied_fits_of_zigzags_reach_the_required_accuracy() -> None:
     model, seeds = ship_model("burylin-tied"), range(5)
     rng = np.random.default_rng(3)
-    off = [{n: TRUTH[n] * rng.choice([0.5, 1.5]) for n in model.names[:8]} for _ in seeds]
-    for starts in ([None] * 5, [{n: v for n, v in o.items() if n != "T3"} for o in off]):
-        found = [
+    wrong = [{n: TRUTH[n] * rng.choice([0.5, 1.5]) for n in model.names[:8]} for _ in seeds]
+    for starts in ([None] * 5, [{n: v for n, v in o.items() if n != "T3"} for o in wrong]):
+        fit_errors = [
             errors(output_error([a_trial(seed=s)], model, fixed={"T3": 0.5}, start=start))
             for s, start in zip(seeds, starts, strict=True)
         ]
-        median = {name: np.median([f[name] for f in found]) for name in found[0]}
+        median = {name: np.median([f[name] for f in fit_errors]) for name in fit_errors[0]}
         assert max(median[name] for name in ("a", "d")) <= 0.1
         assert max(median[name] for name in ("b2", "b3")) <= 0.5
         assert max(median[name] for name in ("f", "g", "h")) <= 1.5
@@ -69,14 +69,14 @@ def test_tied_fits_of_zigzags_reach_the_required_accuracy() -> None:
 
 def test_free_fits_reach_the_cramer_rao_bound_and_their_intervals_hold_the_truth() -> None:
     fits = [output_error([a_trial(seed=s)], ship_model("burylin")) for s in range(8)]
-    found = [uncertainty(fit) for fit in fits]
-    truth = np.array([TRUTH[name] for name in found[0].names])
-    off = np.array([u.values - truth for u in found])
-    bound = np.median([u.bound for u in found], axis=0)
-    ratios = np.sqrt(np.mean(off**2, axis=0)) / bound
+    estimates = [uncertainty(fit) for fit in fits]
+    truth = np.array([TRUTH[name] for name in estimates[0].names])
+    error = np.array([u.values - truth for u in estimates])
+    bound = np.median([u.bound for u in estimates], axis=0)
+    ratios = np.sqrt(np.mean(error**2, axis=0)) / bound
     assert np.sqrt(np.mean(ratios**2)) < 1.2
-    assert ratios.max() < 1.8  # of nine, over eight seeds: chance makes one of them so large
-    inside = [(u.interval[:, 0] < truth) & (truth < u.interval[:, 1]) for u in found]
+    assert ratios.max() < 1.8  # the largest of nine, over eight seeds
+    inside = [(u.interval[:, 0] < truth) & (truth < u.interval[:, 1]) for u in estimates]
     assert 0.88 < np.mean(inside) <= 1.0
 
 
@@ -84,7 +84,7 @@ def test_each_segment_has_its_own_rudder_offset_and_gyro_bias() -> None:
     offsets, biases = (radians(0.4), radians(-0.3)), (radians(0.003), radians(-0.002))
     segments = []
     for seed, (offset, bias) in enumerate(zip(offsets, biases, strict=True)):
-        s = sailed(seed=seed)
+        s = simulated(seed=seed)
         values = dict(s.values) | {
             "rudder": s["rudder"] - offset, "yaw_rate": s["yaw_rate"] + bias
         }  # fmt: skip
@@ -106,7 +106,7 @@ def test_fixed_parameters_are_kept_and_freed_ones_estimated() -> None:
 
 
 def test_missing_samples_have_no_effect() -> None:
-    s = sailed(noise="none")
+    s = simulated(noise="none")
     values = {name: np.array(v) for name, v in s.values.items()}
     values["yaw_rate"][100:900] = np.nan
     values["speed"][::3] = np.nan
@@ -115,7 +115,7 @@ def test_missing_samples_have_no_effect() -> None:
 
 
 def test_one_outlier_in_a_hundred_samples_changes_little() -> None:
-    s = sailed(seed=4)
+    s = simulated(seed=4)
     values = {name: np.array(v) for name, v in s.values.items()}
     values["yaw_rate"][::100] += radians(0.3)
     spiked = split_into_segments(Signals(s.start_ns, s.dt_secs, values), "spikes.mcap")[0]
@@ -147,53 +147,55 @@ def test_alphas_are_unidentifiable_at_constant_revolutions() -> None:
 def test_prior_share_of_an_undetermined_parameter_is_large() -> None:
     segments = [a_trial("turning-circle-35", noise="white")]
     fit = output_error(segments, ship_model("three-dof"), length=200.0)
-    found = uncertainty(fit)
-    share = dict(zip(found.names, found.prior_share, strict=True))
+    estimates = uncertainty(fit)
+    share = dict(zip(estimates.names, estimates.prior_share, strict=True))
     assert share["p"] > 0.5
-    assert "p" in found.unidentifiable
-    assert np.all((found.prior_share > -1e-9) & (found.prior_share < 1 + 1e-9))
+    assert "p" in estimates.unidentifiable
+    assert np.all((estimates.prior_share > -1e-9) & (estimates.prior_share < 1 + 1e-9))
 
 
 def test_runs_of_different_ships_widen_the_intervals() -> None:
-    s = sailed(seed=1)
+    s = simulated(seed=1)
     other = Signals(s.start_ns, s.dt_secs, dict(s.values) | {"rudder": 0.8 * s["rudder"]})
     same = [a_trial(seed=0), a_trial(seed=1)]
     mixed = [a_trial(seed=0), split_into_segments(other, "other.mcap")[0]]
-    model, known = ship_model("burylin-tied"), {"T3": 0.5}
-    alike, unlike = (uncertainty(output_error(t, model, fixed=known)) for t in (same, mixed))
-    assert alike.enlargement == 1.0
-    assert np.all(unlike.std > 2 * alike.std)
+    model, fixed = ship_model("burylin-tied"), {"T3": 0.5}
+    of_one, of_two = (uncertainty(output_error(t, model, fixed=fixed)) for t in (same, mixed))
+    assert of_one.enlargement == 1.0
+    assert np.all(of_two.std > 2 * of_one.std)
 
 
 def test_four_runs_give_jackknife_errors() -> None:
     runs = [a_trial(seed=s, seconds=200.0) for s in range(4)]
-    found = uncertainty(output_error(runs, ship_model("burylin-tied"), fixed={"T3": 0.5}))
-    assert np.isfinite(found.between_runs).all()
-    assert found.enlargement == 1.0
-    # three degrees of freedom: rough, but of the size of the others
-    assert np.all(found.between_runs < 8 * found.bound)
+    estimates = uncertainty(output_error(runs, ship_model("burylin-tied"), fixed={"T3": 0.5}))
+    assert np.isfinite(estimates.between_runs).all()
+    assert estimates.enlargement == 1.0
+    # three degrees of freedom: uncertain, but of the order of the others
+    assert np.all(estimates.between_runs < 8 * estimates.bound)
 
 
-# ---- the noise
+# ---- noise
 
 
 def test_white_proportional_and_slow_noise_are_separated() -> None:
     rng = np.random.default_rng(0)
     level = np.sin(np.arange(20_000) / 300)
     white = 0.02 * rng.standard_normal(20_000) + 0.05 * level * rng.uniform(-1, 1, 20_000) * 3**0.5
-    found = fit_residual_noise([OutputResiduals(white, level, 0.1)], proportional=True, least=1e-9)
-    assert found.white == pytest.approx(0.02, rel=0.05)
-    assert found.relative == pytest.approx(0.05, rel=0.05)
-    assert found.slow == 0
+    noise_fit = fit_residual_noise(
+        [OutputResiduals(white, level, 0.1)], proportional=True, least=1e-9
+    )
+    assert noise_fit.white == pytest.approx(0.02, rel=0.05)
+    assert noise_fit.relative == pytest.approx(0.05, rel=0.05)
+    assert noise_fit.slow == 0
     slow = np.convolve(rng.standard_normal(20_200), np.ones(201) / 201**0.5, "valid") * 0.03
-    found = fit_residual_noise(
+    noise_fit = fit_residual_noise(
         [OutputResiduals(white + slow, level, 0.1)], proportional=True, least=1e-9
     )
-    assert found.slow == pytest.approx(0.03, rel=0.3)
-    assert 10 < found.slow_secs < 40
+    assert noise_fit.slow == pytest.approx(0.03, rel=0.3)
+    assert 10 < noise_fit.slow_secs < 40
 
 
-def test_a_wave_is_found_and_white_noise_has_none() -> None:
+def test_a_wave_is_detected_and_none_in_white_noise() -> None:
     rng = np.random.default_rng(1)
     time = np.arange(5000) * 0.1
     noise, std = rng.standard_normal((5000, 2)), np.ones((5000, 2))
@@ -203,7 +205,7 @@ def test_a_wave_is_found_and_white_noise_has_none() -> None:
     assert swell_frequency(noise, std, 0.1) == pytest.approx(0.1, rel=0.03)
 
 
-def test_a_swell_is_fitted_and_leaves_no_slow_noise() -> None:
+def test_a_fitted_swell_does_not_count_as_slow_noise() -> None:
     fit = output_error([a_trial(seed=6)], ship_model("burylin"))
     assert len(fit.problem.waves[0]) == 1
     omega = fit.minimum.unknowns[fit.problem.own_slice(0)][-5]
@@ -220,22 +222,22 @@ def test_no_segments_unknown_names_and_a_rudder_at_rest_are_rejected() -> None:
         output_error([], ship_model("nomoto"))
     with pytest.raises(UsageError, match="no parameter 'T4'; it has a, b2"):
         output_error([a_trial()], ship_model("burylin-tied"), fixed={"T4": 1.0})
-    s = sailed()
-    still = Signals(s.start_ns, s.dt_secs, dict(s.values) | {"rudder": np.zeros(len(s))})
+    s = simulated()
+    at_rest = Signals(s.start_ns, s.dt_secs, dict(s.values) | {"rudder": np.zeros(len(s))})
     with pytest.raises(LogError, match=r"the rudder moves by 0.0° in all.*still\.mcap"):
-        output_error(split_into_segments(still, "still.mcap"), ship_model("nomoto"))
+        output_error(split_into_segments(at_rest, "still.mcap"), ship_model("nomoto"))
 
 
 def test_short_runs_are_rejected_and_gaps_split_a_run() -> None:
-    s = sailed()
+    s = simulated()
     with pytest.raises(LogError, match=r"less than 60 s at a time.*short\.mcap"):
         split_into_segments(s.part(0, 100), "short.mcap")
     rudder = np.array(s["rudder"])
     rudder[2000:2300] = np.nan
     values = dict(s.values) | {"rudder": rudder}
-    pieces = split_into_segments(Signals(s.start_ns, s.dt_secs, values), "gap.mcap")
-    assert [len(piece) for piece in pieces] == [2000, len(s) - 2300]
-    assert all(np.isfinite(piece.signals["rudder"]).all() for piece in pieces)
+    segments = split_into_segments(Signals(s.start_ns, s.dt_secs, values), "gap.mcap")
+    assert [len(segment) for segment in segments] == [2000, len(s) - 2300]
+    assert all(np.isfinite(segment.signals["rudder"]).all() for segment in segments)
 
 
 def test_a_sparse_run_does_not_hide_slow_noise_in_another() -> None:
