@@ -1,9 +1,11 @@
-"""The disturbance observer: what acted on the ship that the model does not know.
+"""The disturbance observer: forces on the ship that its model does not contain.
 
-Plant and exosystems are augmented with a disturbance of a known kind - constant, ramp, wave - and
-unknown size, and the error's poles placed. Yaw and surge are designed each for itself; together the
-placement would couple them. Source: "Algorithm of ship course control system watcher for assessing
-disturbances and noise measurements", eqs (3), (4).
+The plant is augmented with exosystems of a disturbance of known kind (constant, ramp, wave) and
+unknown size, and the poles of the estimation error are placed. Yaw and surge are designed
+separately; together the placement would couple them.
+
+Source: "Algorithm of ship course control system watcher for assessing disturbances and noise
+measurements", eqs (3), (4).
 """
 
 from collections.abc import Mapping
@@ -30,41 +32,67 @@ from shiplog.vessel.settings import (
 from .loop import initial_state, make_ship_observer, observe_chunk, surge_plant, yaw_plant
 from .observer_design import ForceModel, Sampling, force_observer
 
-DISTURBANCE_UNITS = {  # in SI, as people read it, and the factor from the one to the other
+# of each disturbance: the SI unit, the unit displayed, and the factor from the first to the second
+DISTURBANCE_UNITS = {
     "yaw": ("rad/s³", "0.001 deg/s³", degrees(1) * 1e3),
     "rudder": ("rad", "deg", degrees(1)),
     "surge": ("m/s²", "mm/s²", 1e3),
     "yaw_wave": ("rad/s³", "0.001 deg/s³", degrees(1) * 1e3),
     "surge_wave": ("m/s²", "mm/s²", 1e3),
 }
-CONSTANT = DisturbanceSettings()
-FASTEST = 10.0  # poles times interval: beyond it a sample is forgotten by the next
-QUICKEST_WAVE = 0.9 * pi  # frequency times interval: near Nyquist's the noise in it has no bound
-LOST = 1e6  # in SI: what an observer says that has lost the ship
+DEFAULT_SETTINGS = DisturbanceSettings()
+MAX_POLE_TIMES_INTERVAL = 10.0  # beyond it the observer forgets a sample by the next one
+# wave frequency times sampling interval: towards Nyquist's π the error due to noise has no bound
+MAX_WAVE_TIMES_INTERVAL = 0.9 * pi
+MAX_DISTURBANCE = 1e6  # in SI units: a larger estimate means that the observer has diverged
 
 
 @dataclass(frozen=True, eq=False)
 class Disturbance:
-    """Specific disturbances on the signals' clock: what they add to the equations of motion.
+    """Estimated disturbances on the signals' clock, as terms of the equations of motion.
 
-    `yaw` and `surge` are the slow part, constant or ramp, and zero where neither was asked for; the
-    waves are beside it, and None where they were not.
+    NaN where the observer has diverged.
+
+    Attributes
+    ----------
+    yaw
+        Slow part (constant or ramp) of the yaw disturbance, rad/s³, (n,): a term of w''. Zero where
+        neither a constant nor a ramp is estimated.
+    surge
+        Slow part of the surge disturbance, m/s², (n,): a term of v'. Zero as for `yaw`.
+    rudder
+        The rudder angle, rad, (n,), that would have the effect of `yaw` at the estimated speed; NaN
+        where the rudder has practically no effect.
+    yaw_wave, surge_wave
+        The waves, rad/s³ and m/s², (n,); None where none is estimated.
     """
 
-    yaw: FloatArray  # (n,) rad/s^3, added to w''
-    surge: FloatArray  # (n,) m/s^2, added to v'
-    rudder: FloatArray  # (n,) rad: the rudder that would do, at the speed then, what `yaw` does
-    yaw_wave: FloatArray | None = None  # (n,) rad/s^3
-    surge_wave: FloatArray | None = None  # (n,) m/s^2
+    yaw: FloatArray
+    surge: FloatArray
+    rudder: FloatArray
+    yaw_wave: FloatArray | None = None
+    surge_wave: FloatArray | None = None
 
 
 @dataclass(frozen=True)
 class DisturbanceSummary:
-    """A disturbance over a trial, its first transient left out.
+    """Summary of one disturbance over a trial, without the observer's first transient.
 
-    The standard deviation is what sensor noise leaves once an observer has settled, the ship
-    turning as she usually did; an error of the model counts as a disturbance. That of a wave is of
-    its value, and where the wave is well above it of its amplitude.
+    Attributes
+    ----------
+    unit
+        SI unit of the values.
+    mean, rms, min, max
+        Mean, root mean square and extremes.
+    at_end
+        Mean over the last `settling_secs` of the trial.
+    noise_std
+        Standard deviation that sensor noise alone causes in a settled observer, at the trial's rms
+        yaw rate; model errors are not included, they count as a disturbance. For a wave it is that
+        of its value, and, where the wave is well above it, of its amplitude. NaN for the rudder
+        where the rudder has no effect.
+    settling_secs
+        Duration of the first transient, s, which is left out in a trial more than twice as long.
     """
 
     unit: str
@@ -72,26 +100,43 @@ class DisturbanceSummary:
     rms: float
     min: float
     max: float
-    at_end: float  # the mean over the settling time at the end
-    noise_std: float  # NaN where no rudder would do it
-    settling_secs: float  # before it what is seen is the observer's own transient
+    at_end: float
+    noise_std: float
+    settling_secs: float
 
     @property
     def amplitude(self) -> float:
-        """Of a wave: that of a sinusoid of its variance, less what sensor noise has of this."""
-        left = self.rms**2 - self.mean**2 - self.noise_std**2
-        return np.nan if np.isnan(left) else sqrt(2 * max(left, 0.0))
+        """Amplitude of a wave: that of a sinusoid of its variance, minus the variance of noise."""
+        variance = self.rms**2 - self.mean**2 - self.noise_std**2
+        return np.nan if np.isnan(variance) else sqrt(2 * max(variance, 0.0))
 
 
 class ForceObserver:
-    """Observes a yaw moment and a surge force in chunks, each of the kinds that `settings` names.
+    """Estimates a yaw moment and a surge force, chunk by chunk.
 
-    `wave_frequency`, rad/s, is needed where a wave is one of them. Where nothing is measured, a
-    constant is held, a ramp goes on for a while (`design.force_observer`), a wave turns on. The
-    inputs must be known throughout.
+    Where nothing is measured, a constant is held, a ramp continues for a while (see
+    `force_observer`) and a wave continues its oscillation. Where the chunks are cut changes no
+    result.
 
-    Raises `UsageError` for settings that are none, a wave of no frequency, or one that is too quick
-    for a sensor or too slow to be told from the slow part, and for a model that is not finite.
+    Parameters
+    ----------
+    model
+        Coefficients of the paper's model.
+    noise
+        The measurement noise, for the standard deviations of the summaries.
+    stats
+        Statistics of the signals; they give the yaw rate and the speed at which the poles are
+        placed, the sampling intervals and the initial state.
+    settings
+        The kinds of disturbance, the pattern of the poles and their frequencies.
+    wave_frequency
+        Frequency of the wave, rad/s; required where a wave is one of the kinds.
+
+    Raises
+    ------
+    UsageError
+        For invalid settings, a missing wave frequency, a wave too fast for the samples or too slow
+        to be separated from the slow part, and for a model that is not finite.
     """
 
     def __init__(
@@ -99,64 +144,73 @@ class ForceObserver:
         model: Coefficients,
         noise: NoiseModel,
         stats: SignalStats,
-        settings: DisturbanceSettings = CONSTANT,
+        settings: DisturbanceSettings = DEFAULT_SETTINGS,
         wave_frequency: float | None = None,
     ) -> None:
         self._model = model
-        wanted = force_models(settings, wave_frequency, stats)
-        turning = yaw_stiffness(model, stats.yaw_rate_rms)
-        yaw = force_observer(yaw_plant(model, turning), *wanted["yaw"])
-        surge = force_observer(surge_plant(model, stats.median_speed), *wanted["surge"])
+        models = force_models(settings, wave_frequency, stats)
+        stiffness = yaw_stiffness(model, stats.yaw_rate_rms)
+        yaw = force_observer(yaw_plant(model, stiffness), *models["yaw"])
+        surge = force_observer(surge_plant(model, stats.median_speed), *models["surge"])
         forces = yaw.force, surge.force
-        self._observer = make_ship_observer(model, turning, *forces, *wanted["yaw"])
+        self._observer = make_ship_observer(model, stiffness, *forces, *models["yaw"])
         self._state = initial_state(self._observer, stats)
-        # a ship without way has a rudder that does nothing: its angle is then not a number
-        self._least_steering = 1e-3 * abs(model.d) * stats.max_rudder_effect
-        self._steering = Quantiles()
+        # at almost no speed and thrust the rudder has no effect, and the equivalent angle is NaN
+        self._min_rudder_effect = 1e-3 * abs(model.d) * stats.max_rudder_effect
+        self._rudder_effects = Quantiles()
         self._stds: dict[str, float] = {}
-        self._courses: dict[str, _SummaryCollector] = {}
+        self._summaries: dict[str, _SummaryCollector] = {}
         names = ("yaw", "rudder", "surge", "yaw_wave", "surge_wave")
         for name in names:
             output, design = (1, surge) if name.startswith("surge") else (0, yaw)
-            if name.endswith("wave") and wanted[name.removesuffix("_wave")][0].wave is None:
+            if name.endswith("wave") and models[name.removesuffix("_wave")][0].wave is None:
                 continue
             std = design.stds[int(name.endswith("wave"))]
             self._stds[name] = float(std * noise.measurement_std[output])
-            watch = _SummaryCollector(design.settling_secs, stats.count, stats.dt_secs)
-            self._courses[name] = watch
+            self._summaries[name] = _SummaryCollector(
+                design.settling_secs, stats.count, stats.dt_secs
+            )
 
     def step(self, chunk: Signals, following: Mapping[str, float]) -> Disturbance:
-        """Observe the next chunk; `following` are the inputs at the instant after it."""
+        """Estimate the disturbances of the next chunk.
+
+        Parameters
+        ----------
+        chunk
+            Yaw rate and speed, NaN where not measured, and the inputs, held throughout.
+        following
+            The inputs, rad and 1/min, at the instant after the chunk.
+        """
         delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
         rows, self._state = observe_chunk(
             self._model, self._observer, self._state, chunk["yaw_rate"], chunk["speed"], delta, n,
             chunk.dt_secs,
         )  # fmt: skip
-        rows[~(np.abs(rows) < LOST)] = np.nan
+        rows[~(np.abs(rows) < MAX_DISTURBANCE)] = np.nan
         v, yaw, yaw_wave, surge, surge_wave = rows
-        steering = self._model.d * rudder_effects(self._model, v, chunk["rpm"])
-        self._steering.add(np.abs(steering))
-        works = np.abs(steering) > self._least_steering
+        effect = self._model.d * rudder_effects(self._model, v, chunk["rpm"])
+        self._rudder_effects.add(np.abs(effect))
+        effective = np.abs(effect) > self._min_rudder_effect
         with np.errstate(divide="ignore", invalid="ignore"):
-            rudder = np.where(works, yaw / steering, np.nan)
-        found = Disturbance(
+            rudder = np.where(effective, yaw / effect, np.nan)
+        disturbance = Disturbance(
             yaw,
             surge,
             rudder,
-            yaw_wave if "yaw_wave" in self._courses else None,
-            surge_wave if "surge_wave" in self._courses else None,
+            yaw_wave if "yaw_wave" in self._summaries else None,
+            surge_wave if "surge_wave" in self._summaries else None,
         )
-        for name, watch in self._courses.items():
-            watch.add(getattr(found, name))
-        return found
+        for name, collector in self._summaries.items():
+            collector.add(getattr(disturbance, name))
+        return disturbance
 
     def result(self) -> dict[str, DisturbanceSummary]:
-        """What was observed, once all was: `yaw`, `rudder`, `surge`, and the waves asked for."""
-        usual = self._steering.median()
-        stds = self._stds | {"rudder": self._stds["yaw"] / usual if usual > 0 else np.nan}
+        """Return the summaries of yaw, rudder, surge and the waves estimated, over all chunks."""
+        effect = self._rudder_effects.median()
+        stds = self._stds | {"rudder": self._stds["yaw"] / effect if effect > 0 else np.nan}
         return {
-            name: watch.result(stds[name], DISTURBANCE_UNITS[name][0])
-            for name, watch in self._courses.items()
+            name: collector.result(stds[name], DISTURBANCE_UNITS[name][0])
+            for name, collector in self._summaries.items()
         }
 
 
@@ -164,17 +218,33 @@ def observe_disturbance(
     signals: Signals,
     model: Coefficients,
     noise: NoiseModel,
-    settings: DisturbanceSettings = CONSTANT,
+    settings: DisturbanceSettings = DEFAULT_SETTINGS,
     wave_frequency: float | None = None,
 ) -> tuple[Disturbance, dict[str, DisturbanceSummary]]:
-    """The disturbance in signals that are all there, and what comes of it; as `ForceObserver`."""
-    observing = ForceObserver(model, noise, signal_stats(signals, model), settings, wave_frequency)
-    found = observing.step(signals, last_inputs(signals))
-    return found, observing.result()
+    """Estimate the disturbances of signals that are in memory as a whole.
+
+    Parameters
+    ----------
+    signals
+        Yaw rate, speed, rudder and revolutions on one clock, with the inputs held.
+    model, noise, settings, wave_frequency
+        As for `ForceObserver`.
+
+    Returns
+    -------
+    disturbance : Disturbance
+        The time series.
+    summaries : dict[str, DisturbanceSummary]
+        The summary of each of them.
+    """
+    stats = signal_stats(signals, model)
+    observer = ForceObserver(model, noise, stats, settings, wave_frequency)
+    disturbance = observer.step(signals, last_inputs(signals))
+    return disturbance, observer.result()
 
 
 class _SummaryCollector:
-    """Looks at one disturbance as it is observed."""
+    """Collects the summary of one disturbance from its chunks."""
 
     def __init__(self, settling_secs: float, count: int, dt: float) -> None:
         self._settling_secs = settling_secs
@@ -182,18 +252,18 @@ class _SummaryCollector:
         self._skipped = settling if count > 2 * settling else 0
         self._tail = max(settling, 1)
         self._settled = Moments()
-        self._last: FloatArray = np.zeros(0)
+        self._last_values: FloatArray = np.zeros(0)
 
     def add(self, values: FloatArray) -> None:
-        """Take the next values."""
+        """Add the next values, (n,)."""
         values = np.where(np.isfinite(values), values, np.nan)
         self._settled.add(values[self._skipped :])
         self._skipped = max(self._skipped - len(values), 0)
-        self._last = np.concatenate((self._last, values))[-self._tail :]
+        self._last_values = np.concatenate((self._last_values, values))[-self._tail :]
 
     def result(self, std: float, unit: str) -> DisturbanceSummary:
-        """What all of them come to."""
-        settled, last = self._settled, self._last[np.isfinite(self._last)]
+        """Return the summary, with the standard deviation of noise and the unit given."""
+        settled, last = self._settled, self._last_values[np.isfinite(self._last_values)]
         return DisturbanceSummary(
             unit=unit,
             mean=settled.mean,
@@ -209,74 +279,81 @@ class _SummaryCollector:
 def force_models(
     settings: DisturbanceSettings, wave_frequency: float | None, stats: SignalStats
 ) -> dict[str, tuple[ForceModel, Sampling]]:
-    """What is to be observed in `yaw` and in `surge`, and of what samples.
+    """Return the force model and the sampling of ``"yaw"`` and of ``"surge"``.
 
-    Raises `UsageError` for settings that are none, and for what those samples do not tell.
+    A wave too fast for the samples of one of the two is estimated in the other alone.
+
+    Raises
+    ------
+    UsageError
+        For invalid settings, and where the samples do not determine the disturbance.
     """
-    faults: list[str] = []
-    disturbance_settings(settings_dict(settings), faults)
-    if faults:
-        raise UsageError("; ".join(faults))
+    errors: list[str] = []
+    disturbance_settings(settings_dict(settings), errors)
+    if errors:
+        raise UsageError("; ".join(errors))
     degree = 1 if "ramp" in settings.models else 0 if "constant" in settings.models else None
-    wave = _wave(wave_frequency) if "wave" in settings.models else None
-    blind = _blind(wave, stats) if wave is not None else ()
-    wanted = {}
+    wave = _checked_wave(wave_frequency) if "wave" in settings.models else None
+    too_slow = _too_slow_sensors(wave, stats) if wave is not None else ()
+    models = {}
     frequencies = {"yaw": settings.yaw_frequency, "surge": settings.surge_frequency}
     for output, (name, frequency) in enumerate(frequencies.items()):
         interval = float(stats.interval_secs[output])
         longest = float(stats.gap_steps[output]) * stats.dt_secs
         model = ForceModel(degree, wave, settings.spectrum, frequency)
-        if name in blind and len(blind) < len(frequencies):
+        if name in too_slow and len(too_slow) < len(frequencies):
             model = ForceModel(degree or 0, None, settings.spectrum, frequency)
-        _require_told(name, model, interval)
-        wanted[name] = model, Sampling(interval, longest, stats.dt_secs)
-    return wanted
+        _require_determined(name, model, interval)
+        models[name] = model, Sampling(interval, longest, stats.dt_secs)
+    return models
 
 
 def wave_frequency_warnings(wave_frequency: float, stats: SignalStats) -> list[str]:
-    """Where a wave is not observed because the sensor is too slow for it, in words."""
+    """Warn where no wave is estimated because the samples are too far apart for its frequency."""
     return [
-        f"no wave is observed in {name}: samples every {secs:.3g} s show none of "
-        f"{wave_frequency:.3g} rad/s"
+        f"no wave is estimated in {name}: its samples, {secs:.3g} s apart, are too slow for a wave "
+        f"of {wave_frequency:.3g} rad/s"
         for name, secs in zip(("yaw", "surge"), stats.interval_secs, strict=True)
-        if name in _blind(wave_frequency, stats)
+        if name in _too_slow_sensors(wave_frequency, stats)
     ]
 
 
-def _blind(wave: float, stats: SignalStats) -> tuple[str, ...]:
-    """Of yaw and surge, whose samples do not show a wave."""
+def _too_slow_sensors(wave: float, stats: SignalStats) -> tuple[str, ...]:
+    """Return which of yaw and surge are sampled too slowly for a wave, rad/s."""
     names = zip(("yaw", "surge"), stats.interval_secs, strict=True)
-    return tuple(name for name, interval in names if wave * interval >= QUICKEST_WAVE)
+    return tuple(name for name, interval in names if wave * interval >= MAX_WAVE_TIMES_INTERVAL)
 
 
-def _wave(frequency: float | None) -> float:
+def _checked_wave(frequency: float | None) -> float:
+    """Return the frequency of the wave, rad/s; raise `UsageError` if missing or invalid."""
     if frequency is None:
         raise UsageError(
-            "disturbance.models has a wave whose frequency nobody knows; give"
-            " disturbance.wave_frequency, rad/s, or leave 'wave' out"
+            "disturbance.models has a wave without a frequency; set disturbance.wave_frequency,"
+            " rad/s, or remove 'wave'"
         )
-    fault = number_error("disturbance.wave_frequency", frequency, -inf, inf, positive=True)
-    if fault:
-        raise UsageError(fault)
+    error = number_error("disturbance.wave_frequency", frequency, -inf, inf, positive=True)
+    if error:
+        raise UsageError(error)
     return float(frequency)
 
 
-def _require_told(name: str, model: ForceModel, interval: float) -> None:
-    """Refuse what the samples of yaw or surge, so many seconds apart, do not tell."""
+def _require_determined(name: str, model: ForceModel, interval: float) -> None:
+    """Raise `UsageError` if samples `interval` s apart do not determine the force model."""
     wave, slow = model.wave, model.frequency
-    if slow * interval >= FASTEST:
+    if slow * interval >= MAX_POLE_TIMES_INTERVAL:
         raise UsageError(
-            f"disturbance.{name}_frequency of {slow:.3g} rad/s is beyond samples every"
-            f" {interval:.3g} s; lower it below {FASTEST / interval:.3g}"
+            f"disturbance.{name}_frequency of {slow:.3g} rad/s is too high for samples every"
+            f" {interval:.3g} s; lower it below {MAX_POLE_TIMES_INTERVAL / interval:.3g}"
         )
-    without = "or leave 'wave' out of disturbance.models"
-    if wave is not None and wave * interval >= QUICKEST_WAVE:
+    remedy = "or remove 'wave' from disturbance.models"
+    if wave is not None and wave * interval >= MAX_WAVE_TIMES_INTERVAL:
         raise UsageError(
-            f"{name} measured every {interval:.3g} s shows no wave of {wave:.3g} rad/s; lower"
-            f" disturbance.wave_frequency below {QUICKEST_WAVE / interval:.3g}, {without}"
+            f"samples of {name} every {interval:.3g} s are too slow for a wave of {wave:.3g} rad/s;"
+            f" lower disturbance.wave_frequency below {MAX_WAVE_TIMES_INTERVAL / interval:.3g},"
+            f" {remedy}"
         )
     if wave is not None and model.degree is not None and wave <= slow:
         raise UsageError(
-            f"in {name} a wave of {wave:.3g} rad/s is not told from what is slow, followed at"
-            f" {slow:.3g}; lower disturbance.{name}_frequency, {without}"
+            f"in {name} a wave of {wave:.3g} rad/s cannot be separated from the slow part, followed"
+            f" at {slow:.3g} rad/s; lower disturbance.{name}_frequency, {remedy}"
         )

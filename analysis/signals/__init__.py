@@ -1,4 +1,5 @@
 """Resampled signals: statistics, held inputs, moments, concatenation.
 
-Imports nothing else of `analysis`.
+The folder holds what filters, observers and regression share: arrays and `Signals` in, statistics
+and `Signals` out. It must not import anything else of `analysis`.
 """

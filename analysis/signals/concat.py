@@ -1,4 +1,4 @@
-"""Chunks of a result put together: whatever its arrays, one after the other."""
+"""Concatenation of consecutive chunks of a result."""
 
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
@@ -12,10 +12,18 @@ T = TypeVar("T")
 
 
 def concatenate(chunks: Sequence[T]) -> T:
-    """Consecutive chunks of one kind of dataclass, one at least, as one.
+    """Concatenate consecutive chunks of one dataclass.
 
-    Arrays are put together along their first axis, dataclasses within likewise; all else is as in
-    the first chunk.
+    Parameters
+    ----------
+    chunks
+        At least one chunk, in order of time, all of the same class.
+
+    Returns
+    -------
+    T
+        A dataclass whose arrays are concatenated along their first axis, as are those of nested
+        dataclasses. All other fields are those of the first chunk.
     """
     first = chunks[0]
     if isinstance(first, Signals):

@@ -1,4 +1,4 @@
-"""The inputs of a ship as a filter needs them: known at every instant, and one instant ahead."""
+"""Rudder and revolutions held where not measured, and one instant ahead."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -11,19 +11,33 @@ from shiplog.ships.paper import PAPER_INPUTS
 
 
 class InputHold:
-    """Keeps rudder and revolutions at their last known value wherever they were not measured.
+    """Holds rudder and revolutions at their last measured value (zero-order hold).
 
-    A filter cannot predict without them; what it predicts then is a guess, to be said so.
+    A filter cannot predict without its inputs; where they are held, its estimates are less
+    reliable, which `warnings` reports.
+
+    Parameters
+    ----------
+    clock
+        The uniform clock of the signals.
+
+    Attributes
+    ----------
+    missing
+        Number of instants at which each input was not measured.
     """
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._last = dict.fromkeys(PAPER_INPUTS, np.nan)
         self._last_ns = dict.fromkeys(PAPER_INPUTS, np.iinfo(np.int64).min)
-        self.missing = dict.fromkeys(PAPER_INPUTS, 0)  # instants
+        self.missing = dict.fromkeys(PAPER_INPUTS, 0)
 
     def add_raw(self, chunk: tuple[Channel, ...]) -> None:
-        """Look at the samples themselves for what was known before the clock begins."""
+        """Read the inputs measured up to the start of the clock from raw channels.
+
+        A channel without a sample at the clock's first instant then starts from its last value.
+        """
         for name in PAPER_INPUTS:
             channel = self._clock.channels[name].select(chunk)
             if channel is None:
@@ -35,7 +49,7 @@ class InputHold:
                 self._last[name], self._last_ns[name] = float(values[latest]), int(times[latest])
 
     def step(self, signals: Signals) -> Signals:
-        """The next signals, their inputs known throughout."""
+        """Return the next chunk with its inputs held; NaN before the first sample."""
         values = dict(signals.values)
         for name in PAPER_INPUTS:
             missing = np.isnan(values[name])
@@ -48,25 +62,38 @@ class InputHold:
         return replace(signals, values=values)
 
     def warnings(self) -> list[str]:
-        """What was held, in words."""
+        """Return one warning for each input that had to be held."""
         return [
             f"{name}: not measured for {count * self._clock.dt_secs:.1f} s in all; "
-            "held at its last value there, so that the estimates there are guesses"
+            "held at its last value there, which makes the estimates there less reliable"
             for name, count in self.missing.items()
             if count
         ]
 
 
 def held_throughout(
-    chunks: Iterable[Signals], holding: InputHold
+    chunks: Iterable[Signals], hold: InputHold
 ) -> Iterator[tuple[Signals, Signals, Mapping[str, float]]]:
-    """Each chunk as measured, with its inputs held, and the inputs of the instant after it.
+    """Yield each chunk as measured, with its inputs held, and the inputs that follow it.
 
-    Of the last chunk these are its own last.
+    Parameters
+    ----------
+    chunks
+        Consecutive chunks of the signals.
+    hold
+        The hold; its state is advanced.
+
+    Yields
+    ------
+    signals, held : Signals
+        The chunk as measured, and the same with its inputs held.
+    following : Mapping[str, float]
+        The inputs, rad and 1/min, at the instant after the chunk; for the last chunk, its own last
+        inputs.
     """
     previous: tuple[Signals, Signals] | None = None
     for signals in chunks:
-        held = holding.step(signals)
+        held = hold.step(signals)
         if previous is not None:
             yield *previous, {name: float(held[name][0]) for name in PAPER_INPUTS}
         previous = signals, held
@@ -75,5 +102,5 @@ def held_throughout(
 
 
 def last_inputs(signals: Signals) -> Mapping[str, float]:
-    """The inputs of signals at their end."""
+    """Return the inputs, rad and 1/min, at the last instant of the signals."""
     return {name: float(signals[name][-1]) for name in PAPER_INPUTS}

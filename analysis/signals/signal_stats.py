@@ -1,4 +1,4 @@
-"""What the signals of a trial usually do: what the estimators must know before they begin."""
+"""Statistics of resampled signals: noise levels, sampling intervals, extremes."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,10 @@ from shiplog.types import FloatArray, concatenate_signals
 
 from .moments import Moments
 
-HEAD_COUNT = 50_000  # samples of a long log are enough to tell how well a model fits
+# instants: enough to judge how well a model fits, and little of a long log
+HEAD_COUNT = 50_000
+MAX_NOISE_DEVIATION = 8.0  # third differences beyond it, in robust standard deviations, are spikes
+STD_PER_MAD = 1.4826  # of a normal distribution: standard deviation / median absolute deviation
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,31 +68,41 @@ class SignalStats:
 
     @property
     def interval_secs(self) -> FloatArray:
-        """(2,) the usual time from sample to sample."""
+        """Median time from sample to sample of yaw rate and speed, s, (2,)."""
         return self.intervals * self.dt_secs
 
     @property
     def gap_steps(self) -> FloatArray:
-        """(2,) instants of the clock from sample to sample of an output, beyond which is a gap."""
+        """Number of instants without a sample beyond which there is a gap, (2,)."""
         return np.array([gap_threshold_secs(s) / self.dt_secs for s in self.interval_secs])
 
 
 class SignalStatsCollector:
-    """Looks at signals, their inputs held, as they come in chunks.
+    """Collects `SignalStats` from signals that come in chunks.
 
-    Of `model` only the alphas are used. Source of the noise: `noise_level`.
+    Where the chunks are cut changes no result.
+
+    Parameters
+    ----------
+    model
+        Coefficients of the paper's model; only the alphas, for the rudder effect, are used.
+
+    Attributes
+    ----------
+    max_speed
+        Largest absolute speed so far, m/s.
     """
 
     def __init__(self, model: Coefficients) -> None:
         self._model = model
         self._outputs = {name: _OutputStatsCollector() for name in PAPER_OUTPUTS}
         self._speed, self._rpm = Quantiles(), Quantiles()
-        self.max_speed = self._max_rudder_effect = 0.0  # m/s so far, and of the rudder's effect
+        self.max_speed = self._max_rudder_effect = 0.0
         self._heads: list[Signals] = []
         self._count, self._dt = 0, 1.0
 
     def add(self, chunk: Signals) -> None:
-        """Take the next signals."""
+        """Add the next chunk of signals, with the inputs held."""
         for name, output in self._outputs.items():
             output.add(chunk[name])
         speed = chunk["speed"]
@@ -106,7 +119,7 @@ class SignalStatsCollector:
         self._count, self._dt = self._count + len(chunk), chunk.dt_secs
 
     def result(self) -> SignalStats:
-        """What all that was added comes to."""
+        """Return the statistics of all chunks added."""
         outputs = list(self._outputs.values())
         yaw_rate = outputs[0].moments
         return SignalStats(
@@ -127,29 +140,42 @@ class SignalStatsCollector:
 
 
 def signal_stats(signals: Signals, model: Coefficients) -> SignalStats:
-    """What signals usually do, their inputs held; of `model` only the alphas are used."""
-    gauging = SignalStatsCollector(model)
-    gauging.add(signals)
-    return gauging.result()
+    """Compute the statistics of signals that are in memory as a whole.
+
+    Parameters
+    ----------
+    signals
+        Yaw rate, speed, rudder and revolutions on one clock, with the inputs held.
+    model
+        Coefficients of the paper's model; only the alphas, for the rudder effect, are used.
+
+    Returns
+    -------
+    SignalStats
+        The statistics; the same as `SignalStatsCollector` computes from chunks.
+    """
+    collector = SignalStatsCollector(model)
+    collector.add(signals)
+    return collector.result()
 
 
 class _OutputStatsCollector:
-    """Looks at one output."""
+    """Collects the statistics of one output, yaw rate or speed."""
 
     def __init__(self) -> None:
         self.moments, self.noise, self.first = Moments(), NoiseLevel(), np.nan
         self._intervals, self._last, self._count = Quantiles(), -1, 0
 
     def add(self, values: FloatArray) -> None:
-        """Take the next values, NaN where not measured."""
+        """Add the next values, NaN where not measured."""
         at = np.flatnonzero(np.isfinite(values))
         self.moments.add(values)
         if len(at):
-            seen = values[at]
-            self.noise.add(seen)
+            measured = values[at]
+            self.noise.add(measured)
             numbers = at + self._count
             if self._last < 0:
-                self.first = float(seen[0])
+                self.first = float(measured[0])
                 self._intervals.add(np.diff(numbers).astype(float))
             else:
                 self._intervals.add(np.diff(numbers, prepend=self._last).astype(float))
@@ -157,15 +183,27 @@ class _OutputStatsCollector:
         self._count += len(values)
 
     def interval(self) -> float:
-        """The median number of instants from sample to sample; 1 where there are not two."""
+        """Return the median number of instants from sample to sample, or 1 without two samples."""
         return self._intervals.median() if len(self._intervals.values) else 1.0
 
 
 def noise_level(values: FloatArray) -> float:
-    """The standard deviation of a signal's white noise, from its third differences, (n,).
+    """Estimate the standard deviation of a signal's white noise from its third differences.
 
-    NaN is not measured. Differences eight times the usual are spikes and not counted. A signal
-    printed to few digits has at least the noise of its rounding. NaN of fewer than four values.
+    Differencing removes the slow motion of the ship: white noise of variance s² has third
+    differences of variance (1 + 9 + 9 + 1) s² = 20 s². Differences beyond `MAX_NOISE_DEVIATION`
+    robust standard deviations (1.4826 times the median absolute deviation) are spikes and are left
+    out. A signal recorded with few digits has at least the noise of its rounding, step / √12.
+
+    Parameters
+    ----------
+    values
+        The signal, (n,), NaN where not measured.
+
+    Returns
+    -------
+    float
+        The standard deviation, in the signal's unit; NaN for fewer than four measured values.
     """
     level = NoiseLevel()
     level.add(values[np.isfinite(values)])
@@ -173,32 +211,33 @@ def noise_level(values: FloatArray) -> float:
 
 
 class NoiseLevel:
-    """As `noise_level`, of measured values that come in chunks."""
+    """Estimates the white noise of measured values that come in chunks, as `noise_level` does."""
 
     def __init__(self) -> None:
         self._last: FloatArray = np.zeros(0)
         self._moments = Moments()
-        self._thirds, self._least_step = Quantiles(), np.inf
+        self._thirds, self._min_step = Quantiles(), np.inf
 
-    def add(self, seen: FloatArray) -> None:
-        """Take the next measured values."""
-        self._moments.add(seen)
-        new = np.concatenate((self._last[-1:], seen))
+    def add(self, measured: FloatArray) -> None:
+        """Add the next measured values, (n,), none of them NaN."""
+        self._moments.add(measured)
+        new = np.concatenate((self._last[-1:], measured))
         steps = np.abs(np.diff(new))
-        self._least_step = min(self._least_step, float(np.min(steps[steps > 0], initial=np.inf)))
-        seen = np.concatenate((self._last, seen))
-        # white noise of variance s^2 gives 20 s^2
-        self._thirds.add(np.diff(seen, 3) / np.sqrt(20.0))
-        self._last = seen[-3:]
+        self._min_step = min(self._min_step, float(np.min(steps[steps > 0], initial=np.inf)))
+        joined = np.concatenate((self._last, measured))
+        # white noise of variance s² has third differences of variance 20 s²
+        self._thirds.add(np.diff(joined, 3) / np.sqrt(20.0))
+        self._last = joined[-3:]
 
     def result(self) -> float:
-        """The standard deviation of all that was added."""
+        """Return the standard deviation of the noise in all values added."""
         thirds = self._thirds.values
         if not len(thirds):
             return np.nan
-        usual = 1.4826 * float(np.median(np.abs(thirds)))
-        kept = thirds[np.abs(thirds) <= 8 * usual] if usual > 0 else thirds
+        robust_std = STD_PER_MAD * float(np.median(np.abs(thirds)))
+        limit = MAX_NOISE_DEVIATION * robust_std
+        kept = thirds[np.abs(thirds) <= limit] if robust_std > 0 else thirds
         std = self._moments.std
-        rounding = self._least_step / np.sqrt(12.0) if np.isfinite(self._least_step) else 0.0
+        rounding = self._min_step / np.sqrt(12.0) if np.isfinite(self._min_step) else 0.0
         floor = max(1e-6 * std, 1e-12)
         return max(float(np.sqrt(np.mean(kept**2))), min(rounding, std), floor)

@@ -564,29 +564,29 @@ def slowly(stats: SignalStats, interval: float) -> SignalStats:
         ({"spectrum": "bessel"}, None, "disturbance.spectrum must be one of butterworth, binomial"),
         ({"yaw_frequency": -1.0}, None, "disturbance.yaw_frequency must be positive, got -1"),
         ({"surge_frequency": np.nan}, None, "disturbance.surge_frequency must be finite, got nan"),
-        ({"models": ("wave",)}, None, "frequency nobody knows; give disturbance.wave_frequency"),
+        ({"models": ("wave",)}, None, "a wave without a frequency; set disturbance.wave_frequency"),
         ({"models": ("wave",)}, 0.0, "disturbance.wave_frequency must be positive, got 0"),
         ({"models": ("wave",)}, np.inf, "disturbance.wave_frequency must be finite, got inf"),
         ({"models": ("wave",)}, "0.6", "disturbance.wave_frequency must be a number, got '0.6'"),
         (
             {"models": ("wave",)},
             3.0,
-            "yaw measured every 1 s shows no wave of 3 rad/s; lower disturbance.wave_frequency",
+            "yaw every 1 s are too slow for a wave of 3 rad/s; lower disturbance.wave_frequency",
         ),
         (
             {"models": ("ramp", "wave")},
             0.05,
-            "in yaw a wave of 0.05 .* followed at 0.05; lower disturbance.yaw_frequency, or leave",
+            "yaw a wave of 0.05 .* at 0.05 rad/s; lower disturbance.yaw_frequency, or remove",
         ),
         (
             {"models": ("constant", "wave"), "surge_frequency": 0.7},
             0.6,
-            "in surge a wave of 0.6 .* followed at 0.7; lower disturbance.surge_frequency",
+            "in surge a wave of 0.6 .* followed at 0.7 rad/s; lower disturbance.surge_frequency",
         ),
         (
             {"surge_frequency": 8.0},
             None,
-            "disturbance.surge_frequency of 8 rad/s is beyond samples every 2 s; lower it below 5",
+            "surge_frequency of 8 rad/s is too high for samples every 2 s; lower it below 5",
         ),
         ({"yaw_frequency": 1e-9}, None, "poles are so slow for the samples .*; take faster ones"),
     ],
@@ -656,4 +656,4 @@ def test_a_wave_too_quick_for_one_sensor_is_left_out_of_that_alone(vessel: Vesse
     assert found.disturbance.yaw_wave is not None
     assert found.disturbance.surge_wave is None
     assert "surge_wave" not in found.findings.disturbances
-    assert any("no wave is observed in surge" in said for said in found.findings.warnings)
+    assert any("no wave is estimated in surge" in text for text in found.findings.warnings)

@@ -10,7 +10,7 @@ START = 1_700_000_000 * 10**9
 
 
 def log_of(rudder: list[float], rpm: list[float]) -> TrialLog:
-    """Samples a second apart, the first two of them before the clock begins."""
+    """Return a log with samples one second apart, the first two before the clock starts."""
     stamps = START + np.arange(-2, len(rudder) - 2) * 10**9
     return TrialLog(
         "x",
@@ -21,17 +21,17 @@ def log_of(rudder: list[float], rpm: list[float]) -> TrialLog:
     )
 
 
-def test_what_is_missing_is_the_last_known_even_from_before_the_clock() -> None:
+def test_missing_inputs_hold_their_last_value_even_from_before_the_clock() -> None:
     nan = float("nan")
     log = log_of([0.1, 0.2, nan, nan, 0.3, nan], [80, nan, 81, nan, nan, 82])
-    found = compute_log_stats(log)
-    clock = Clock(START, 1.0, 4, {name: found[name] for name in ("rudder", "rpm")})
+    log_stats = compute_log_stats(log)
+    clock = Clock(START, 1.0, 4, {name: log_stats[name] for name in ("rudder", "rpm")})
     signals = Signals(START, 1.0, {c.name: c.values[2:] for c in log})
     for cuts in ([], [1], [1, 2, 3]):
-        holding = InputHold(clock)
-        holding.add_raw(log.channels)
+        hold = InputHold(clock)
+        hold.add_raw(log.channels)
         chunks = [signals.part(a, b) for a, b in zip([0, *cuts], [*cuts, 4], strict=True)]
-        rows = list(held_throughout(chunks, holding))
+        rows = list(held_throughout(chunks, hold))
         rudder = np.concatenate([held["rudder"] for _, held, _ in rows])
         rpm = np.concatenate([held["rpm"] for _, held, _ in rows])
         assert rudder.tolist() == [0.2, 0.2, 0.3, 0.3]
@@ -39,15 +39,15 @@ def test_what_is_missing_is_the_last_known_even_from_before_the_clock() -> None:
         assert [following["rudder"] for *_, following in rows] == [
             *(rudder[cut] for cut in cuts), 0.3
         ]  # fmt: skip
-        assert holding.missing == {"rudder": 3, "rpm": 2}
-        assert [s.split(":")[0] for s in holding.warnings()] == ["rudder", "rpm"]
-        assert "3.0 s in all" in holding.warnings()[0]
+        assert hold.missing == {"rudder": 3, "rpm": 2}
+        assert [text.split(":")[0] for text in hold.warnings()] == ["rudder", "rpm"]
+        assert "3.0 s in all" in hold.warnings()[0]
 
 
-def test_nothing_is_said_where_nothing_is_missing() -> None:
+def test_there_are_no_warnings_where_no_input_is_missing() -> None:
     log = log_of([0.1, 0.2, 0.3], [80, 80, 80])
-    found = compute_log_stats(log)
-    holding = InputHold(Clock(START, 1.0, 1, {n: found[n] for n in ("rudder", "rpm")}))
+    log_stats = compute_log_stats(log)
+    hold = InputHold(Clock(START, 1.0, 1, {n: log_stats[n] for n in ("rudder", "rpm")}))
     signals = Signals(START, 1.0, {"rudder": np.array([0.3]), "rpm": np.array([80.0])})
-    assert holding.step(signals)["rudder"] == pytest.approx([0.3])
-    assert holding.warnings() == []
+    assert hold.step(signals)["rudder"] == pytest.approx([0.3])
+    assert hold.warnings() == []

@@ -1,3 +1,7 @@
+import copy
+import pickle
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -9,7 +13,7 @@ from shiplog import TrialLog, Vessel, resample
 NAMES = ("yaw_rate", "speed", "rudder", "rpm")
 
 
-def test_what_is_usual_is_what_numpy_makes_of_the_whole(vessel: Vessel) -> None:
+def test_statistics_equal_numpys_of_the_whole_trial(vessel: Vessel) -> None:
     sensors = suite("white", {"speed.rate_hz": 2.0, "yaw_rate.dropout": 0.1})
     trial = simulate(vessel, "pseudo-random", duration_secs=300.0, sensors=sensors)
     signals = resample(TrialLog("x", trial.channels), channels=NAMES)
@@ -22,19 +26,19 @@ def test_what_is_usual_is_what_numpy_makes_of_the_whole(vessel: Vessel) -> None:
     assert stats.yaw_rate_rms == pytest.approx(np.sqrt(np.nanmean(w**2)), rel=1e-12)
     assert (stats.median_speed, stats.max_speed) == (np.nanmedian(v), np.nanmax(v))
     assert stats.median_rpm == np.median(signals["rpm"])
-    parted = SignalStatsCollector(vessel.coefficients)
+    collector = SignalStatsCollector(vessel.coefficients)
     for cuts in zip([0, 1, 999], [1, 999, len(w)], strict=True):
-        parted.add(signals.part(*cuts))
-    again = parted.result()
+        collector.add(signals.part(*cuts))
+    in_chunks = collector.result()
     for name in ("first", "std", "interval_secs", "noise_std"):
-        assert np.array_equal(getattr(stats, name), getattr(again, name))
+        assert np.array_equal(getattr(stats, name), getattr(in_chunks, name))
     assert (stats.yaw_rate_rms, stats.max_rudder_effect) == (
-        again.yaw_rate_rms,
-        again.max_rudder_effect,
+        in_chunks.yaw_rate_rms,
+        in_chunks.max_rudder_effect,
     )
 
 
-def test_noise_is_found_below_the_ships_motion(vessel: Vessel) -> None:
+def test_noise_is_estimated_beneath_the_ships_motion(vessel: Vessel) -> None:
     sensors = suite("white", {"yaw_rate.white": 3e-4, "speed.white": 0.07, "speed.rate_hz": 2.0})
     trial = simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=sensors)
     signals = resample(TrialLog("x", trial.channels), channels=NAMES)
@@ -42,7 +46,7 @@ def test_noise_is_found_below_the_ships_motion(vessel: Vessel) -> None:
     assert noise_level(signals["speed"]) == pytest.approx(0.07, rel=0.1)
 
 
-def test_a_spike_and_a_gap_do_not_pass_for_noise() -> None:
+def test_a_spike_and_a_gap_do_not_count_as_noise() -> None:
     values = np.random.default_rng(2).standard_normal(5000)
     values[1000] += 500
     values[2000:2500] = np.nan
@@ -54,5 +58,21 @@ def test_a_signal_printed_to_few_digits_has_the_noise_of_its_rounding() -> None:
     assert noise_level(values) == pytest.approx(0.01 / np.sqrt(12), rel=0.5)
 
 
-def test_four_samples_are_needed_to_tell_noise() -> None:
+def test_the_noise_of_fewer_than_four_samples_is_nan() -> None:
     assert np.isnan(noise_level(np.array([1.0, 2.0, np.nan])))
+
+
+def test_statistics_survive_pickling_and_deepcopy(vessel: Vessel) -> None:
+    trial = simulate(vessel, "zigzag-20-20", duration_secs=60.0, sensors=suite("white"))
+    signals = resample(TrialLog("x", trial.channels), channels=NAMES)
+    stats = signal_stats(signals, vessel.coefficients)
+    pickled = pickle.loads(pickle.dumps(stats))  # noqa: S301 - our own bytes
+    for copied in (pickled, copy.deepcopy(stats)):
+        for field in fields(stats):
+            value, copied_value = getattr(stats, field.name), getattr(copied, field.name)
+            if field.name == "head":
+                assert copied_value.start_ns == value.start_ns
+                for name in NAMES:
+                    assert np.array_equal(copied_value[name], value[name], equal_nan=True)
+            else:
+                assert np.array_equal(copied_value, value)
