@@ -91,7 +91,7 @@ def told(log: TrialLog, case: Case) -> tuple[Change, ...]:
         else load_vessel(case.vessel)[0].paper_coefficients
     )
     equations = WeakForm(model, len(signals), signals.dt_secs, (1, 1, 1, 1))
-    watch = ShipChangeTest(equations, guessed=case.guessed)
+    watch = ShipChangeTest(equations, model_is_fitted=case.guessed)
     watch.add(*equations.step(signals, float(np.max(np.abs(signals["speed"])))))
     return watch.result()
 

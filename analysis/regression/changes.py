@@ -1,8 +1,8 @@
-"""Whether a coefficient changed during the trial: which one, when, and by how much.
+"""Changes of coefficients within a trial: which coefficient, when, and by how much.
 
-The most surely told change of the whole trial is sought first (`split`), then each side of it is
-searched for itself. Of the rows no more is kept than the triangular factors of some thousand
-blocks, so that a trial may be of any length.
+The most significant change of the whole trial is detected first (`change_point`), then each side of
+it is searched in turn (binary segmentation). Only the triangular factors of at most `MAX_BLOCKS`
+blocks of rows are stored, so that a trial may be of any length.
 """
 
 from dataclasses import dataclass
@@ -19,48 +19,65 @@ from .change_point import (
     SIGNIFICANCE_LEVEL,
     Blocks,
     ChangePointFit,
-    best_change,
-    changed,
-    inverse_of,
-    is_sure,
-    run_squares,
-    share_of,
+    bartlett_variances,
+    detect_change,
+    fit_change,
+    inverse_gram,
+    is_significant,
+    relative_difference,
 )
 from .sliding import MAX_INFLATION
 from .weak_form import SLIPSTREAM, Equation, Rows, WeakForm, with_constant, with_slipstream
 from .window_qr import rotate_row
 
-BLOCKS_PER_BUMP = 6  # blocks in a bump's length: so sharp is the instant
+BLOCKS_PER_BUMP = 6  # sets the resolution of a change's instant
 MAX_BLOCKS = 4096
-MAX_SPLIT_DEPTH = 3  # how often a side is parted again
-MIN_RELATIVE_CHANGE = 0.01  # of itself by which a coefficient must change, to be worth telling,
-MIN_RELATIVE_CHANGE_FITTED = (
-    0.1  # and where the model was guessed, which by itself makes smaller ones
-)
+MAX_SPLIT_DEPTH = 3  # levels of the binary segmentation
+MIN_RELATIVE_CHANGE = 0.01  # a smaller change is not reported
+MIN_RELATIVE_CHANGE_FITTED = 0.1  # the same for yaw with a fitted model, whose errors mimic changes
 
 
 @dataclass(frozen=True)
 class Change:
-    """A coefficient that is not the same before and after an instant."""
+    """Change of one coefficient at an instant.
+
+    Attributes
+    ----------
+    name, unit
+        The coefficient and its unit.
+    from_secs, until_secs
+        The interval in which the values hold, s since the signals' start.
+    at_secs
+        The instant of the change, s since the signals' start.
+    before, after
+        The values from `from_secs` to `at_secs` and from `at_secs` to `until_secs`.
+    before_std, after_std
+        Their standard deviations.
+    relative_change
+        The difference divided by the value before; NaN unless the value before is determined at
+        two standard deviations.
+    relative_change_half_width
+        Half the width of its 95 % interval; NaN likewise.
+    alternatives
+        Other coefficients that may have changed instead: the data do not show which.
+    """
 
     name: str
     unit: str
-    from_secs: float  # since the signals' start: from here it is `before`,
-    at_secs: float  # from here `after`,
-    until_secs: float  # until here
+    from_secs: float
+    at_secs: float
+    until_secs: float
     before: float
     after: float
     before_std: float
     after_std: float
-    relative_change: (
-        float  # by which it changed, of the value before; NaN unless that one is determined
-    )
-    relative_change_half_width: float  # half of its 95 % interval
-    alternatives: tuple[str, ...]  # any of these may have changed in its place
+    relative_change: float
+    relative_change_half_width: float
+    alternatives: tuple[str, ...]
 
     @property
     def description(self) -> str:
-        """By how much, or from what to what."""
+        """The relative change with its 95 % interval if known, else the values before and after."""
         if np.isfinite(self.relative_change):
             half = 100 * self.relative_change_half_width
             digits = 0 if half >= 1 else 1
@@ -68,115 +85,141 @@ class Change:
         return f"from {self.before:.3g} to {self.after:.3g} {self.unit}"
 
     def __str__(self) -> str:
-        """The change in a sentence."""
-        alternatives = (
-            f" (or {' or '.join(self.alternatives)} in its place)" if self.alternatives else ""
-        )
+        """Return a warning in one line."""
+        names = " or ".join((self.name, *self.alternatives))
         return (
-            f"{self.name}{alternatives} differs before and after {self.at_secs:.0f} s "
-            f"{self.description}: the ship, her loading, the depth, the "
-            "weather, or a model that does not hold for both"
+            f"{names} changed {self.description} at {self.at_secs:.0f} s: the ship, its loading, "
+            "the water depth or the weather changed, or the model does not hold on both sides"
         )
 
 
 class ShipChangeTest:
-    """Looks for changes in the coefficients of both equations, whose rows come in chunks.
+    """Test of both equations for changes of coefficients, from rows that come in chunks.
 
-    A steady yaw moment may come and go. Where the model is a `guessed` one, nothing is known of
-    the slipstream: whatever the speed and the revolutions may do to the rudder is allowed for, and
-    no small changes of yaw are told.
+    A steady yaw moment may change; it is not reported.
+
+    Parameters
+    ----------
+    equations
+        The stage that computes the rows.
+    model_is_fitted
+        Whether the model was fitted to the same log. The slipstream is then unknown: a regressor
+        takes up the effect of speed and revolutions on the rudder, and changes of yaw coefficients
+        below `MIN_RELATIVE_CHANGE_FITTED` are not reported.
     """
 
-    def __init__(self, equations: WeakForm, *, guessed: bool) -> None:
+    def __init__(self, equations: WeakForm, *, model_is_fitted: bool) -> None:
         yaw, count = equations.yaw.with_constant(), equations.row_count
-        self._guessed = guessed
-        rudder = yaw.with_slipstream() if guessed else yaw
+        self._model_is_fitted = model_is_fitted
+        rudder = yaw.with_slipstream() if model_is_fitted else yaw
         self._yaw = ChangeTest(
-            rudder, count, least=MIN_RELATIVE_CHANGE_FITTED if guessed else MIN_RELATIVE_CHANGE
+            rudder,
+            count,
+            min_relative_change=MIN_RELATIVE_CHANGE_FITTED
+            if model_is_fitted
+            else MIN_RELATIVE_CHANGE,
         )
         self._surge = ChangeTest(equations.surge, count)
 
     def add(self, yaw: Rows, surge: Rows) -> None:
-        """The next rows."""
+        """Add the next rows."""
         yaw = with_constant(yaw)
-        self._yaw.add(with_slipstream(yaw, surge) if self._guessed else yaw)
+        self._yaw.add(with_slipstream(yaw, surge) if self._model_is_fitted else yaw)
         self._surge.add(surge)
 
     def result(self) -> tuple[Change, ...]:
-        """What changed, in the order of time."""
+        """Return the changes in the order of time."""
         found = *self._yaw.result(), *self._surge.result()
         return tuple(sorted(found, key=lambda change: change.at_secs))
 
 
 class ChangeTest:
-    """Looks for changes in one equation's coefficients, `count` rows in all, in chunks.
+    """Test of one equation for changes of coefficients, from rows that come in chunks.
 
-    A `constant` among the regressors may change, too, and nothing is said of it: that is a
-    disturbance. Where there is a slipstream (`with_slipstream`) it changes as d does. No change
-    is told by a share of less than `least`.
+    A `constant` among the regressors may change, too; that is a disturbance and not reported. A
+    slipstream regressor (`with_slipstream`) changes in proportion with d.
+
+    Parameters
+    ----------
+    equation
+        The equation.
+    count
+        The number of rows of the whole trial.
+    min_relative_change
+        The smallest change that is reported, relative to the value before.
     """
 
     def __init__(
-        self, equation: Equation, count: int, *, least: float = MIN_RELATIVE_CHANGE
+        self, equation: Equation, count: int, *, min_relative_change: float = MIN_RELATIVE_CHANGE
     ) -> None:
-        self._equation, self._count, self._least, self._seen = equation, count, least, 0
+        self._equation, self._count, self._min_relative_change, self._seen = (
+            equation,
+            count,
+            min_relative_change,
+            0,
+        )
         self._size = max(1, equation.overlap // BLOCKS_PER_BUMP, -(-count // MAX_BLOCKS))
         blocks, p = -(-count // self._size), len(equation.names)
         self._factors = np.zeros((blocks, p, p + 1))
         self._tallies = np.tile([0.0, inf, -inf], (blocks, 1))
-        self._least_excitation = 0.0
+        self._min_excitation = 0.0
 
     def add(self, rows: Rows) -> None:
-        """The next rows."""
+        """Add the next rows."""
         every = np.column_stack((rows.regressors, rows.target, rows.excitation))
-        _fold(self._factors, self._tallies, every, self._seen, self._size)
+        _add_to_blocks(self._factors, self._tallies, every, self._seen, self._size)
         self._seen += len(every)
-        self._least_excitation = rows.min_excitation
+        self._min_excitation = rows.min_excitation
 
     def result(self) -> tuple[Change, ...]:
-        """What changed, in the order of time."""
+        """Return the changes in the order of time."""
         blocks = self._blocks()
         if blocks is None:
             return ()
-        last, clear = len(blocks.products), blocks.clear
-        at = _sought(blocks, 0, last, MAX_SPLIT_DEPTH)
+        last, guard_blocks = len(blocks.moments), blocks.guard_blocks
+        at = _find_blocks(blocks, 0, last, MAX_SPLIT_DEPTH)
         found: list[Change] = []
-        for before, after in zip([-clear, *at], [*at[1:], last + clear], strict=False):
-            part = blocks.part(before + clear, after - clear)  # between its neighbours
-            split = changed(part)
-            found += _told(part, split) if split else []
+        for before, after in zip(
+            [-guard_blocks, *at], [*at[1:], last + guard_blocks], strict=False
+        ):
+            part = blocks.part(before + guard_blocks, after - guard_blocks)  # between other changes
+            fit = detect_change(part)
+            found += _significant_changes(part, fit) if fit else []
         return tuple(found)
 
     def _blocks(self) -> Blocks | None:
-        """The blocks, without columns that are zero throughout; None if there is no telling."""
+        """Return the blocks, without regressors that are zero in all rows; None if all are zero."""
         upper = self._factors[:, :, :-1].transpose(0, 2, 1)
-        squares, products = upper @ self._factors[:, :, :-1], upper @ self._factors[:, :, -1:]
-        sizes = np.sqrt(np.einsum("kii->i", squares))
+        grams, moments = upper @ self._factors[:, :, :-1], upper @ self._factors[:, :, -1:]
+        sizes = np.sqrt(np.einsum("kii->i", grams))
         kept = sizes > 0
         if not kept.any():
             return None
         every, units = self._equation.names, sizes[kept]
-        starts = np.minimum(np.arange(len(squares) + 1) * self._size, self._count) - 0.5
+        starts = np.minimum(np.arange(len(grams) + 1) * self._size, self._count) - 0.5
         blocks = Blocks(
             tuple(name for name, there in zip(every, kept, strict=True) if there),
             units,
-            squares[:, kept][:, :, kept] / np.outer(units, units),
-            products[:, kept, 0] / units,
+            grams[:, kept][:, :, kept] / np.outer(units, units),
+            moments[:, kept, 0] / units,
             self._tallies,
             self._equation.bump_secs / 2 + starts * self._equation.stride_secs,
             self._equation,
-            self._least_excitation,
-            self._least,
+            self._min_excitation,
+            self._min_relative_change,
             max(2, -(-self._equation.overlap // self._size)),
         )
-        return _without_needless(blocks) if SLIPSTREAM in blocks.names else blocks
+        return _without_redundant_slipstream(blocks) if SLIPSTREAM in blocks.names else blocks
 
 
 @compiled
-def _fold(
+def _add_to_blocks(
     factors: FloatArray, tallies: FloatArray, rows: FloatArray, first: int, size: int
 ) -> None:
-    """Rows [X y excitation] (m, p + 2), used up, of which `first` came before, into blocks."""
+    """Add rows ``[X y excitation]`` (m, p + 2), overwritten, to blocks of `size` rows.
+
+    `first` rows have been added before.
+    """
     last = rows.shape[1] - 1
     for k in range(len(rows)):
         block = (first + k) // size
@@ -190,73 +233,79 @@ def _fold(
             tallies[block, 2] = max(tallies[block, 2], rows[k, last])
 
 
-def _without_needless(blocks: Blocks) -> Blocks:
-    """Without the slipstream, if the rudder alone can do what it does: at a speed that stays."""
-    last, inverse = blocks.names.index(SLIPSTREAM), inverse_of(blocks.squares.sum(0))
+def _without_redundant_slipstream(blocks: Blocks) -> Blocks:
+    """Drop the slipstream regressor where the rudder explains it, as at a constant speed."""
+    last, inverse = blocks.names.index(SLIPSTREAM), inverse_gram(blocks.grams.sum(0))
     if inverse is not None and sqrt(inverse[last, last]) <= MAX_INFLATION:
         return blocks
     return blocks._replace(
         names=blocks.names[:last],
         units=blocks.units[:last],
-        squares=blocks.squares[:, :last, :last],
-        products=blocks.products[:, :last],
+        grams=blocks.grams[:, :last, :last],
+        moments=blocks.moments[:, :last],
     )
 
 
-def _sought(blocks: Blocks, start: int, stop: int, depth: int) -> list[int]:
-    """The first blocks after each change between `start` and `stop`."""
-    split = changed(blocks.part(start, stop)) if depth else None
-    if split is None:
+def _find_blocks(blocks: Blocks, start: int, stop: int, depth: int) -> list[int]:
+    """Return the first block after each change between `start` and `stop`, recursively."""
+    fit = detect_change(blocks.part(start, stop)) if depth else None
+    if fit is None:
         return []
-    at, clear = start + split.at, blocks.clear
-    earlier = _sought(blocks, start, at - clear, depth - 1)
-    return [*earlier, at, *_sought(blocks, at + clear, stop, depth - 1)]
+    at, guard_blocks = start + fit.block, blocks.guard_blocks
+    earlier = _find_blocks(blocks, start, at - guard_blocks, depth - 1)
+    return [*earlier, at, *_find_blocks(blocks, at + guard_blocks, stop, depth - 1)]
 
 
-def _told(blocks: Blocks, split: ChangePointFit) -> list[Change]:
-    """The changes of a split that are a coefficient's, and not too small."""
-    alternatives = _instead(blocks, split) if len(split.columns) == 1 else ()
+def _significant_changes(blocks: Blocks, fit: ChangePointFit) -> list[Change]:
+    """Return the changes of coefficients that are large enough to report."""
+    alternatives = _alternatives(blocks, fit) if len(fit.columns) == 1 else ()
     return [
-        _change(blocks, split, c, alternatives)
-        for c, i in enumerate(split.columns)
-        if blocks.names[i] in COEFFICIENT_UNITS and share_of(split, c) >= blocks.least_share
+        _change(blocks, fit, c, alternatives)
+        for c, i in enumerate(fit.columns)
+        if blocks.names[i] in COEFFICIENT_UNITS
+        and relative_difference(fit, c) >= blocks.min_relative_change
     ]
 
 
-def _change(blocks: Blocks, split: ChangePointFit, c: int, alternatives: tuple[str, ...]) -> Change:
-    i, edges = split.columns[c], blocks.edges_secs
+def _change(blocks: Blocks, fit: ChangePointFit, c: int, alternatives: tuple[str, ...]) -> Change:
+    i, edges = fit.columns[c], blocks.edges_secs
     j = len(blocks.names) + c
-    before, difference = split.values[i], split.values[j]
-    share, of_before, of_difference = difference / before, *split.influences[:, [i, j]].T
+    before, difference = fit.values[i], fit.values[j]
+    share, of_before, of_difference = difference / before, *fit.influences[:, [i, j]].T
     every = of_before, of_before + of_difference, (of_difference - share * of_before) / before
-    stds = np.sqrt(split.inflation * run_squares(np.column_stack(every), blocks.run))
-    sure = abs(before) > 2 * stds[0]
+    stds = np.sqrt(
+        fit.variance_factor * bartlett_variances(np.column_stack(every), blocks.overlap_blocks)
+    )
+    is_determined = abs(before) > 2 * stds[0]
     return Change(
         name=blocks.names[i],
         unit=COEFFICIENT_UNITS[blocks.names[i]],
         from_secs=float(edges[0]),
-        at_secs=float(edges[split.at]),
+        at_secs=float(edges[fit.block]),
         until_secs=float(edges[-1]),
         before=float(before / blocks.units[i]),
         after=float((before + difference) / blocks.units[i]),
         before_std=float(stds[0] / blocks.units[i]),
         after_std=float(stds[1] / blocks.units[i]),
-        relative_change=float(share) if sure else nan,
-        relative_change_half_width=float(-stdtrit(split.degrees[c], 0.025) * stds[2])
-        if sure
+        relative_change=float(share) if is_determined else nan,
+        relative_change_half_width=float(-stdtrit(fit.degrees_of_freedom[c], 0.025) * stds[2])
+        if is_determined
         else nan,
         alternatives=alternatives,
     )
 
 
-def _instead(blocks: Blocks, split: ChangePointFit) -> tuple[str, ...]:
-    """The coefficients that might have changed alone: beside one the found one is in doubt."""
+def _alternatives(blocks: Blocks, fit: ChangePointFit) -> tuple[str, ...]:
+    """Return the coefficients that may have changed instead.
+
+    These are significant alone, and with them the change of the fit is not.
+    """
     found = []
     for i, name in enumerate(blocks.names):
-        if name not in COEFFICIENT_UNITS or i in split.columns:
+        if name not in COEFFICIENT_UNITS or i in fit.columns:
             continue
-        alone, both = best_change(blocks, (i,)), best_change(blocks, (i, *split.columns))
-        doubted = both is None or both.chances[-1] > SIGNIFICANCE_LEVEL
-        if alone is not None and is_sure(blocks, alone) and doubted:
+        alone, both = fit_change(blocks, (i,)), fit_change(blocks, (i, *fit.columns))
+        is_doubtful = both is None or both.p_values[-1] > SIGNIFICANCE_LEVEL
+        if alone is not None and is_significant(blocks, alone) and is_doubtful:
             found.append(name)
     return tuple(found)

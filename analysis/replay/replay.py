@@ -276,7 +276,7 @@ class _Stages:
             weak_form.surge, count, plan.surge_solution, window_secs=window_secs
         )
         self._weak_form = weak_form
-        self._change_test = ShipChangeTest(weak_form, guessed=plan.model_is_fitted)
+        self._change_test = ShipChangeTest(weak_form, model_is_fitted=plan.model_is_fitted)
         self.tracker = Tracker(plan.clock, plan.log_stats.get("position"))
 
     def step(

@@ -10,9 +10,9 @@ from analysis.regression.change_point import (
     GUARD_SHARE,
     MIN_INFORMATION_SHARE,
     Blocks,
-    best_change,
-    changed,
-    largest_of_instants,
+    detect_change,
+    fit_change,
+    sup_wald_p_value,
 )
 from analysis.regression.weak_form import Equation
 from shiplog.types import FloatArray
@@ -34,14 +34,14 @@ def blocks_of(X: FloatArray, y: FloatArray) -> Blocks:
     return Blocks(
         names=("a", "d"),
         units=np.ones(2),
-        squares=np.array([x.T @ x for x, _ in parts]),
-        products=np.array([x.T @ b for x, b in parts]),
+        grams=np.array([x.T @ x for x, _ in parts]),
+        moments=np.array([x.T @ b for x, b in parts]),
         tallies=np.array([[len(b), x[:, 0].min(), x[:, 0].max()] for x, b in parts]),
         edges_secs=np.arange(len(parts) + 1) * float(SIZE),
         equation=Equation(("a", "d"), 1.0, float(OVERLAP)),
         min_excitation=0.0,
-        least_share=0.0,
-        run=OVERLAP // SIZE,
+        min_relative_change=0.0,
+        overlap_blocks=OVERLAP // SIZE,
     )
 
 
@@ -51,9 +51,9 @@ def test_the_largest_of_all_instants_is_judged_as_andrews_printed(
 ) -> None:
     """Andrews (2003), table I: one coefficient, 15 % trimmed on either side."""
     level, critical = percent
-    chance = float(chi2.sf(critical, 1))
-    spread = 2 * log((1 - 0.15) / 0.15)
-    assert 100 * largest_of_instants(chance, spread) == pytest.approx(level, rel=0.08)
+    p_value = float(chi2.sf(critical, 1))
+    log_odds_range = 2 * log((1 - 0.15) / 0.15)
+    assert 100 * sup_wald_p_value(p_value, log_odds_range) == pytest.approx(level, rel=0.08)
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.15, 0.85), (0.4, 0.8), (0.05, 0.3)])
@@ -65,8 +65,8 @@ def test_for_other_instants_it_is_what_brownian_bridges_do(low: float, high: flo
     tried = (at >= low) & (at <= high)
     largest = np.max(bridges[:, tried] ** 2 / (at * (1 - at))[tried], axis=1)
     critical = float(np.quantile(largest, 0.95))
-    spread = log(high / (1 - high) / (low / (1 - low)))
-    found = largest_of_instants(float(chi2.sf(critical, 1)), spread)
+    log_odds_range = log(high / (1 - high) / (low / (1 - low)))
+    found = sup_wald_p_value(float(chi2.sf(critical, 1)), log_odds_range)
     assert found == pytest.approx(0.05, rel=0.25)
 
 
@@ -89,59 +89,63 @@ def brute_instant(X: FloatArray, y: FloatArray, column: int) -> int:
 @pytest.mark.parametrize("column", [0, 1])
 def test_the_instant_is_that_of_a_search_through_all_regressions(seed: int, column: int) -> None:
     X, y = regression(seed, 0.3)
-    found = best_change(blocks_of(X, y), (column,))
+    found = fit_change(blocks_of(X, y), (column,))
     assert found is not None
-    assert found.at == brute_instant(X, y, column)
+    assert found.block == brute_instant(X, y, column)
 
 
 def test_values_errors_and_chances_are_those_of_the_rows_themselves() -> None:
     X, y = regression(3, 0.3)
-    found = best_change(blocks_of(X, y), (0,))
+    found = fit_change(blocks_of(X, y), (0,))
     assert found is not None
-    clear = int(np.ceil(GUARD_SHARE * OVERLAP / SIZE)) * SIZE
+    guard_blocks = int(np.ceil(GUARD_SHARE * OVERLAP / SIZE)) * SIZE
     block = np.arange(len(y))
-    kept = (block < found.at * SIZE - clear) | (block >= found.at * SIZE + clear)
-    every = np.column_stack((X, X[:, 0] * (block >= found.at * SIZE)))
+    kept = (block < found.block * SIZE - guard_blocks) | (
+        block >= found.block * SIZE + guard_blocks
+    )
+    every = np.column_stack((X, X[:, 0] * (block >= found.block * SIZE)))
     values = np.linalg.lstsq(every[kept], y[kept])[0]
     assert found.values == pytest.approx(values, rel=1e-9)
     inverse = np.linalg.inv(every[kept].T @ every[kept])
     scores = (every * (y - every @ values)[:, None]) * kept[:, None]
     sums = scores.reshape(-1, SIZE, 3).sum(1) @ inverse
-    run, variance = OVERLAP // SIZE, sums[:, 2] @ sums[:, 2]
-    for lag in range(1, run):
-        variance += 2 * (1 - lag / run) * (sums[lag:, 2] @ sums[:-lag, 2])
-    ours = np.sum(np.convolve(found.influences[:, 2], np.ones(run)) ** 2) / run
+    overlap_blocks, variance = OVERLAP // SIZE, sums[:, 2] @ sums[:, 2]
+    for lag in range(1, overlap_blocks):
+        variance += 2 * (1 - lag / overlap_blocks) * (sums[lag:, 2] @ sums[:-lag, 2])
+    ours = (
+        np.sum(np.convolve(found.influences[:, 2], np.ones(overlap_blocks)) ** 2) / overlap_blocks
+    )
     assert ours == pytest.approx(variance, rel=1e-9)
     independent = kept.sum() / (OVERLAP / 3)
-    assert found.inflation == pytest.approx(independent / (independent - 3))
+    assert found.variance_factor == pytest.approx(independent / (independent - 3))
 
 
 def test_what_changed_is_named_and_nothing_else() -> None:
     for seed in range(10):
-        found = changed(blocks_of(*regression(seed, 0.4)))
+        found = detect_change(blocks_of(*regression(seed, 0.4)))
         assert found is not None
         assert found.columns == (0,)
-        assert abs(found.at * SIZE - 240) < 40
+        assert abs(found.block * SIZE - 240) < 40
 
 
 def test_where_nothing_changed_alarms_are_no_more_than_promised() -> None:
     """Of 400 regressions with coloured noise."""
-    alarms = sum(changed(blocks_of(*regression(seed))) is not None for seed in range(400))
+    alarms = sum(detect_change(blocks_of(*regression(seed))) is not None for seed in range(400))
     assert alarms <= 20
 
 
 def test_without_rows_or_with_twins_for_columns_nothing_is_told() -> None:
     X, y = regression(0, 0.4)
     blocks = blocks_of(X, y)
-    assert changed(blocks.part(5, 5)) is None
-    assert changed(blocks.part(7, 8)) is None
-    assert changed(blocks_of(X[:, [0, 0]], y)) is None
+    assert detect_change(blocks.part(5, 5)) is None
+    assert detect_change(blocks.part(7, 8)) is None
+    assert detect_change(blocks_of(X[:, [0, 0]], y)) is None
 
 
 def test_a_side_on_which_nothing_moves_tells_nothing() -> None:
     X, y = regression(1, 0.4)
     still = blocks_of(X, y)
     still.tallies[: len(still.tallies) // 2, 1:] = 1.0
-    moving = best_change(still._replace(min_excitation=0.1), (0,))
+    moving = fit_change(still._replace(min_excitation=0.1), (0,))
     assert moving is not None
-    assert moving.at > len(still.tallies) // 2
+    assert moving.block > len(still.tallies) // 2
