@@ -1,8 +1,8 @@
 """Exosystems of disturbances, and a plant augmented by them.
 
-A disturbance is what an exosystem puts out, a linear system of known modes and unknown state:
-a constant, a ramp, a wave. Source: "Algorithm of ship course control system watcher for assessing
-disturbances and noise measurements", eqs (1) to (3).
+A disturbance is the output of an exosystem: a linear system of known modes and unknown state that
+generates a constant, a ramp or a wave. Source: "Algorithm of ship course control system watcher
+for assessing disturbances and noise measurements", eqs (1) to (3).
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,27 +20,58 @@ from .matrices import as_finite_array, as_matrix, as_number, as_square_matrix
 
 @dataclass(frozen=True, eq=False)
 class Exosystem:
-    """x' = Ac x, of which the disturbance is Cc x: e^{λt} times a polynomial, λ known."""
+    """The generator x' = Ac x of a disturbance Cc x: e^{λt} times a polynomial, λ known.
 
-    Ac: FloatArray  # (k, k), 1/s
-    Cc: FloatArray  # (1, k)
+    Attributes
+    ----------
+    Ac
+        (k, k), 1/s.
+    Cc
+        (1, k).
+
+    Examples
+    --------
+    A ramp is the output of a double integrator:
+
+    >>> Exosystem.polynomial(1).Ac.tolist()
+    [[0.0, 1.0], [0.0, 0.0]]
+    """
+
+    Ac: FloatArray
+    Cc: FloatArray
 
     @classmethod
     def polynomial(cls, degree: int) -> Self:
-        """A constant (0), a ramp (1), a parabola (2), ...; k = degree + 1."""
+        """Build the exosystem of a constant (degree 0), a ramp (1), a parabola (2), ...
+
+        It has degree + 1 states. Raises `UsageError` as `exponential` does.
+        """
         return cls.exponential(0.0, degree)
 
     @classmethod
     def harmonic(cls, omega: float) -> Self:
-        """A sinusoid of any amplitude and phase, `omega` in rad/s; its state turns, k = 2."""
+        """Build the exosystem of a sinusoid of any amplitude and phase; it has two states.
+
+        `omega` is its frequency, rad/s. Raises `UsageError` unless it is positive.
+        """
         return cls.exponential(1j * as_number("omega", omega, least=np.finfo(float).tiny))
 
     @classmethod
     def exponential(cls, rate: complex, degree: int = 0) -> Self:
-        """e^{rate t} times a polynomial; `rate` in 1/s, k = degree + 1, or twice that if complex.
+        """Build the exosystem of e^{rate t} times a polynomial.
 
-        Raises `UsageError` for a rate that is not finite and a degree that is no whole number from
-        zero.
+        Parameters
+        ----------
+        rate
+            λ, 1/s; a complex rate σ + jω gives an oscillation of ω rad/s.
+        degree
+            Degree of the polynomial. The exosystem has degree + 1 states, twice as many for a
+            complex rate.
+
+        Raises
+        ------
+        UsageError
+            The rate is not finite, or the degree is not a whole number from zero.
         """
         if degree != int(degree) or degree < 0:
             raise UsageError(f"degree is {degree}; expected a whole number from 0")
@@ -54,53 +85,105 @@ class Exosystem:
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """x' = A x + B u, y = C x, and what its states and sensors are called."""
+    """The plant x' = A x + B u, y = C x, and the names of its states and sensors.
 
-    A: FloatArray  # (n, n)
-    B: FloatArray  # (n, inputs), a column of zeros where there are none
-    C: FloatArray  # (m, n)
+    Attributes
+    ----------
+    A
+        (n, n), 1/s.
+    B
+        (n, inputs); one column of zeros where there is no input.
+    C
+        (m, n).
+    states
+        Names of the n states.
+    sensors
+        Names of the m sensors.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
     states: tuple[str, ...]
     sensors: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class DisturbanceInput:
-    """A disturbance by name, and where it acts: on states' rates of change, on sensors, or both.
+    """A named disturbance and where it acts: on rates of change of states, on sensors, or both.
 
-    A factor of one on a state makes the disturbance specific (a moment over the inertia), in the
-    unit of that state per second; 1 / I makes it the moment itself.
+    A factor of one on a state makes the disturbance specific (moment over inertia), in the unit of
+    that state per second; with the factor 1 / I the disturbance is the moment itself.
+
+    Attributes
+    ----------
+    name
+        Name of the disturbance.
+    exosystem
+        Its generator.
+    on_state
+        Factor on the rate of change of each named state: the column of Cf.
+    on_sensor
+        Factor on each named sensor: the column of Cv.
     """
 
     name: str
     exosystem: Exosystem
-    on_state: Mapping[str, float] = field(default_factory=dict)  # the column of Cf
-    on_sensor: Mapping[str, float] = field(default_factory=dict)  # the column of Cv
+    on_state: Mapping[str, float] = field(default_factory=dict)
+    on_sensor: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class AugmentedPlant:
-    """Plant and exosystems as one: eq (3)."""
+    """Plant and exosystems as one system of N states, eq (3).
 
-    A: FloatArray  # [A, Cf; 0, Ac]
-    B: FloatArray  # [B; 0]
-    C: FloatArray  # [C, Cv]
-    D: FloatArray  # [0, Cc]
+    Attributes
+    ----------
+    A
+        (N, N): [A, Cf Cc; 0, Ac].
+    B
+        (N, inputs): [B; 0].
+    C
+        (m, N): [C, Cv Cc].
+    D
+        (k, N): [0, Cc]; the k disturbances are D x.
+    names
+        Names of the k disturbances.
+    states
+        Names of the N states.
+    disturbance_index
+        For each state the index of the disturbance it belongs to; -1 for the plant.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
     names: tuple[str, ...]
     states: tuple[str, ...]
-    disturbance_index: tuple[int, ...]  # of each state the influence, -1 being the plant
+    disturbance_index: tuple[int, ...]
 
 
 def augment_with_disturbances(
     plant: Plant, disturbances: Sequence[DisturbanceInput]
 ) -> AugmentedPlant:
-    """Plant, n states, and exosystems as one system; raises `UsageError` for what does not fit."""
+    """Augment a plant of n states with the exosystems of its disturbances, eq (3).
+
+    The states of the plant come first, then those of each exosystem in turn.
+
+    Raises
+    ------
+    UsageError
+        Matrices do not fit, names are repeated, or a disturbance acts on an unknown state or
+        sensor.
+    """
     A = as_square_matrix("A", plant.A)
     n = len(A)
     B, C = as_matrix("B", plant.B, rows=n), as_matrix("C", plant.C, columns=n)
     states, names = list(plant.states), tuple(disturbance.name for disturbance in disturbances)
-    for what, given, count in (("states", plant.states, n), ("sensors", plant.sensors, len(C))):
+    for kind, given, count in (("states", plant.states, n), ("sensors", plant.sensors, len(C))):
         if len(given) != count or len(set(given)) != count:
-            raise UsageError(f"{what} are {', '.join(given)}; expected {count} different names")
+            raise UsageError(f"{kind} are {', '.join(given)}; expected {count} different names")
     if len(set(names)) != len(names):
         raise UsageError(f"disturbances are {', '.join(names)}; expected different names")
     D, disturbance_index = np.zeros((0, n)), [-1] * n
@@ -119,7 +202,7 @@ def augment_with_disturbances(
 
 
 def _column(name: str, factors: Mapping[str, float], kind: str, names: Sequence[str]) -> FloatArray:
-    """The factors of a disturbance on the plant's states or sensors, (count, 1)."""
+    """Return the factors of a disturbance on the named states or sensors, (len(names), 1)."""
     column = np.zeros((len(names), 1))
     for target, factor in factors.items():
         if target not in names:

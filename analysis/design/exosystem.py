@@ -1,7 +1,7 @@
-"""Design of the disturbance observer: a gain for plant and exosystems as one system.
+"""Disturbance observer: one gain for the plant and the exosystems of its disturbances.
 
 Source: "Algorithm of ship course control system watcher for assessing disturbances and noise
-measurements", eqs (3) and (4). Its "binomial" filtering is Butterworth's.
+measurements", eqs (3) and (4). What the paper calls "binomial" filtering is Butterworth's.
 """
 
 from collections.abc import Sequence
@@ -41,17 +41,35 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class DisturbanceObserver:
-    """x̂' = A x̂ + B u + L (y - C x̂) of plant and environment, N states; the disturbances are D x̂."""
+    """The observer x̂' = A x̂ + B u + L (y - C x̂) of plant and exosystems; d̂ = D x̂.
 
-    L: FloatArray  # (N, m)
-    A: FloatArray  # (N, N)
-    B: FloatArray  # (N, inputs)
-    C: FloatArray  # (m, N)
-    D: FloatArray  # (k, N)
-    poles: ComplexArray  # (N,), 1/s, channel after channel
-    names: tuple[str, ...]  # of the k disturbances
-    states: tuple[str, ...]  # of the N states
-    channels: tuple[tuple[int, ...], ...]  # the states of each channel
+    Attributes
+    ----------
+    L
+        (N, m): the gain.
+    A, B, C
+        (N, N), (N, inputs) and (m, N): the augmented plant.
+    D
+        (k, N): the estimated disturbances are D x̂.
+    poles
+        (N,), 1/s: eigenvalues of A - L C, channel by channel.
+    names
+        Names of the k disturbances.
+    states
+        Names of the N states.
+    channels
+        Indices of the states of each channel.
+    """
+
+    L: FloatArray
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+    poles: ComplexArray
+    names: tuple[str, ...]
+    states: tuple[str, ...]
+    channels: tuple[tuple[int, ...], ...]
 
 
 def disturbance_observer(
@@ -63,37 +81,67 @@ def disturbance_observer(
     state_noise: ArrayLike | None = None,
     sensor_noise: ArrayLike | None = None,
 ) -> DisturbanceObserver:
-    """The observer of a plant's states, n, and of what disturbs it, by the exosystems' states.
+    """Design the observer of a plant's states and of its disturbances.
 
-    Parts that have nothing to do with each other are channels and designed each for itself; they
-    come in the order of their first states. `spectrum` is "butterworth" or "binomial" (all poles
-    at -`frequency`) of a `frequency` in rad/s, one or one a channel; poles (N,), 1/s, channel after
-    channel; or "kalman", with the intensities of white noise `state_noise` (N,), on the rates of
-    change of plant and exosystems, and `sensor_noise` (m,), squares of units times second.
+    Uncoupled parts of the augmented plant are channels, designed one by one, in the order of their
+    first states.
 
-    Raises `UsageError` for matrices and names that do not fit, and for disturbances that the
-    sensors cannot distinguish, naming them, their mode and a measurement that would: constant
-    moment and constant gyro bias, say. Source: the disturbance observer's paper, (3) and (4).
+    Parameters
+    ----------
+    plant
+        n states and m sensors.
+    disturbances
+        The disturbances; plant and exosystems have N states together.
+    spectrum
+        "butterworth" or "binomial" (all poles at -`frequency`) need `frequency`; poles (N,), 1/s,
+        channel by channel, are placed as given; "kalman" computes the gain from the noise.
+    frequency
+        rad/s: one, or one for each channel.
+    state_noise
+        (N,): intensity of white noise on the rate of change of each state of plant and exosystems,
+        in squared units of the rate times second; for "kalman".
+    sensor_noise
+        (m,): intensity of white noise of each sensor, in squared units times second; for "kalman".
+
+    Raises
+    ------
+    UsageError
+        Matrices or names do not fit, or the sensors cannot distinguish the disturbances, for
+        example a constant moment and a constant gyro bias. The message names the disturbances,
+        their mode and a measurement that would distinguish them.
+
+    References
+    ----------
+    "Algorithm of ship course control system watcher ...", (3) and (4).
+
+    Examples
+    --------
+    A constant specific moment on a yaw rate, both poles at -0.1 1/s:
+
+    >>> ship = Plant(np.zeros((1, 1)), np.zeros((1, 1)), np.eye(1), ("rate",), ("gyro",))
+    >>> moment = DisturbanceInput("moment", Exosystem.polynomial(0), on_state={"rate": 1.0})
+    >>> disturbance_observer(ship, [moment], "binomial", frequency=0.1).L.round(3).tolist()
+    [[0.2], [0.01]]
     """
     system = augment_with_disturbances(plant, disturbances)
-    hidden = system_ambiguities(system)
-    if hidden:
-        raise UsageError("; ".join(str(ambiguity) for ambiguity in hidden))
+    unresolved = system_ambiguities(system)
+    if unresolved:
+        raise UsageError("; ".join(str(ambiguity) for ambiguity in unresolved))
     N, m = len(system.A), len(system.C)
     channels = _channels(system)
-    wanted = _wanted(spectrum, frequency, [len(states) for states, _ in channels])
+    requested = _requested_poles(spectrum, frequency, [len(states) for states, _ in channels])
     L, poles = np.zeros((N, m)), []
     for k, (states, sensors) in enumerate(channels):
         A, C = system.A[np.ix_(states, states)], system.C[np.ix_(sensors, states)]
-        if wanted is None:
+        if requested is None:
             Q = np.diag(_intensities("state_noise", state_noise, N)[states])
             R = np.diag(_intensities("sensor_noise", sensor_noise, m)[sensors])
             kalman = kalman_gain(A, np.eye(len(A)), C, Q, R)
-            gain, found = kalman.gain, kalman.poles
+            gain, closed_poles = kalman.gain, kalman.poles
         else:
-            gain, found = place_multilevel(A, C, wanted[k]), wanted[k]
+            gain, closed_poles = place_multilevel(A, C, requested[k]), requested[k]
         L[np.ix_(states, sensors)] = gain
-        poles.append(found)
+        poles.append(closed_poles)
     return DisturbanceObserver(
         L=L,
         A=system.A,
@@ -108,7 +156,7 @@ def disturbance_observer(
 
 
 def _channels(system: AugmentedPlant) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """The states and sensors of each part that nothing connects to another."""
+    """Return the state and sensor indices of each uncoupled part of the augmented plant."""
     N = len(system.A)
     linked = np.vstack((system.A, system.C)) != 0
     links = np.hstack((linked, np.zeros((len(linked), len(system.C)))))
@@ -119,10 +167,10 @@ def _channels(system: AugmentedPlant) -> list[tuple[NDArray[np.intp], NDArray[np
     ]
 
 
-def _wanted(
+def _requested_poles(
     spectrum: ArrayLike, frequency: float | Sequence[float] | None, sizes: Sequence[int]
 ) -> list[ComplexArray] | None:
-    """The poles of each channel; none where the noise decides."""
+    """Return the poles of each channel, (size,) each; `None` for a Kalman design."""
     if not isinstance(spectrum, str):
         poles = np.asarray(spectrum)
         if poles.shape != (sum(sizes),):
@@ -143,23 +191,26 @@ def _wanted(
         return None
     if frequency is None:
         raise UsageError(f"frequency is missing; {spectrum} poles need one in rad/s")
-    each = as_finite_array("frequency", frequency)
-    if each.shape not in ((), (len(sizes),)) or np.any(each <= 0):
+    frequencies = as_finite_array("frequency", frequency)
+    if frequencies.shape not in ((), (len(sizes),)) or np.any(frequencies <= 0):
         raise UsageError(
             f"frequency is {frequency}; expected a positive one, or one for each of the"
             f" {len(sizes)} channels"
         )
-    each = np.broadcast_to(each, len(sizes))
+    frequencies = np.broadcast_to(frequencies, len(sizes))
     return [
-        POLE_PATTERNS[spectrum](n, omega) for n, omega in zip(sizes, each.tolist(), strict=True)
+        POLE_PATTERNS[spectrum](n, omega)
+        for n, omega in zip(sizes, frequencies.tolist(), strict=True)
     ]
 
 
-def _intensities(name: str, values: ArrayLike | None, count: int) -> FloatArray:
-    """Intensities of white noise, (count,), none of them negative."""
+def _intensities(name: str, values: ArrayLike | None, size: int) -> FloatArray:
+    """Check intensities of white noise: (size,), none of them negative."""
     if values is None:
-        raise UsageError(f"{name} is missing; kalman needs its intensities, ({count},)")
-    found = as_finite_array(name, values)
-    if found.shape != (count,) or np.any(found < 0):
-        raise UsageError(f"{name} is of shape {found.shape}; expected ({count},), none negative")
-    return found
+        raise UsageError(f"{name} is missing; kalman needs its intensities, ({size},)")
+    intensities = as_finite_array(name, values)
+    if intensities.shape != (size,) or np.any(intensities < 0):
+        raise UsageError(
+            f"{name} is of shape {intensities.shape}; expected ({size},), none negative"
+        )
+    return intensities

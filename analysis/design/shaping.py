@@ -1,4 +1,7 @@
-"""Shaping filters of coloured noise, and a plant augmented by them."""
+"""Shaping filters of coloured noise, and a plant augmented by them.
+
+Source: Sakharov, Shergina, Chertkov, eqs (14) to (19).
+"""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -18,85 +21,144 @@ DOUBLE_ROOT_TOLERANCE = 1e-6  # relative distance of the two computed parts of a
 
 @dataclass(frozen=True, eq=False)
 class TransferFunction:
-    """H(s) = numerator / denominator: coefficients of descending powers of s."""
+    """A transfer function H(s) = numerator / denominator, in descending powers of s.
 
-    numerator: FloatArray  # (m + 1,)
-    denominator: FloatArray  # (n + 1,), the first being 1
+    Attributes
+    ----------
+    numerator
+        (m + 1,).
+    denominator
+        (n + 1,), the first coefficient being one.
+    """
+
+    numerator: FloatArray
+    denominator: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class ShapedSystem:
-    """x' = A x + B u + G n, y = C x, the shaping filter's k states being the last of x."""
+    """The plant x' = A x + B u + G n, y = C x, augmented by the k states of a shaping filter.
 
-    A: FloatArray  # (n + k, n + k)
-    B: FloatArray  # (n + k, inputs)
-    C: FloatArray  # (m, n + k)
-    G: FloatArray  # (n + k, noises), the shaped one being the last
+    Attributes
+    ----------
+    A
+        (n + k, n + k), 1/s; the states of the filter come last.
+    B
+        (n + k, inputs).
+    C
+        (m, n + k).
+    G
+        (n + k, noises): inputs of white noise, that of the shaping filter last.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    G: FloatArray
 
 
 def spectral_factor(numerator: ArrayLike, denominator: ArrayLike) -> TransferFunction:
-    """The stable minimum-phase H with |H(jω)|² = numerator(ω) / denominator(ω).
+    """Compute the stable minimum-phase H with |H(jω)|² = numerator(ω) / denominator(ω).
 
-    Both are coefficients of descending powers of ω, (2m + 1,) and (2n + 1,), those of odd powers
-    being zero. Where the spectrum touches zero H has zeros on the imaginary axis.
+    Where the spectrum touches zero, H has zeros on the imaginary axis.
 
-    Convention: H shapes white noise of unit two-sided intensity, and the variance of what comes
-    out is the integral of the spectrum over all ω, divided by 2π (`shaped_variance`). For Dryden's
-    2 L σ² (1 + 3 L² ω²) / (1 + L² ω²)² that is 2σ², not σ².
+    Convention: H shapes white noise of unit two-sided intensity, and the variance of its output is
+    the integral of the spectrum over all ω, divided by 2π (`shaped_variance`). For Dryden's
+    2 L σ² (1 + 3 L² ω²) / (1 + L² ω²)² this is 2σ², not σ².
 
-    Raises `UsageError` for a spectrum that is odd, negative somewhere, infinite at some ω, or
-    that does not fall towards high ω. Source: Sakharov, Shergina, Chertkov, (14) to (16).
+    Parameters
+    ----------
+    numerator
+        (2m + 1,): coefficients of descending powers of ω; those of odd powers are zero.
+    denominator
+        (2n + 1,): likewise.
+
+    Raises
+    ------
+    UsageError
+        The spectrum has odd powers, is negative somewhere, infinite at some ω, or grows towards
+        high ω.
+
+    References
+    ----------
+    Sakharov, Shergina, Chertkov, (14) to (16).
+
+    Examples
+    --------
+    The spectrum 1 / (1 + ω²) belongs to H(s) = 1 / (s + 1):
+
+    >>> spectral_factor([1.0], [1.0, 0.0, 1.0]).denominator.tolist()
+    [1.0, 1.0]
     """
-    above = _even("numerator", numerator)
-    below = _even("denominator", denominator)
-    if len(above) > len(below):
+    top = _even("numerator", numerator)
+    bottom = _even("denominator", denominator)
+    if len(top) > len(bottom):
         raise UsageError(
-            f"numerator is of degree {2 * len(above) - 2}; expected no more than the"
-            f" denominator's {2 * len(below) - 2}: the spectrum would grow without end"
+            f"numerator is of degree {2 * len(top) - 2}; expected no more than the"
+            f" denominator's {2 * len(bottom) - 2}: the spectrum would grow without end"
         )
-    if above[0] * below[0] < 0:
+    if top[0] * bottom[0] < 0:
         raise UsageError("numerator over denominator is negative at high ω; expected a spectrum")
-    zeros, poles = _left_roots("numerator", above), _left_roots("denominator", below)
+    zeros, poles = _left_roots("numerator", top), _left_roots("denominator", bottom)
     if np.any(poles.real == 0):
         peak = np.abs(poles[poles.real == 0].imag)[0]
         raise UsageError(f"denominator is zero at ω = {peak:.4g}; expected a finite spectrum")
-    gain = np.sqrt(above[0] / below[0])
+    gain = np.sqrt(top[0] / bottom[0])
     return TransferFunction(
         gain * np.atleast_1d(np.real(np.poly(zeros))), np.atleast_1d(np.real(np.poly(poles)))
     )
 
 
 def _even(name: str, coefficients: ArrayLike) -> FloatArray:
-    """The coefficients in ω² of an even polynomial in ω."""
-    found = np.trim_zeros(np.atleast_1d(as_finite_array(name, coefficients)), "f")
-    if found.ndim != 1 or not len(found):
-        raise UsageError(f"{name} is of shape {found.shape}; expected coefficients, not all zero")
-    if len(found) % 2 == 0 or np.any(found[1::2]):
-        raise UsageError(f"{name}, {found.shape}, has odd powers of ω; expected even ones alone")
-    return found[::2]
+    """Return the coefficients in ω² of an even polynomial in ω."""
+    trimmed = np.trim_zeros(np.atleast_1d(as_finite_array(name, coefficients)), "f")
+    if trimmed.ndim != 1 or not len(trimmed):
+        raise UsageError(f"{name} is of shape {trimmed.shape}; expected coefficients, not all zero")
+    if len(trimmed) % 2 == 0 or np.any(trimmed[1::2]):
+        raise UsageError(f"{name}, {trimmed.shape}, has odd powers of ω; expected even ones alone")
+    return trimmed[::2]
 
 
 def _left_roots(name: str, coefficients: FloatArray) -> ComplexArray:
-    """The roots s = jω, none in the right half plane, of a polynomial in ω²; half of all."""
+    """Compute the roots s = jω, not in the right half plane, of a polynomial in ω²: half of all."""
     squares = np.roots(coefficients).astype(complex)
-    # roots within rounding of ω² > 0 are a double one each two: the polynomial touches zero there
+    # two positive roots that agree up to rounding are a double root: the polynomial touches zero
     touching = (squares.real > 0) & (
         np.abs(squares.imag) <= DOUBLE_ROOT_TOLERANCE * np.abs(squares)
     )
-    at = np.sort(squares[touching].real)
-    if len(at) % 2 or np.any(at[1::2] - at[::2] > DOUBLE_ROOT_TOLERANCE * at[1::2]):
-        raise UsageError(f"{name} changes sign near ω = {np.sqrt(at[0]):.4g}; expected none")
-    axis = 1j * np.sqrt((at[1::2] + at[::2]) / 2)
+    double = np.sort(squares[touching].real)
+    upper, lower = double[1::2], double[::2]
+    if len(double) % 2 or np.any(upper - lower > DOUBLE_ROOT_TOLERANCE * upper):
+        raise UsageError(f"{name} changes sign near ω = {np.sqrt(double[0]):.4g}; expected none")
+    axis = 1j * np.sqrt((upper + lower) / 2)
     left = -np.sqrt(-squares[~touching])
     left.real[squares[~touching] == 0] = 0.0
     return np.concatenate((left, axis, -axis))
 
 
 def wave_filter(variance: float, frequency: float, damping: float = 0.1) -> TransferFunction:
-    """Waves about one frequency: kw s / (s² + 2 ζ ω0 s + ω0²), kw² = 4 ζ ω0 variance.
+    """Build the shaping filter of waves around one frequency: kw s / (s² + 2 ζ ω0 s + ω0²).
 
-    `variance` is that of what comes out, `frequency` ω0 in rad/s. Raises `UsageError` unless
-    frequency and damping are positive and the variance is not negative.
+    The gain follows from the variance: kw² = 4 ζ ω0 variance.
+
+    Parameters
+    ----------
+    variance
+        Variance of the output, in squared units of the output.
+    frequency
+        ω0, rad/s.
+    damping
+        ζ.
+
+    Raises
+    ------
+    UsageError
+        Frequency or damping is not positive, or the variance is negative.
+
+    Examples
+    --------
+    >>> round(shaped_variance(wave_filter(variance=4.0, frequency=0.8)), 6)
+    4.0
     """
     variance = as_number("variance", variance)
     frequency = as_number("frequency", frequency, least=np.finfo(float).tiny)
@@ -108,9 +170,10 @@ def wave_filter(variance: float, frequency: float, damping: float = 0.1) -> Tran
 
 
 def shaped_variance(shaping: TransferFunction) -> float:
-    """The variance of white noise of unit two-sided intensity behind the shaping filter.
+    """Compute the variance of the output of a filter driven by white noise of unit intensity.
 
-    Raises `UsageError` where it is infinite: H is not stable or passes white noise itself.
+    The intensity is two-sided. Raises `UsageError` where the variance is infinite: H is not stable
+    or passes white noise directly.
     """
     A, B, C, D = _realised(shaping)
     if D.any():
@@ -128,16 +191,42 @@ def augment_with_shaping(
     at: Literal["state", "output"] = "state",
     noise: ArrayLike | None = None,
 ) -> ShapedSystem:
-    """The plant x' = A x + B u, y = C x with a coloured disturbance w = H(s) n, n being white.
+    """Augment the plant x' = A x + B u, y = C x with a coloured disturbance w = H(s) n, n white.
 
-    A (n, n), B (n, inputs), C (m, n). At the state w enters as G w, G (n,) or (n, 1); at the
-    output as y = C x + G w, G (m,) or (m, 1): what is then estimated of x is free of it, and the
-    filter has a notch at its frequency. `noise` (n, q) is where white noise enters besides. For
-    several disturbances augment again, `noise` being the G found so far.
+    For several disturbances augment again, with the G of the result as `noise`.
 
-    Raises `UsageError` for matrices that do not fit, a filter that is not stable or has more
-    zeros than poles, and at the output one that passes white noise itself: that belongs to R.
-    Source: Sakharov, Shergina, Chertkov, (17) to (19), with G0 Dw in the noise's block.
+    Parameters
+    ----------
+    A
+        (n, n), 1/s.
+    B
+        (n, inputs).
+    C
+        (m, n).
+    G
+        Where w enters: as G w in x', G (n,) or (n, 1), or as G w in y, G (m,) or (m, 1).
+    shaping
+        H(s) with k poles.
+    at
+        "state" or "output". At the output the estimate of x is free of w, and the filter has a
+        notch at the frequency of w.
+    noise
+        (n, q): where further white noise enters; none by default.
+
+    Returns
+    -------
+    ShapedSystem
+        n + k states, q + 1 noises.
+
+    Raises
+    ------
+    UsageError
+        The matrices do not fit; the filter is not stable or has more zeros than poles; or, at the
+        output, it passes white noise directly, which belongs to R.
+
+    References
+    ----------
+    Sakharov, Shergina, Chertkov, (17) to (19), with G0 Dw in the block of the noise.
     """
     A = as_square_matrix("A", A)
     n = len(A)
@@ -160,7 +249,7 @@ def augment_with_shaping(
 
 
 def _realised(shaping: TransferFunction) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Aw (k, k), Bw (k, 1), Cw (1, k), Dw (1, 1) in controller form."""
+    """Realise a transfer function: Aw (k, k), Bw (k, 1), Cw (1, k), Dw (1, 1), controller form."""
     numerator = np.trim_zeros(np.atleast_1d(as_finite_array("numerator", shaping.numerator)), "f")
     denominator = np.trim_zeros(
         np.atleast_1d(as_finite_array("denominator", shaping.denominator)), "f"
