@@ -1,4 +1,7 @@
-"""Cascades of filters, each taking the estimate of the one before as its measurement."""
+"""Cascades of filters, each taking the estimate of the previous one as its measurement.
+
+Source: Antonov, (12). Its claim that the accuracy grows without bound does not hold.
+"""
 
 from dataclasses import dataclass
 
@@ -15,23 +18,34 @@ from .riccati import error_covariance, kalman_gain
 
 @dataclass(frozen=True, eq=False)
 class Cascade:
-    """Stages that each take the state estimated before for a measurement of the whole state."""
+    """The gain and the accuracy of a cascade of filters.
 
-    gain: FloatArray  # of every stage after the first, (n, n)
-    relative: FloatArray  # (stages, m) σ of each measured quantity's error, the optimal filter's 1
+    Attributes
+    ----------
+    gain
+        K, (n, n): the gain of every stage after the first.
+    relative
+        (stages, m): standard deviation of the error of each measured quantity at each stage,
+        relative to that of the optimal filter.
+    """
+
+    gain: FloatArray
+    relative: FloatArray
 
     @property
     def best(self) -> int:
-        """The stage with the least error, counted from one."""
+        """The stage with the smallest error, counted from one."""
         return int(np.argmin(np.linalg.norm(self.relative, axis=1))) + 1
 
     @property
-    def verdict(self) -> str:
-        """Whether it was worth it, in one line."""
+    def summary(self) -> str:
+        """The best stage and its error relative to the first and the last stage, in one line."""
         first, least, last = (self.relative[k].max() for k in (0, self.best - 1, -1))
         text = f"stage {self.best} of {len(self.relative)} is the best, {least:.3g} times the"
         text += f" optimal error; the first alone has {first:.3g}"
-        return text if last == least else f"{text}, and more stages hurt: the last has {last:.3g}"
+        if last == least:
+            return text
+        return f"{text}; further stages increase it: the last has {last:.3g}"
 
 
 def cascade(
@@ -44,16 +58,39 @@ def cascade(
     stages: int,
     correlation_secs: float,
 ) -> Cascade:
-    """What stages of x̂₊' = A x̂₊ + K₊ (x̂ - x̂₊) make of a first filter of gain `first` (n, m).
+    """Design the stages x̂₊' = A x̂₊ + K (x̂ - x̂₊) behind a first filter and compute their errors.
 
-    A and R1 (n, n), S (m, n), R2 (m, m) as in `quality_filter`, and true. The first filter's error
-    is taken for white measurement noise of the intensity covariance times `correlation_secs`, the
-    time it stays the same. It is not white, and it is correlated with the noise in x': so no stage
-    adds accuracy to an optimal filter, each costs some, and one repairs a filter that is much too
-    fast. A slow one is beyond repair: what it threw away no stage brings back.
+    Each stage treats the error of the first filter as white measurement noise of the intensity
+    covariance times `correlation_secs`. It is neither white nor uncorrelated with the noise in x':
+    no stage adds accuracy to an optimal filter, each costs some. One stage improves a filter that
+    is much too fast; a filter that is too slow cannot be improved, since the information is lost.
 
-    Raises `UsageError` for matrices that do not fit, a first filter that is not stable, fewer
-    stages than one. Source: Antonov, (12), whose claim of accuracy without bound does not hold.
+    Parameters
+    ----------
+    A
+        (n, n), 1/s: x' = A x + white noise of intensity R1.
+    S
+        (m, n): y = S x + white noise of intensity R2.
+    R1
+        (n, n): true intensity of the state noise.
+    R2
+        (m, m): true intensity of the measurement noise.
+    first
+        (n, m): the gain of the first filter.
+    stages
+        Number of stages, the first included.
+    correlation_secs
+        Correlation time of the first filter's error, s.
+
+    Raises
+    ------
+    UsageError
+        The matrices do not fit, the first filter is not stable, `stages` is below one, or
+        `correlation_secs` is not positive.
+
+    References
+    ----------
+    Antonov, (12).
     """
     A = as_square_matrix("A", A)
     n = len(A)
@@ -69,7 +106,7 @@ def cascade(
     K = kalman_gain(A, np.eye(n), np.eye(n), R1, errors * correlation_secs).gain
     optimum = kalman_gain(A, np.eye(n), S, R1, R2).covariance
 
-    # the errors of all stages are one system, driven by the state's noise and by the sensors'
+    # the errors of all stages form one linear system driven by state noise and sensor noise
     F = np.kron(np.eye(stages), A - K) + np.kron(np.eye(stages, k=-1), K)
     F[:n, :n] = A - first @ S
     noise = np.kron(np.ones((stages, stages)), R1)

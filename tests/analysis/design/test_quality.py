@@ -131,14 +131,14 @@ def test_cascade_improves_only_a_first_stage_that_is_too_fast(
     found = cascade(SHIP, RATE, R1, R2, first, stages=5, correlation_secs=10)
     assert found.relative[:, 0] == pytest.approx(errors, abs=5e-3)
     assert found.best == best
-    assert "more stages hurt" in found.verdict
-    assert f"stage {best} of 5 is the best" in found.verdict
+    assert "further stages increase it" in found.summary
+    assert f"stage {best} of 5 is the best" in found.summary
 
 
 def test_summary_of_a_cascade() -> None:
     first = quality_filter(SHIP, RATE, R1, 1e-4 * R2).gain
     found = cascade(SHIP, RATE, R1, R2, first, stages=2, correlation_secs=10)
-    assert found.verdict == (
+    assert found.summary == (
         "stage 2 of 2 is the best, 1.27 times the optimal error; the first alone has 2.91"
     )
 
@@ -276,7 +276,7 @@ UNFIT: list[tuple[dict[str, Any], str]] = [
     ({"projectors": (np.eye(2), np.eye(2))}, r"projectors, \(2, 2\): expected E1 \+ E2 = I"),
     ({"projectors": (np.eye(3), np.eye(2))}, r"projectors\[0\] is of shape \(3, 3\)"),
     ({"B": [[1], [0]]}, r"A \(2, 2\) and B: the mode at 0 does not decay and cannot be moved by B"),
-    ({"P": np.zeros((2, 2))}, "A .* and P: the mode at 0 neither grows nor decays and P does not"),
+    ({"P": np.zeros((2, 2))}, "A .* and P: the mode at 0 neither grows nor decays and P gives"),
 ]
 
 
