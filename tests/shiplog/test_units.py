@@ -45,7 +45,7 @@ def test_units_of_different_quantities_are_not_converted() -> None:
         conversion_factor("deg", "m")
 
 
-def test_an_unknown_unit_is_reported_with_the_nearest_known() -> None:
+def test_an_unknown_unit_is_reported_with_the_nearest_known_unit() -> None:
     with pytest.raises(UsageError, match=r"unknown unit 'rad/sec'; did you mean 'rad/s'\?; known"):
         conversion_factor("rad/sec", "rad/s")
     with pytest.raises(UsageError, match="unknown unit 'furlong'; known are"):

@@ -435,7 +435,7 @@ def test_progress_goes_from_0_to_1_and_names_models_and_runs() -> None:
     rank_models(segments, [ship_model("nomoto"), ship_model("norrbin")], on_progress=on_progress)
     assert {step for step, _ in steps} == {
         f"model {i + 1} of 2 ({name}), {run}"
-        for i, name in enumerate(("nomoto", "norrbin"))
+        for i, name in enumerate(("norrbin", "nomoto"))  # the one with more parameters first
         for run in ("all runs", "run 1 of 2", "run 2 of 2")
     }
     shares = [share for _, share in steps]

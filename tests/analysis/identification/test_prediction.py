@@ -44,6 +44,12 @@ def marin(run: str) -> tuple[TrialLog, Segment]:
     return recorded(KVLCC2 / "marin" / f"MARIN_FREE_KVLCC2_{run}_m.dat")
 
 
+@cache
+def marin_zigzag_fit() -> OutputError:
+    segments = [marin("zz_10")[1], marin("zz_20")[1]]
+    return output_error(segments, ship_model("three-dof"), length=LENGTH)
+
+
 def hsva() -> list[Segment]:
     runs = ("10_05", "10_10_P", "20_05", "20_10_S", "30_05", "35_05")
     return [recorded(KVLCC2 / "hsva" / f"HSVA_CPMC_KVLCC2_Z_{run}.dat")[1] for run in runs]
@@ -70,9 +76,9 @@ def circle_errors(fit: OutputError) -> dict[str, float]:
     }
 
 
+@pytest.mark.xdist_group("marin zigzags")
 def test_turning_circle_is_predicted_from_marin_zigzags() -> None:
-    segments = [marin("zz_10")[1], marin("zz_20")[1]]
-    errors = circle_errors(output_error(segments, ship_model("three-dof"), length=LENGTH))
+    errors = circle_errors(marin_zigzag_fit())
     assert abs(errors["advance"]) < 3
     assert abs(errors["transfer"]) < 10
     assert abs(errors["tactical_diameter"]) < 5
@@ -133,9 +139,9 @@ def test_simulated_zigzag_has_the_overshoots_of_an_independent_simulation() -> N
     np.testing.assert_allclose(np.degrees(overshoots)[:2], [16.355, 14.744], atol=0.01)
 
 
+@pytest.mark.xdist_group("marin zigzags")
 def test_first_overshoots_of_the_tanker_are_predicted() -> None:
-    segments = [marin("zz_10")[1], marin("zz_20")[1]]
-    fit = output_error(segments, ship_model("three-dof"), length=LENGTH)
+    fit = marin_zigzag_fit()
     for angle, measured in ((10, 9.39), (20, 15.59)):
         predicted = zigzag_overshoots(
             fit, np.radians(-angle), np.radians(angle), rudder_rate=np.radians(2.32),

@@ -52,6 +52,12 @@ def identified(name: str) -> tuple[IdentifiedShip, str]:
     return ship, vessel_toml(ship)
 
 
+@cache
+def identified_by_papers_model(name: str) -> IdentifiedShip:
+    """Return the paper's model of the logs of another model."""
+    return identify(logs_of(name), "burylin")
+
+
 def exact_motion(vessel: Vessel, run: str) -> dict[str, FloatArray]:
     trajectory = compute_trajectory(vessel, manoeuvre(run, 400.0, vessel.approach_rpm), 400.0)
     return trajectory.at(np.arange(400.0))
@@ -106,7 +112,7 @@ def test_the_papers_model_of_the_same_logs_is_written_for_replay(name: str) -> N
     paper = parse_vessel(text, "v.toml").paper_coefficients
     assert "# `shiplog record simulate` uses this model.\n[model]" in text
     assert "The paper's model, fitted to the same logs; `shiplog replay` designs" in text
-    alone = identify(logs_of(name), "burylin").fit.parameters
+    alone = identified_by_papers_model(name).fit.parameters
     np.testing.assert_allclose(paper, alone, rtol=1e-9)
 
 
@@ -145,7 +151,7 @@ def test_the_papers_model_among_the_candidates_is_not_fitted_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     ship, text = identified("slipstream")
-    paper = identify(logs_of("slipstream"), "burylin")
+    paper = identified_by_papers_model("slipstream")
     compared = replace(ship, candidates=(Candidate(paper.model, paper.fit, np.zeros((3, 4))),))
     monkeypatch.setattr(vessel_file, "output_error", None)
     assert vessel_toml(compared) == text

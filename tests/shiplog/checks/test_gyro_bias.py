@@ -15,7 +15,7 @@ from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
 
 
-def sailed(vessel: Vessel, seed: int = 0, **settings: float) -> TrialLog:
+def simulated_log(vessel: Vessel, seed: int = 0, **settings: float) -> TrialLog:
     noisy = {"heading.white": np.radians(0.2)} | {
         name.replace("__", "."): value for name, value in settings.items()
     }
@@ -25,24 +25,24 @@ def sailed(vessel: Vessel, seed: int = 0, **settings: float) -> TrialLog:
 
 @pytest.mark.parametrize("bias_deg", [-0.02, 0.01])
 def test_the_bias_of_a_gyro_is_estimated(vessel: Vessel, bias_deg: float) -> None:
-    warning = gyro_bias_warning(sailed(vessel, yaw_rate__bias=np.radians(bias_deg)))
+    warning = gyro_bias_warning(simulated_log(vessel, yaw_rate__bias=np.radians(bias_deg)))
     assert warning is not None
     assert float(warning.split("bias of ")[1].split()[0]) == pytest.approx(bias_deg, abs=0.001)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_an_unbiased_gyro_gives_no_warning(vessel: Vessel, seed: int) -> None:
-    assert gyro_bias_warning(sailed(vessel, seed)) is None
+    assert gyro_bias_warning(simulated_log(vessel, seed)) is None
 
 
 def test_dropouts_are_not_mistaken_for_a_bias(vessel: Vessel) -> None:
     for seed in range(5):
         gaps = {"yaw_rate__dropout": 0.05, "yaw_rate__dropout_secs": 10.0}
-        assert gyro_bias_warning(sailed(vessel, seed, **gaps)) is None
+        assert gyro_bias_warning(simulated_log(vessel, seed, **gaps)) is None
 
 
 def test_a_heading_that_increases_to_port_gives_a_warning(vessel: Vessel) -> None:
-    log = sailed(vessel)
+    log = simulated_log(vessel)
     reversed_heading = tuple(
         replace(c, values=-c.values) if c.name == "heading" else c for c in log
     )
@@ -52,7 +52,7 @@ def test_a_heading_that_increases_to_port_gives_a_warning(vessel: Vessel) -> Non
 
 
 def test_without_a_heading_there_is_no_warning(vessel: Vessel) -> None:
-    log = sailed(vessel, yaw_rate__bias=1.0)
+    log = simulated_log(vessel, yaw_rate__bias=1.0)
     assert gyro_bias_warning(replace(log, channels=log.channels[:4])) is None
 
 

@@ -20,7 +20,7 @@ RNG = np.random.default_rng(20)
 Steering = Callable[[float, float, float], float]  # time, heading, yaw rate -> rudder, rad
 
 
-def sailed(
+def simulated_log(
     steering: Steering, *, secs: float = 600.0, seed: int = 0, waves: float = 0.0
 ) -> TrialLog:
     """A ship of first order, K = 0.05 1/s and T = 40 s, with noise and a disturbance."""
@@ -65,7 +65,7 @@ def autopilot(_: float, heading: float, rate: float) -> float:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_reversed_rudder_is_found_in_a_zigzag_and_the_right_one_is_not(seed: int) -> None:
-    log = sailed(zigzag(), seed=seed, waves=1e-5)
+    log = simulated_log(zigzag(), seed=seed, waves=1e-5)
     assert rudder_sign_warning(log) is None
     warning = rudder_sign_warning(with_reversed_rudder(log))
     assert warning is not None
@@ -75,7 +75,7 @@ def test_a_reversed_rudder_is_found_in_a_zigzag_and_the_right_one_is_not(seed: i
 
 
 def test_a_reversed_rudder_is_found_in_a_turning_circle() -> None:
-    log = sailed(circle)
+    log = simulated_log(circle)
     assert rudder_sign_warning(log) is None
     assert rudder_sign_warning(with_reversed_rudder(log)) is not None
 
@@ -83,7 +83,7 @@ def test_a_reversed_rudder_is_found_in_a_turning_circle() -> None:
 @pytest.mark.parametrize("waves", [0.0, 1e-5, 1e-4])
 @pytest.mark.parametrize("seed", range(10))
 def test_a_straight_run_gives_no_warning_whichever_the_sign(seed: int, waves: float) -> None:
-    log = sailed(lambda *_: 0.0, seed=seed, waves=waves)
+    log = simulated_log(lambda *_: 0.0, seed=seed, waves=waves)
     assert rudder_sign_warning(log) is None
     assert rudder_sign_warning(with_reversed_rudder(log)) is None
 
@@ -93,12 +93,12 @@ def test_a_straight_run_gives_no_warning_whichever_the_sign(seed: int, waves: fl
 def test_an_autopilot_in_waves_gives_no_warning_where_the_sign_is_right(
     seed: int, waves: float
 ) -> None:
-    assert rudder_sign_warning(sailed(autopilot, seed=seed, waves=waves)) is None
+    assert rudder_sign_warning(simulated_log(autopilot, seed=seed, waves=waves)) is None
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_rudder_unrelated_to_the_turning_gives_no_warning(seed: int) -> None:
-    log = sailed(lambda *_: 0.0, seed=seed, waves=1e-4)
+    log = simulated_log(lambda *_: 0.0, seed=seed, waves=1e-4)
     rng = np.random.default_rng(100 + seed)
     wander = np.cumsum(rng.normal(0, 0.005, 6000))
     assert (
@@ -110,7 +110,7 @@ def test_a_rudder_unrelated_to_the_turning_gives_no_warning(seed: int) -> None:
 
 
 def test_gaps_and_missing_samples_do_not_hide_a_reversed_rudder() -> None:
-    rate, rudder = with_reversed_rudder(sailed(zigzag())).channels
+    rate, rudder = with_reversed_rudder(simulated_log(zigzag())).channels
     values = rate.values.copy()
     values[1000:1300] = np.nan
     kept = np.r_[0:3000, 3300:6000]
@@ -124,7 +124,7 @@ def test_gaps_and_missing_samples_do_not_hide_a_reversed_rudder() -> None:
 
 
 def test_without_the_channels_or_their_samples_there_is_no_warning() -> None:
-    rate, rudder = with_reversed_rudder(sailed(zigzag())).channels
+    rate, rudder = with_reversed_rudder(simulated_log(zigzag())).channels
     later = replace(rudder, measured_ns=rudder.measured_ns + 10**13)
     empty = channel(np.zeros(0), name="rudder")
     unmeasured = replace(rudder, values=np.full(len(rudder), np.nan))
@@ -133,7 +133,7 @@ def test_without_the_channels_or_their_samples_there_is_no_warning() -> None:
 
 
 def test_a_dead_speed_log_does_not_hide_a_reversed_rudder() -> None:
-    log = with_reversed_rudder(sailed(zigzag()))
+    log = with_reversed_rudder(simulated_log(zigzag()))
     for dead in (np.zeros(6000), np.full(6000, np.nan)):
         speed = channel(dead, name="speed")
         assert rudder_sign_warning(replace(log, channels=(*log.channels, speed))) is not None

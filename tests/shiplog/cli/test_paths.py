@@ -1,4 +1,4 @@
-"""Bad paths are refused before any work, each in one line with its remedy."""
+"""Bad paths are rejected before any work, each in one line with its remedy."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from shiplog.cli.paths import require_distinct, require_inputs, require_outputs,
 from shiplog.errors import LogError, ShiplogError, UsageError
 
 
-def test_a_missing_log_and_a_folder_are_refused(tmp_path: Path) -> None:
+def test_a_missing_log_and_a_folder_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"no such file: .*a\.mcap"):
         require_inputs(tmp_path / "a.mcap")
     with pytest.raises(LogError, match="name one file in it"):
@@ -17,7 +17,7 @@ def test_a_missing_log_and_a_folder_are_refused(tmp_path: Path) -> None:
     require_inputs(tmp_path / "a.mcap", None)
 
 
-def test_an_output_in_a_missing_folder_and_a_folder_are_refused(tmp_path: Path) -> None:
+def test_an_output_in_a_missing_folder_and_a_folder_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(ShiplogError, match="there is no folder"):
         require_outputs(tmp_path / "no" / "a.rrd")
     with pytest.raises(ShiplogError, match="it is a folder"):
@@ -25,7 +25,7 @@ def test_an_output_in_a_missing_folder_and_a_folder_are_refused(tmp_path: Path) 
     require_outputs(tmp_path / "a.rrd", None, "-")
 
 
-def test_an_output_over_an_input_or_another_output_is_refused(tmp_path: Path) -> None:
+def test_an_output_over_an_input_or_another_output_is_rejected(tmp_path: Path) -> None:
     log, review = tmp_path / "a.mcap", tmp_path / "a.rrd"
     for outputs in ([log], [review, review]):
         with pytest.raises(UsageError, match="named twice"):

@@ -16,7 +16,7 @@ from shiplog.ships import GROUP, Model, loadable_models, model_names, ship_model
 from shiplog.ships.path import input_path
 
 
-def test_unknown_models_and_parameters_are_refused_with_the_nearest() -> None:
+def test_unknown_models_and_parameters_are_rejected_with_the_nearest_name() -> None:
     with pytest.raises(UsageError, match=r"did you mean 'nomoto'.*; installed: burylin, "):
         ship_model("nomotto")
     with pytest.raises(UsageError, match=r"no parameter 'b4'.*it has a, b1"):

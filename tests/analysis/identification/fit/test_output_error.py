@@ -36,6 +36,11 @@ def a_trial(*args: object, **settings: object) -> Segment:
     return split_into_segments(simulated(*args, **settings), name)[0]  # type: ignore[arg-type]
 
 
+@cache
+def free_fit(seed: int) -> OutputError:
+    return output_error([a_trial(seed=seed)], ship_model("burylin"))
+
+
 def errors(fit: OutputError) -> dict[str, float]:
     """Return the errors of the free parameters, % of their true values."""
     estimates = dict(zip(fit.problem.model.names, fit.parameters, strict=True))
@@ -67,8 +72,9 @@ def test_tied_fits_of_zigzags_reach_the_required_accuracy() -> None:
         assert max(median[name] for name in ("f", "g", "h")) <= 1.5
 
 
+@pytest.mark.xdist_group("free fits")
 def test_free_fits_reach_the_cramer_rao_bound_and_their_intervals_hold_the_truth() -> None:
-    fits = [output_error([a_trial(seed=s)], ship_model("burylin")) for s in range(8)]
+    fits = [free_fit(seed) for seed in range(8)]
     estimates = [uncertainty(fit) for fit in fits]
     truth = np.array([TRUTH[name] for name in estimates[0].names])
     error = np.array([u.values - truth for u in estimates])
@@ -205,8 +211,9 @@ def test_a_wave_is_detected_and_none_in_white_noise() -> None:
     assert swell_frequency(noise, std, 0.1) == pytest.approx(0.1, rel=0.03)
 
 
+@pytest.mark.xdist_group("free fits")
 def test_a_fitted_swell_does_not_count_as_slow_noise() -> None:
-    fit = output_error([a_trial(seed=6)], ship_model("burylin"))
+    fit = free_fit(6)
     assert len(fit.problem.waves[0]) == 1
     omega = fit.minimum.unknowns[fit.problem.own_slice(0)][-5]
     assert omega == pytest.approx(0.1, rel=0.01)
