@@ -115,11 +115,30 @@ def optimal_gain(
     S: FloatArray,
     words: MatrixNames = FILTER_NAMES,
 ) -> Gain:
-    """The Kalman filter of state noise W (n, n), measurement noise R (m, m), cross term S (n, m).
+    """Compute the Kalman gain for the state noise W, measurement noise R and cross term S.
 
-    What it is given must have been checked; A is shifted where a quality design asks for it, and
-    transposed for a regulator. A P + P A' + W - (P C' + S) R⁻¹ (C P + S') = 0,
-    L = (P C' + S) R⁻¹. Raises `UsageError` where there is no stabilising solution, naming the mode.
+    It solves A P + P A' + W - (P C' + S) R⁻¹ (C P + S') = 0; L = (P C' + S) R⁻¹. The arguments are
+    not checked; a quality design passes a shifted A, a regulator the transposed system.
+
+    Parameters
+    ----------
+    A
+        (n, n), 1/s.
+    C
+        (m, n).
+    W
+        (n, n): intensity of the state noise.
+    R
+        (m, m): intensity of the measurement noise.
+    S
+        (n, m): cross intensity.
+    words
+        Names of the matrices, for error messages.
+
+    Raises
+    ------
+    UsageError
+        There is no stabilising solution; the message names the mode.
     """
     weight = np.linalg.solve(R, S.T).T  # S R⁻¹
     drift, drive, sharp = A - weight @ C, W - weight @ S.T, C.T @ np.linalg.solve(R, C)
@@ -137,7 +156,7 @@ def optimal_gain(
     if residual > MAX_RICCATI_RESIDUAL:
         raise UsageError(
             f"{matrices}: the residual of the Riccati equation is {residual:.1g};"
-            " bring the units nearer to each other"
+            " choose units that make the entries more alike"
         )
     return Gain(L, P, poles, residual)
 
@@ -145,14 +164,14 @@ def optimal_gain(
 def _solved(
     A: FloatArray, C: FloatArray, W: FloatArray, R: FloatArray, S: FloatArray
 ) -> FloatArray:
-    """The library's P, (n, n), asked for in units that suit it.
+    """Solve the Riccati equation with scipy, in scaled units; return P (n, n).
 
-    With a ship's, of state noise 1e-12 and measurement noise 1e-9, it finds none or a wrong one. So
-    the measurements are taken in units of their noise, and P in the p that makes the equation's
-    first and last coefficients alike.
+    With the noise of a ship (state 1e-12, measurement 1e-9) scipy finds no solution or a wrong one.
+    The measurements are therefore scaled to unit noise, and P by the p that makes the constant and
+    the quadratic coefficient of the equation alike.
     """
     if not W.any() and sorted_eigenvalues(A)[-1].real < 0:
-        return np.zeros_like(A)  # nothing drives what decays; the library's rounding is no answer
+        return np.zeros_like(A)  # exact: no noise drives a stable system
     F = np.linalg.cholesky(R)
     C, S = np.linalg.solve(F, C), np.linalg.solve(F, S.T).T
     p = np.sqrt(np.linalg.norm(W)) / np.linalg.norm(C) if W.any() and C.any() else 1.0
@@ -163,7 +182,7 @@ def _solved(
 def _require_solvable(
     A: FloatArray, C: FloatArray, drift: FloatArray, drive: FloatArray, words: MatrixNames
 ) -> None:
-    """Raise `UsageError` for a mode that no gain makes decay, or that the best one would not."""
+    """Raise `UsageError` for a mode that no gain or not the optimal gain stabilises."""
     for mode in unobservable_eigenvalues(A, C):
         if mode.real >= -AXIS_TOLERANCE * np.linalg.norm(A):
             raise UsageError(
@@ -183,8 +202,8 @@ def _require_stable(closed: FloatArray, matrices: str) -> ComplexArray:
     poles = sorted_eigenvalues(closed)
     if poles[-1].real >= 0:
         raise UsageError(
-            f"{matrices}: the gain found leaves a pole at {format_eigenvalue(poles[-1])}: too weak"
-            " a hold on a mode for the arithmetic, or units too far apart"
+            f"{matrices}: the computed gain leaves a pole at {format_eigenvalue(poles[-1])}: a mode"
+            " is almost unobservable, or the units differ too much"
         )
     return poles
 
@@ -192,14 +211,14 @@ def _require_stable(closed: FloatArray, matrices: str) -> ComplexArray:
 def newton_step(
     drift: FloatArray, drive: FloatArray, sharp: FloatArray, P: FloatArray
 ) -> FloatArray:
-    """P nearer to the root of drift P + P drift' + drive - P sharp P, all (n, n).
+    """Improve P as the root of drift P + P drift' + drive - P sharp P = 0, all (n, n).
 
-    The library's P is good to the units of its matrices, which a ship's are far apart in; from
-    there one step squares what is missing (Kleinman, 1968).
+    scipy's P is accurate in the units of its matrices, and those of a ship differ by orders of
+    magnitude; from there one Newton step squares the error (Kleinman, 1968).
     """
     residual = drift @ P + P @ drift.T + drive - P @ sharp @ P
-    better = P + solve_continuous_lyapunov(drift - P @ sharp, -residual)
-    return (better + better.T) / 2
+    improved = P + solve_continuous_lyapunov(drift - P @ sharp, -residual)
+    return (improved + improved.T) / 2
 
 
 def scaled_residual(
@@ -221,11 +240,34 @@ def sorted_eigenvalues(closed: FloatArray) -> ComplexArray:
 def error_covariance(
     A: ArrayLike, L: ArrayLike, C: ArrayLike, W: ArrayLike, R: ArrayLike
 ) -> FloatArray:
-    """The covariance (n, n) of the error of any gain L (n, m), optimal or not.
+    """Compute the steady-state error covariance (n, n) of any gain L, optimal or not.
 
-    A (n, n), C (m, n); W (n, n) is the state's noise intensity, R (m, m) the measurement's:
-    (A - L C) P + P (A - L C)' + W + L R L' = 0. Raises `UsageError` for matrices that do not fit
-    and where A - L C is not stable.
+    It solves (A - L C) P + P (A - L C)' + W + L R L' = 0.
+
+    Parameters
+    ----------
+    A
+        (n, n), 1/s.
+    L
+        (n, m).
+    C
+        (m, n).
+    W
+        (n, n): intensity of the state noise.
+    R
+        (m, m): intensity of the measurement noise.
+
+    Raises
+    ------
+    UsageError
+        The matrices do not fit, or A - L C is not stable.
+
+    Examples
+    --------
+    A random walk whose value is measured, with the optimal gain of one and with twice that gain:
+
+    >>> [error_covariance([[0]], [[gain]], [[1]], 1.0, 1.0).item() for gain in (1.0, 2.0)]
+    [1.0, 1.25]
     """
     A = as_square_matrix("A", A)
     n = len(A)

@@ -273,7 +273,7 @@ def test_diverging_estimate_raises_an_error(order: str, count: int) -> None:
         return np.exp(1e3 * np.abs(x))
 
     observer = tick_observer(away, spacecraft_jacobian, ANGLES, [-0.5] * count, order=order)
-    with pytest.raises(UsageError, match=r"the estimate is lost in the tick from x̂ = \[0.1, -0.2"):
+    with pytest.raises(UsageError, match=r"the estimate diverges in the tick from x̂ = \[0.1, -0.2"):
         observer.step(POINT, np.tile(POINT[:3], (3, 1)), tick_secs=1.0)
 
 
