@@ -148,7 +148,7 @@ class TickObserver:
         return end
 
     def _linearised(self, x: FloatArray, u: FloatArray) -> FloatArray:
-        """Return the Jacobian (n, n) at x; raise if it is not finite or far faster than the poles."""
+        """Return the Jacobian (n, n) at x; raise if not finite or far faster than the poles."""
         n = self.C.shape[1]
         x = _vector("x", x, n)
         try:
