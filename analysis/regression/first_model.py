@@ -50,8 +50,8 @@ def fit_first_model(
     missing = [part for part, key in (("yaw", "a"), ("surge", "f")) if key not in estimates]
     if missing:
         raise LogError(
-            f"the log carries no model, and too little moves in it to fit one of "
-            f"{' and '.join(missing)}; give the ship's with --vessel: {name}"
+            f"the log contains no model, and too little motion to fit {' and '.join(missing)}; "
+            f"give a vessel file with --vessel: {name}"
         )
     return Vessel(
         f"fitted to {name}",

@@ -1,4 +1,4 @@
-"""A regression that changes at an unknown instant, against brute force."""
+"""Change points, compared with an exhaustive search and with published critical values."""
 
 from math import log
 
@@ -21,7 +21,7 @@ SIZE, OVERLAP = 4, 12
 
 
 def regression(seed: int, change: float = 0.0, n: int = 480) -> tuple[FloatArray, FloatArray]:
-    """Two regressors and a left side whose noise is a moving sum; the first changes halfway."""
+    """Two regressors and a target whose noise is a moving sum; the first one changes halfway."""
     rng = np.random.default_rng(seed)
     X = rng.standard_normal((n, 2)) + np.array([1.0, 0.0])
     noise = np.convolve(rng.standard_normal(n + OVERLAP - 1), np.ones(OVERLAP) / OVERLAP, "valid")
@@ -46,7 +46,7 @@ def blocks_of(X: FloatArray, y: FloatArray) -> Blocks:
 
 
 @pytest.mark.parametrize("percent", [(10, 7.12), (5, 8.68), (1, 12.16)])
-def test_the_largest_of_all_instants_is_judged_as_andrews_printed(
+def test_p_values_agree_with_the_table_of_andrews(
     percent: tuple[float, float],
 ) -> None:
     """Andrews (2003), table I: one coefficient, 15 % trimmed on either side."""
@@ -57,7 +57,7 @@ def test_the_largest_of_all_instants_is_judged_as_andrews_printed(
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.15, 0.85), (0.4, 0.8), (0.05, 0.3)])
-def test_for_other_instants_it_is_what_brownian_bridges_do(low: float, high: float) -> None:
+def test_p_values_agree_with_simulated_brownian_bridges(low: float, high: float) -> None:
     rng, steps = np.random.default_rng(1), 1000
     bridges = np.cumsum(rng.standard_normal((8000, steps)), axis=1) / np.sqrt(steps)
     at = np.arange(1, steps + 1) / steps
@@ -70,31 +70,31 @@ def test_for_other_instants_it_is_what_brownian_bridges_do(low: float, high: flo
     assert found == pytest.approx(0.05, rel=0.25)
 
 
-def brute_instant(X: FloatArray, y: FloatArray, column: int) -> int:
-    """The block before which one more column, zero until there, leaves the least squares."""
+def exhaustive_block(X: FloatArray, y: FloatArray, column: int) -> int:
+    """Return the first block after the change with the smallest sum of squared residuals."""
     leverage = np.linalg.inv(X.T @ X)
     weight = np.cumsum(np.einsum("ti,ij->tj", X, leverage)[:, column] ** 2)
-    left = {}
+    square_sums = {}
     for at in range(1, len(y) // SIZE):
         share = weight[at * SIZE - 1] / weight[-1]
         if MIN_INFORMATION_SHARE <= share <= 1 - MIN_INFORMATION_SHARE:
             after = X[:, column] * (np.arange(len(y)) >= at * SIZE)
             every = np.column_stack((X, after))
             residual = y - every @ np.linalg.lstsq(every, y)[0]
-            left[at] = residual @ residual
-    return min(left, key=left.__getitem__)
+            square_sums[at] = residual @ residual
+    return min(square_sums, key=square_sums.__getitem__)
 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("column", [0, 1])
-def test_the_instant_is_that_of_a_search_through_all_regressions(seed: int, column: int) -> None:
+def test_the_instant_is_that_of_an_exhaustive_search(seed: int, column: int) -> None:
     X, y = regression(seed, 0.3)
     found = fit_change(blocks_of(X, y), (column,))
     assert found is not None
-    assert found.block == brute_instant(X, y, column)
+    assert found.block == exhaustive_block(X, y, column)
 
 
-def test_values_errors_and_chances_are_those_of_the_rows_themselves() -> None:
+def test_values_and_variances_equal_those_computed_from_the_rows() -> None:
     X, y = regression(3, 0.3)
     found = fit_change(blocks_of(X, y), (0,))
     assert found is not None
@@ -120,7 +120,7 @@ def test_values_errors_and_chances_are_those_of_the_rows_themselves() -> None:
     assert found.variance_factor == pytest.approx(independent / (independent - 3))
 
 
-def test_what_changed_is_named_and_nothing_else() -> None:
+def test_only_the_changed_coefficient_is_detected() -> None:
     for seed in range(10):
         found = detect_change(blocks_of(*regression(seed, 0.4)))
         assert found is not None
@@ -128,13 +128,13 @@ def test_what_changed_is_named_and_nothing_else() -> None:
         assert abs(found.block * SIZE - 240) < 40
 
 
-def test_where_nothing_changed_alarms_are_no_more_than_promised() -> None:
-    """Of 400 regressions with coloured noise."""
+def test_the_rate_of_false_alarms_is_below_its_limit() -> None:
+    """Count over 400 regressions with correlated noise."""
     alarms = sum(detect_change(blocks_of(*regression(seed))) is not None for seed in range(400))
     assert alarms <= 20
 
 
-def test_without_rows_or_with_twins_for_columns_nothing_is_told() -> None:
+def test_no_change_is_detected_without_rows_or_with_identical_columns() -> None:
     X, y = regression(0, 0.4)
     blocks = blocks_of(X, y)
     assert detect_change(blocks.part(5, 5)) is None
@@ -142,7 +142,7 @@ def test_without_rows_or_with_twins_for_columns_nothing_is_told() -> None:
     assert detect_change(blocks_of(X[:, [0, 0]], y)) is None
 
 
-def test_a_side_on_which_nothing_moves_tells_nothing() -> None:
+def test_a_side_without_excitation_is_not_searched() -> None:
     X, y = regression(1, 0.4)
     still = blocks_of(X, y)
     still.tallies[: len(still.tallies) // 2, 1:] = 1.0

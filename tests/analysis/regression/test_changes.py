@@ -1,3 +1,7 @@
+"""Changes of coefficients within simulated trials and synthetic rows."""
+
+import pickle
+from copy import deepcopy
 from dataclasses import replace
 from itertools import pairwise
 
@@ -34,7 +38,9 @@ ZIGZAG = Case("table1", guessed=False, manoeuvre="zigzag-20-20", noise="paper")
 @pytest.mark.parametrize(
     "manoeuvre", ["zigzag-20-20", "zigzag-10-10", "pseudo-random", "turning-circle"]
 )
-def test_where_nothing_changed_nothing_is_told(vessel: str, guessed: bool, manoeuvre: str) -> None:
+def test_no_change_is_reported_where_nothing_changed(
+    vessel: str, guessed: bool, manoeuvre: str
+) -> None:
     for noise in ("paper", "white"):
         case = Case(vessel, guessed, manoeuvre, noise)
         for secs in (600.0, 1200.0):
@@ -44,7 +50,7 @@ def test_where_nothing_changed_nothing_is_told(vessel: str, guessed: bool, manoe
 @pytest.mark.parametrize("name", ["d", "f", "b2"])
 @pytest.mark.parametrize("guessed", [False, True])
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "pseudo-random"])
-def test_a_fifth_more_or_less_is_found_in_time_with_its_size(
+def test_a_change_by_a_fifth_is_detected_with_its_instant_and_size(
     name: str, guessed: bool, manoeuvre: str
 ) -> None:
     case = Case("table1", guessed, manoeuvre, "white")
@@ -59,26 +65,26 @@ def test_a_fifth_more_or_less_is_found_in_time_with_its_size(
         assert (found.from_secs, found.until_secs) == pytest.approx((30, 1170), abs=2)
 
 
-def test_unrest_of_the_sea_is_no_change(vessel: Vessel) -> None:
+def test_random_forcing_is_not_a_change(vessel: Vessel) -> None:
     for seed in range(4):
-        sailed = simulate(
+        trial = simulate(
             vessel, "zigzag-20-20", duration_secs=1200.0, seed=seed, sensors=suite("paper"),
             random_forcing=RandomForcing(np.radians(0.2), 0.005),
         )  # fmt: skip
-        assert told(TrialLog("random_forcing", sailed.channels), ZIGZAG) == ()
+        assert told(TrialLog("random_forcing", trial.channels), ZIGZAG) == ()
 
 
-def test_a_steady_moment_that_sets_in_is_no_coefficient(vessel: Vessel) -> None:
+def test_the_onset_of_a_steady_moment_is_not_a_change(vessel: Vessel) -> None:
     gusts = (Gust(np.radians(2.0), 500.0),)
     for seed in range(4):
-        sailed = simulate(
+        trial = simulate(
             vessel, "zigzag-20-20", duration_secs=1200.0, seed=seed, sensors=suite("paper"),
             gusts=gusts,
         )  # fmt: skip
-        assert told(TrialLog("gust", sailed.channels), ZIGZAG) == ()
+        assert told(TrialLog("gust", trial.channels), ZIGZAG) == ()
 
 
-def test_two_coefficients_that_change_together_are_both_told(vessel: Vessel) -> None:
+def test_two_coefficients_that_change_together_are_both_reported(vessel: Vessel) -> None:
     log = changed_trial(
         vessel, "pseudo-random", {"a": 1.2, "d": 0.8}, at_secs=700.0, duration_secs=1500.0,
         sensors=suite("white"), seed=1,
@@ -89,8 +95,8 @@ def test_two_coefficients_that_change_together_are_both_told(vessel: Vessel) -> 
     assert changes["d"].relative_change == pytest.approx(-0.2, abs=0.02)
 
 
-def test_where_several_could_have_changed_all_are_named() -> None:
-    """In a 10/10 zig-zag the yaw rate is always as large: f does what h does."""
+def test_alternatives_of_a_change_are_reported() -> None:
+    """In a 10/10 zig-zag the magnitude of the yaw rate is constant: f and h are equivalent."""
     case = replace(ZIGZAG, manoeuvre="zigzag-10-10")
     (found,) = told(halfway(case, "f", 0.8, seed=0), case)
     assert "f" in (found.name, *found.alternatives)
@@ -98,8 +104,8 @@ def test_where_several_could_have_changed_all_are_named() -> None:
     assert str(found).startswith(" or ".join((found.name, *found.alternatives)) + " changed ")
 
 
-def made(changes: dict[int, float], n: int = 3000, seed: int = 0) -> Rows:
-    """Rows with white noise whose first slope becomes what is given, from the row given."""
+def synthetic_rows(changes: dict[int, float], n: int = 3000, seed: int = 0) -> Rows:
+    """Return rows with white noise; `changes` maps a row to the first coefficient from it on."""
     rng = np.random.default_rng(seed)
     X, slope = rng.standard_normal((n, 2)), np.full(n, 1.0)
     for start, value in changes.items():
@@ -109,16 +115,16 @@ def made(changes: dict[int, float], n: int = 3000, seed: int = 0) -> Rows:
     return Rows(equation, 5.0 + np.arange(n), y, X, X[:, 0], 0.1)
 
 
-def watched(rows: Rows, cuts: list[int] | None = None) -> tuple[Change, ...]:
-    watch = ChangeTest(rows.equation, len(rows.target))
+def detected_changes(rows: Rows, cuts: list[int] | None = None) -> tuple[Change, ...]:
+    test = ChangeTest(rows.equation, len(rows.target))
     edges = [0, *(cuts or []), len(rows.target)]
     for start, stop in pairwise(edges):
-        watch.add(rows.part(start, stop))
-    return watch.result()
+        test.add(rows.part(start, stop))
+    return test.result()
 
 
-def test_what_comes_and_goes_is_told_twice() -> None:
-    found = watched(made({1000: 1.5, 2000: 1.0}))
+def test_a_temporary_change_is_reported_twice() -> None:
+    found = detected_changes(synthetic_rows({1000: 1.5, 2000: 1.0}))
     assert [change.name for change in found] == ["a", "a"]
     assert [change.at_secs for change in found] == pytest.approx([1005, 2005], abs=20)
     assert [change.relative_change for change in found] == pytest.approx([0.5, -1 / 3], abs=0.07)
@@ -127,33 +133,39 @@ def test_what_comes_and_goes_is_told_twice() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_where_chunks_are_cut_changes_no_bit(seed: int) -> None:
-    rows = made({1200: 1.3}, seed=seed)
+def test_results_do_not_depend_on_the_chunks_to_the_last_bit(seed: int) -> None:
+    rows = synthetic_rows({1200: 1.3}, seed=seed)
     rows.target[100:140] = np.nan
     cuts = np.sort(np.random.default_rng(seed).integers(0, 3001, 12)).tolist()
-    assert watched(rows, cuts) == watched(rows)
-    assert watched(rows)
+    assert detected_changes(rows, cuts) == detected_changes(rows)
+    assert detected_changes(rows)
 
 
-def test_rows_in_a_gap_belong_to_no_side() -> None:
-    rows = made({1500: 1.3})
+def test_a_change_can_be_pickled_and_copied() -> None:
+    (change,) = detected_changes(synthetic_rows({1500: 1.3}))
+    assert pickle.loads(pickle.dumps(change)) == change  # noqa: S301
+    assert deepcopy(change) == change
+
+
+def test_rows_in_a_gap_are_ignored() -> None:
+    rows = synthetic_rows({1500: 1.3})
     rows.target[1400:1600] = np.nan
-    (found,) = watched(rows)
+    (found,) = detected_changes(rows)
     assert abs(found.at_secs - 1505) < 130
     assert found.relative_change == pytest.approx(0.3, abs=0.06)
 
 
-def test_less_than_a_hundredth_is_not_worth_telling() -> None:
-    rows = made({1500: 1.005})
+def test_a_change_below_one_percent_is_not_reported() -> None:
+    rows = synthetic_rows({1500: 1.005})
     clear = replace(rows, target=rows.regressors @ [1.0, 1.0])
     clear.target[1500:] += 0.005 * rows.regressors[1500:, 0]
-    assert watched(clear) == ()
+    assert detected_changes(clear) == ()
 
 
-def test_of_a_month_no_more_is_kept_than_of_a_day() -> None:
+def test_memory_is_bounded_for_a_month_of_rows() -> None:
     yaw = Equation(("a", "b1", "b2", "b3", "d", "e", "constant"), 1.0, 60.0)
-    watch = ChangeTest(yaw, 31 * 86400)
-    assert len(watch._factors) <= MAX_BLOCKS
+    test = ChangeTest(yaw, 31 * 86400)
+    assert len(test._factors) <= MAX_BLOCKS
     assert ChangeTest(yaw, 0).result() == ()
 
 
@@ -183,10 +195,10 @@ def test_a_replay_tells_of_it_in_words_in_a_table_and_in_numbers(changed: Analys
     assert summary["relative_change"] == pytest.approx(-0.2, abs=0.01)
 
 
-def test_its_levels_are_drawn_and_meet_at_the_change(changed: Analysis) -> None:
-    sketch = SeriesBuilder(changed.findings.plan.clock, changed.findings.plan.stats)
-    sketch.add(changed.as_chunk())
-    panels = {panel.name: panel for panel in history_panels(changed.findings, sketch.result())}
+def test_values_before_and_after_are_drawn_and_meet_at_the_change(changed: Analysis) -> None:
+    builder = SeriesBuilder(changed.findings.plan.clock, changed.findings.plan.stats)
+    builder.add(changed.as_chunk())
+    panels = {panel.name: panel for panel in history_panels(changed.findings, builder.result())}
     step = panels["coefficient_d"].series[-1]
     (change,) = changed.findings.changes
     assert step.time_secs.tolist() == [change.from_secs, change.at_secs, change.until_secs]
@@ -200,17 +212,17 @@ def test_its_levels_are_drawn_and_meet_at_the_change(changed: Analysis) -> None:
     assert all(len(panels[f"coefficient_{name}"].series) == 2 for name in ("a", "f"))
 
 
-def test_of_a_trial_without_a_change_nothing_is_said(zigzag_analysis: Analysis) -> None:
+def test_a_trial_without_a_change_has_no_table_of_changes(zigzag_analysis: Analysis) -> None:
     assert zigzag_analysis.findings.changes == ()
     assert replay_json(zigzag_analysis.findings)["changes"] == []
     assert len(replay_tables(zigzag_analysis.findings)) == 4
 
 
-def test_the_ship_is_watched_as_its_two_equations_are(vessel: Vessel) -> None:
+def test_a_ship_test_equals_the_tests_of_its_two_equations(vessel: Vessel) -> None:
     log = halfway(ZIGZAG, "f", 0.8, seed=0)
     signals = resample(log, channels=CHANNELS)
     yaw, surge = weak_form(signals, vessel.coefficients)
-    found = watched(with_constant(yaw)) + watched(surge)
+    found = detected_changes(with_constant(yaw)) + detected_changes(surge)
     assert found == told(log, ZIGZAG)
     equations = WeakForm(SPEED_PROPORTIONAL_RUDDER, len(signals), signals.dt_secs, (1, 1, 1, 1))
     assert ShipChangeTest(equations, model_is_fitted=True).result() == ()

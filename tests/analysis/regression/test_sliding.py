@@ -1,3 +1,7 @@
+"""Regression over whole trials and sliding windows, on simulated trials and against numpy."""
+
+import pickle
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -29,16 +33,16 @@ def rows_of(  # noqa: ANN201
     return weak_form(signals, vessel.coefficients)
 
 
-def off(vessel: Vessel, name: str, value: float) -> float:
+def relative_error(vessel: Vessel, name: str, value: float) -> float:
     true = getattr(vessel.coefficients, name)
     return abs(value / true - 1)
 
 
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "zigzag-10-10", "pseudo-random"])
-def test_from_clean_data_the_coefficients_come_back(vessel: Vessel, manoeuvre: str) -> None:
+def test_clean_data_give_the_true_coefficients(vessel: Vessel, manoeuvre: str) -> None:
     for rows in rows_of(vessel, manoeuvre):
         for name, found in fit_coefficients(rows)[0].coefficients.items():
-            assert off(vessel, name, found.value) < 1e-3, name
+            assert relative_error(vessel, name, found.value) < 1e-3, name
 
 
 @pytest.mark.parametrize(
@@ -46,17 +50,17 @@ def test_from_clean_data_the_coefficients_come_back(vessel: Vessel, manoeuvre: s
     # the median errors of identification.md section 5 for the weak form, threefold
     [("a", 0.4), ("b1", 45), ("b2", 22), ("b3", 12), ("d", 0.5), ("e", 26), ("f", 9), ("g", 3)],
 )
-def test_under_the_papers_noise_the_errors_are_those_of_the_weak_form(
+def test_errors_with_the_papers_noise_are_within_three_times_the_published_medians(
     vessel: Vessel, name: str, percent: float
 ) -> None:
     yaw, surge = rows_of(vessel, noise="paper")
     found = fit_coefficients(yaw)[0].coefficients | fit_coefficients(surge)[0].coefficients
-    assert 100 * off(vessel, name, found[name].value) < percent
+    assert 100 * relative_error(vessel, name, found[name].value) < percent
     assert abs(found[name].value - getattr(vessel.coefficients, name)) < 4 * found[name].std
 
 
-def test_nothing_of_the_assumed_model_comes_back(vessel: Vessel) -> None:
-    """The paper's own scheme returns its prior; this one may use of it the alphas alone."""
+def test_coefficients_do_not_depend_on_the_assumed_model(vessel: Vessel) -> None:
+    """Only the alphas of the model are used; the paper's own scheme returns its prior."""
     trial = simulate(vessel, "zigzag-20-20", duration_secs=400.0, sensors=suite("paper"))
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
     c = vessel.coefficients
@@ -70,7 +74,7 @@ def test_nothing_of_the_assumed_model_comes_back(vessel: Vessel) -> None:
         )
 
 
-def test_a_window_is_the_same_regression_as_numpys_on_its_rows(vessel: Vessel) -> None:
+def test_a_window_equals_numpys_solution_of_its_rows(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, "pseudo-random", noise="paper")
     history = fit_coefficients(yaw)[1]
     k = 120
@@ -83,7 +87,7 @@ def test_a_window_is_the_same_regression_as_numpys_on_its_rows(vessel: Vessel) -
     assert history.conditions[k] == pytest.approx(np.linalg.cond(scaled), rel=1e-9)
 
 
-def test_histories_end_where_the_windows_do(vessel: Vessel) -> None:
+def test_times_of_a_history_are_the_ends_of_its_windows(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
     history = fit_coefficients(yaw, window_secs=150.0)[1]
     assert history.time_secs[0] == pytest.approx(150.0)
@@ -95,7 +99,7 @@ def test_a_trial_shorter_than_the_window_is_one_window(vessel: Vessel) -> None:
     assert fit_coefficients(yaw)[1].values.shape == (1, 6)
 
 
-def test_a_column_of_zeros_is_dropped_and_has_no_value(vessel: Vessel) -> None:
+def test_a_regressor_of_zeros_has_no_value(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
     regressors = yaw.regressors.copy()
     regressors[:, 5] = 0
@@ -105,25 +109,25 @@ def test_a_column_of_zeros_is_dropped_and_has_no_value(vessel: Vessel) -> None:
     assert np.isfinite(found.values[:5]).all()
 
 
-def test_windows_that_cannot_tell_are_blank(vessel: Vessel) -> None:
+def test_collinear_regressors_determine_no_coefficient(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
-    twins = yaw.regressors.copy()
-    twins[:, 3] = twins[:, 2] * (1 + 1e-9)
-    found, history = fit_coefficients(replace(yaw, regressors=twins))
+    regressors = yaw.regressors.copy()
+    regressors[:, 3] = regressors[:, 2] * (1 + 1e-9)
+    found, history = fit_coefficients(replace(yaw, regressors=regressors))
     assert found.condition > MAX_CONDITION
     assert np.isnan(history.values).all()
     assert all(not c.determined for c in found.coefficients.values())
 
 
-def test_missing_rows_are_left_out(vessel: Vessel) -> None:
+def test_missing_rows_are_ignored(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
     target = yaw.target.copy()
     target[100:140] = np.nan
     for name, found in fit_coefficients(replace(yaw, target=target))[0].coefficients.items():
-        assert off(vessel, name, found.value) < 1e-3
+        assert relative_error(vessel, name, found.value) < 1e-3
 
 
-def parted(rows: Rows, seed: int) -> list[Rows]:
+def in_chunks(rows: Rows, seed: int) -> list[Rows]:
     rng = np.random.default_rng(seed)
     cuts = np.sort(rng.integers(0, len(rows.target) + 1, 12)).tolist()
     return [
@@ -139,38 +143,34 @@ def with_gaps(rows: Rows) -> Rows:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_windows_of_rows_in_chunks_are_those_of_the_whole_to_the_last_bit(
-    vessel: Vessel, seed: int
-) -> None:
+def test_windows_do_not_depend_on_the_chunks_to_the_last_bit(vessel: Vessel, seed: int) -> None:
     for rows in rows_of(vessel, "pseudo-random", "paper"):
-        holed = with_gaps(rows)
-        windows = WindowedRegression(holed.equation, len(holed.target))
-        found = concatenate([windows.step(chunk) for chunk in parted(holed, seed)])
-        expected = fit_coefficients(holed)[1]
+        rows_with_gaps = with_gaps(rows)
+        windows = WindowedRegression(rows_with_gaps.equation, len(rows_with_gaps.target))
+        found = concatenate([windows.step(chunk) for chunk in in_chunks(rows_with_gaps, seed)])
+        expected = fit_coefficients(rows_with_gaps)[1]
         assert np.isfinite(expected.stds).any()
         for name in ("time_secs", "values", "stds", "conditions"):
             np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_fit_of_rows_in_chunks_is_that_of_the_whole_to_the_last_bit(
-    vessel: Vessel, seed: int
-) -> None:
+def test_a_fit_does_not_depend_on_the_chunks_to_the_last_bit(vessel: Vessel, seed: int) -> None:
     for rows in rows_of(vessel, "pseudo-random", "paper"):
-        holed = with_gaps(rows)
-        regression = RegressionAccumulator(holed.equation)
-        for chunk in parted(holed, seed):
+        rows_with_gaps = with_gaps(rows)
+        regression = RegressionAccumulator(rows_with_gaps.equation)
+        for chunk in in_chunks(rows_with_gaps, seed):
             regression.add(chunk)
         errors = StandardErrorAccumulator(regression.solve())
-        for chunk in parted(holed, seed + 10):
+        for chunk in in_chunks(rows_with_gaps, seed + 10):
             errors.add(chunk)
-        found, expected = errors.result(), fit_regression(holed)
+        found, expected = errors.result(), fit_regression(rows_with_gaps)
         assert (found.values == expected.values).all()
         assert (found.stds == expected.stds).all()
         assert found.condition == expected.condition
 
 
-def test_one_pass_gives_the_values_of_fewer_regressors_too(vessel: Vessel) -> None:
+def test_a_pass_also_solves_for_fewer_regressors(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, noise="paper")
     regression = RegressionAccumulator(yaw.equation)
     regression.add(yaw)
@@ -181,7 +181,7 @@ def test_one_pass_gives_the_values_of_fewer_regressors_too(vessel: Vessel) -> No
     assert found.determined.all()
 
 
-def test_windows_without_rows_are_none(vessel: Vessel) -> None:
+def test_there_are_no_windows_before_the_first_is_full(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel)
     history: CoefficientHistory = WindowedRegression(yaw.equation, len(yaw.target)).step(
         yaw.part(0, 10)
@@ -191,9 +191,9 @@ def test_windows_without_rows_are_none(vessel: Vessel) -> None:
 
 
 def test_errors_allow_for_overlapping_rows() -> None:
-    """Rows that are moving sums of white noise: the usual formula is blind to their overlap."""
+    """Rows are moving sums of white noise; the textbook formula ignores their overlap."""
     rng, overlap, n = np.random.default_rng(0), 20, 600
-    slopes, claimed, naive = [], [], []
+    slopes, estimated, naive = [], [], []
     x = np.column_stack([np.sin(np.arange(n) / 25), np.cos(np.arange(n) / 40)])
     for _ in range(300):
         noise = np.convolve(rng.standard_normal(n + overlap - 1), np.ones(overlap), "valid")
@@ -203,18 +203,18 @@ def test_errors_allow_for_overlapping_rows() -> None:
         )
         found = fit_regression(rows)
         slopes.append(found.values[0])
-        claimed.append(found.stds[0])
-        left = y - x @ found.values
-        naive.append(np.sqrt(left @ left / (n - 2) * np.linalg.inv(x.T @ x)[0, 0]))
-    assert np.mean(claimed) == pytest.approx(np.std(slopes), rel=0.25)
+        estimated.append(found.stds[0])
+        residual = y - x @ found.values
+        naive.append(np.sqrt(residual @ residual / (n - 2) * np.linalg.inv(x.T @ x)[0, 0]))
+    assert np.mean(estimated) == pytest.approx(np.std(slopes), rel=0.25)
     assert np.mean(naive) < 0.4 * np.std(slopes)
 
 
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "turning-circle", "pull-out"])
-def test_two_standard_deviations_hold_the_truth_as_often_as_they_say(
+def test_two_standard_deviations_contain_the_truth_in_over_ninety_percent(
     vessel: Vessel, manoeuvre: str
 ) -> None:
-    """Over seeds and noises, of whole trials and of their windows."""
+    """Count over seeds and noises, for whole trials and for windows."""
     inside: dict[str, list[bool]] = {"whole": [], "windows": []}
     for seed in range(8):
         for noise in ("white", "paper"):
@@ -226,16 +226,16 @@ def test_two_standard_deviations_hold_the_truth_as_often_as_they_say(
                 true = np.array([getattr(vessel.coefficients, n) for n in history.names])
                 for name, c in found.coefficients.items():
                     if np.isfinite(c.std):
-                        away = c.value - getattr(vessel.coefficients, name)
-                        inside["whole"].append(abs(away) < 2 * c.std)
-                known = np.isfinite(history.stds)
-                held = np.abs(history.values - true) < 2 * history.stds
-                inside["windows"] += held[known].tolist()
+                        error = c.value - getattr(vessel.coefficients, name)
+                        inside["whole"].append(abs(error) < 2 * c.std)
+                is_known = np.isfinite(history.stds)
+                is_inside = np.abs(history.values - true) < 2 * history.stds
+                inside["windows"] += is_inside[is_known].tolist()
     assert np.mean(inside["whole"]) > 0.9
     assert np.mean(inside["windows"]) > 0.9
 
 
-def test_in_a_steady_turn_windows_are_blank_and_b1_b2_are_not_told(vessel: Vessel) -> None:
+def test_a_steady_turn_determines_no_window_and_neither_b1_nor_b2(vessel: Vessel) -> None:
     yaw, _ = rows_of(vessel, "turning-circle", "paper")
     found, history = fit_coefficients(yaw, constant=True)
     assert np.isnan(history.values).all()
@@ -244,14 +244,28 @@ def test_in_a_steady_turn_windows_are_blank_and_b1_b2_are_not_told(vessel: Vesse
     assert found.coefficients["a"].determined
 
 
-def test_a_straight_run_tells_nothing_of_yaw(vessel: Vessel) -> None:
+def test_a_straight_run_does_not_determine_yaw(vessel: Vessel) -> None:
     still = simulate(vessel, "turning-circle", duration_secs=10.0, sensors=suite("paper"))
     signals = resample(TrialLog("still", still.channels), channels=NAMES)
     yaw, _ = weak_form(signals, vessel.coefficients)
     assert not any(c.determined for c in fit_coefficients(yaw)[0].coefficients.values())
 
 
-def test_a_coefficient_is_determined_two_standard_deviations_from_zero() -> None:
+def test_a_coefficient_is_determined_if_two_standard_deviations_from_zero() -> None:
     assert Coefficient(-3.0, 1.0, "1").determined
     assert not Coefficient(-1.5, 1.0, "1").determined
     assert not Coefficient(float("nan"), float("nan"), "1").determined
+
+
+def test_results_can_be_pickled_and_copied(vessel: Vessel) -> None:
+    yaw, _ = rows_of(vessel, noise="paper")
+    fit, history = fit_coefficients(yaw)
+    for copied, copied_history in (
+        pickle.loads(pickle.dumps((fit, history))),  # noqa: S301
+        deepcopy((fit, history)),
+    ):
+        assert copied.coefficients == fit.coefficients
+        np.testing.assert_array_equal(copied.window_conditions, fit.window_conditions)
+        assert copied_history.names == history.names
+        np.testing.assert_array_equal(copied_history.values, history.values)
+        np.testing.assert_array_equal(copied_history.stds, history.stds)

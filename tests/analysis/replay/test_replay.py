@@ -521,7 +521,7 @@ def test_ten_seconds_determine_no_coefficient(vessel: Vessel, manoeuvre: str) ->
     assert not any(coefficient.determined for coefficient in every.values())
     assert "use a longer log" in window_warnings(found)[0]
     assert "shorten the windows" not in window_warnings(found)[0]
-    with pytest.raises(LogError, match="too little moves in it to fit one"):
+    with pytest.raises(LogError, match="too little motion to fit"):
         analyse(as_log(trial))
 
 
@@ -547,7 +547,7 @@ def test_a_rudder_at_rest_determines_no_coefficient(vessel: Vessel) -> None:
     every = found.findings.yaw.coefficients | found.findings.surge.coefficients
     assert not any(coefficient.determined for coefficient in every.values())
     assert found.findings.changes == ()
-    with pytest.raises(LogError, match="too little moves in it to fit one of yaw and surge"):
+    with pytest.raises(LogError, match="too little motion to fit yaw and surge"):
         analyse(log)
 
 
