@@ -15,6 +15,7 @@ from shiplog import TrialLog, Vessel, load_vessel
 
 @pytest.fixture(scope="session")
 def recordings() -> Path:
+    """Return the folder of the real recordings; skip the test where it does not exist."""
     if not RECORDINGS.is_dir():
         pytest.skip(f"the real recordings are not here: {RECORDINGS}")
     return RECORDINGS
@@ -22,12 +23,13 @@ def recordings() -> Path:
 
 @pytest.fixture(scope="session")
 def vessel() -> Vessel:
+    """Return the paper's ship, Table 1 in degrees."""
     return load_vessel("table1")[0]
 
 
 @pytest.fixture(scope="session")
 def zigzag() -> SimulatedTrial:
-    """A 20/20 zig-zag of the paper's ship under the paper's noise."""
+    """Return a 20/20 zigzag of the paper's ship with the paper's noise."""
     vessel, text = load_vessel("table1")
     return simulate(
         vessel,
@@ -41,9 +43,11 @@ def zigzag() -> SimulatedTrial:
 
 @pytest.fixture(scope="session")
 def zigzag_log(zigzag: SimulatedTrial) -> TrialLog:
+    """Return the zigzag as a log in memory."""
     return as_log(zigzag, "zigzag.mcap")
 
 
 @pytest.fixture(scope="session")
 def zigzag_analysis(zigzag_log: TrialLog) -> Analysis:
+    """Return the replay of the zigzag, computed once."""
     return analyse(zigzag_log)

@@ -13,4 +13,5 @@ unit = "deg/s"
 
 
 def layout(text: str = MINIMAL, top: str = "") -> Layout:
+    """Parse a layout from text, with further lines above it."""
     return parse_layout(f"{top}\n{text}", "gyro.toml")

@@ -36,6 +36,7 @@ def toml_of(name: str, parameters: Mapping[str, float] | None = None, head: str 
 
 
 def vessel_of(name: str) -> Vessel:
+    """Return the ship of a model as parsed from its vessel file."""
     return parse_vessel(toml_of(name), f"{name}.toml")
 
 

@@ -16,6 +16,7 @@ unit = "deg/s"
 
 
 def trial() -> TrialLog:
+    """Return a log with extreme values, an empty channel, two fields and decreasing times."""
     stamps = 1_700_000_000_000_000_001 + 100_000_000 * np.arange(5)
     places = np.arange(10.0).reshape(5, 2) / 3
     empty = stamps[:0]
@@ -42,6 +43,7 @@ def trial() -> TrialLog:
 
 
 def require_same(one: TrialLog, other: TrialLog) -> None:
+    """Check that two logs are equal to the last bit: NaN, signs of zero, times, metadata."""
     assert dict(one.metadata) == dict(other.metadata)
     assert one.vessel_toml == other.vessel_toml
     assert len(one.channels) == len(other.channels)

@@ -87,5 +87,5 @@ def test_the_sources_of_a_package_are_listed_without_importing_it(packages: Path
     for file in ("folder/__init__.py", "folder/part.py"):
         (packages / file).write_text("raise RuntimeError\n", encoding="utf-8")
     declare(packages, "broken", GROUP, one="broken_module:A", two="folder.part:B", three="absent:C")
-    found = [file.relative_to(packages).as_posix() for file in extension_sources(GROUP)]
-    assert found == ["broken_module.py", "folder/__init__.py", "folder/part.py"]
+    sources = [file.relative_to(packages).as_posix() for file in extension_sources(GROUP)]
+    assert sources == ["broken_module.py", "folder/__init__.py", "folder/part.py"]

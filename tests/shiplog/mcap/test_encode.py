@@ -95,12 +95,12 @@ def test_encoding_in_portions_gives_the_same_messages_as_all_at_once(
 
 
 def _split(data: bytes) -> list[bytes]:
-    found, at = [], 0
+    result, at = [], 0
     while at < len(data):
         size = 9 + struct.unpack_from("<Q", data, at + 1)[0]
-        found.append(data[at : at + size])
+        result.append(data[at : at + size])
         at += size
-    return found
+    return result
 
 
 @pytest.mark.parametrize("largest", [100, 1000, 1 << 20])

@@ -136,14 +136,14 @@ LAYOUTS: list[dict[str, Any]] = [
 def parts_by_mcap(
     path: Path, topics: list[str], start: int | None, end: int | None
 ) -> dict[str, list[tuple[int, int, bytes]]]:
-    found: dict[str, list[tuple[int, int, bytes]]] = {}
+    result: dict[str, list[tuple[int, int, bytes]]] = {}
     with path.open("rb") as stream:
         reader = make_reader(stream)
         for _, topic, message in reader.iter_messages(topics, starting_at=start, ending_before=end):
-            found.setdefault(topic.topic, []).append(
+            result.setdefault(topic.topic, []).append(
                 (message.log_time, message.publish_time, message.data[1:])
             )
-    return found
+    return result
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -73,14 +73,14 @@ def description(c: Channel) -> tuple[object, ...]:
 
 
 def assert_same_log(log: LogFile, expected_log: TrialLog) -> None:
-    found = {key: c for key, c in joined_chunks(log.chunks()).items() if len(c)}
+    result = {key: c for key, c in joined_chunks(log.chunks()).items() if len(c)}
     expected = {c.key: c for c in expected_log if len(c)}
-    assert found.keys() == expected.keys()
+    assert result.keys() == expected.keys()
     for key, c in expected.items():
-        assert description(found[key]) == description(c)
-        np.testing.assert_array_equal(found[key].received_ns, c.received_ns)
-        np.testing.assert_array_equal(found[key].measured_ns, c.measured_ns)
-        assert found[key].values.tobytes() == c.values.tobytes()
+        assert description(result[key]) == description(c)
+        np.testing.assert_array_equal(result[key].received_ns, c.received_ns)
+        np.testing.assert_array_equal(result[key].measured_ns, c.measured_ns)
+        assert result[key].values.tobytes() == c.values.tobytes()
     assert log.name == expected_log.name
     assert log.metadata == expected_log.metadata
     assert log.vessel_toml == expected_log.vessel_toml

@@ -157,8 +157,8 @@ def integrated(
         def rates(
             t: float, x: FloatArray, begun: float = begun, slope: float = slope, n: float = driven
         ) -> FloatArray:
-            found = ORACLES[name](c, x, begun + slope * t, slope * units[0], n)[0]
-            return np.array(found) / units[0]
+            result = ORACLES[name](c, x, begun + slope * t, slope * units[0], n)[0]
+            return np.array(result) / units[0]
 
         states.append(solve_ivp(rates, (0, DT), states[-1], rtol=1e-10, atol=1e-13).y[:, -1])
     outputs = np.array([ORACLES[name](c, x, 0.0, 0.0, 0.0)[1] for x in states])
@@ -169,12 +169,12 @@ def integrated(
 def test_every_model_agrees_with_scipys_integration_of_its_equations(name: str) -> None:
     model, parameters, state, scale = a_ship(name)
     signals = a_run()
-    found = model.simulate(
+    result = model.simulate(
         parameters, state, input_path(signals), len(signals), offset=0.02, scale=scale
     )
     exact = integrated(name, parameters, state, signals, 0.02)
     assert np.ptp(exact[:, 3]) > 0.1
-    for output, got, right in zip(MODEL_OUTPUTS, found.T, exact.T, strict=True):
+    for output, got, right in zip(MODEL_OUTPUTS, result.T, exact.T, strict=True):
         np.testing.assert_allclose(got, right, atol=TOLERANCES[output], err_msg=output)
 
 
@@ -184,9 +184,9 @@ def test_sensitivities_are_the_derivatives_of_the_outputs(name: str) -> None:
     signals = a_run()
     path, n, p = input_path(signals), len(signals), len(parameters)
     directions = np.eye(p + len(state) + 1)
-    found = model.sensitivities(parameters, state, path, n, directions, offset=0.01, scale=scale)
+    result = model.sensitivities(parameters, state, path, n, directions, offset=0.01, scale=scale)
     at = np.concatenate((parameters, state, [0.01]))
-    for along, exact in zip(directions, found, strict=True):
+    for along, exact in zip(directions, result, strict=True):
         h = 1e-5 * max(abs(float(at @ along)), 1e-2)
 
         def moved(by: float, along: FloatArray = along) -> FloatArray:

@@ -36,13 +36,13 @@ def test_the_papers_ship_has_the_equations_of_the_filters_to_the_last_bit() -> N
     constants = ship.constants(9.0, 80.0)
     for w, w_dot, v, delta, rate in rng.normal(size=(100, 5)) * (0.01, 1e-4, 3.0, 0.3, 0.04):
         x = np.array([w, w_dot, 9 + v, 0.3, 5.0, 6.0])
-        found = rates_si(
+        result = rates_si(
             TABLE1, constants, x, straight_run(80, delta)._replace(delta_dot=rate), 0.0, 0.0
         )
         w_ddot = yaw_acceleration_rate(TABLE1, w, w_dot, 9 + v, 80.0, delta, rate)
         surge = surge_acceleration(TABLE1, w, 9 + v, 80.0)
-        assert found[:4].tolist() == [w_dot, w_ddot, surge, w]
-        assert found[4:] == pytest.approx((9 + v) * np.array([np.cos(0.3), np.sin(0.3)]))
+        assert result[:4].tolist() == [w_dot, w_ddot, surge, w]
+        assert result[4:] == pytest.approx((9 + v) * np.array([np.cos(0.3), np.sin(0.3)]))
 
 
 def test_a_moment_acts_on_the_yaw_of_the_papers_ship_alone() -> None:
@@ -113,11 +113,11 @@ def test_the_rates_in_si_are_those_of_the_documented_equations(name: str) -> Non
             straight_state > 0, 0.1, 0.05
         )
         acting = Excitation(*rng.normal(size=2) * (0.3, 0.03), 80.0, 0.02, 0.01, 0.7, 0.03)
-        found = rates_si(ship.coefficients, constants, x, acting, 3.0, 0.5)
+        result = rates_si(ship.coefficients, constants, x, acting, 3.0, 0.5)
         moment = 0.02 + 0.01 * np.sin(0.7 * 3.5)
         rudder = acting.delta + 0.5 * acting.delta_dot, acting.delta_dot
         expected = rates_in_si(name, x, rudder, 80.0, moment=moment, force=0.03)
-        assert found == pytest.approx(expected, rel=1e-11, abs=1e-13)
+        assert result == pytest.approx(expected, rel=1e-11, abs=1e-13)
 
 
 @pytest.mark.parametrize("name", SHIPS)
@@ -140,15 +140,15 @@ def hard_over(t: float, start: float, rate: float) -> float:
 
 def stepped(start: float, rate: float) -> np.ndarray:
     """w, w' and v every 0.1 s for 200 s, (2000, 3), one step a sample without regard to knots."""
-    ship, found, work = papers(), [], np.empty((3, 6))
+    ship, result, work = papers(), [], np.empty((3, 6))
     state = ship.straight_state(steady_speed(TABLE1, 80.0))
     constants = ship.constants(state[2], 80.0)
     for k in range(2000):
         delta, after = (hard_over(k * 0.1 + h, start, rate) for h in (0.0, 0.1))
         moving = straight_run(80, delta)._replace(delta_dot=(after - delta) / 0.1)
         state = runge_kutta_step(TABLE1, constants, state, moving, 0.0, 0.1, work).copy()
-        found.append(state[:3])
-    return np.array(found)
+        result.append(state[:3])
+    return np.array(result)
 
 
 def exact(start: float, rate: float) -> np.ndarray:
