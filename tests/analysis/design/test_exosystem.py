@@ -44,9 +44,9 @@ def bias(sensor: str = "gyro", exosystem: Exosystem = CONSTANT) -> DisturbanceIn
 FORCE = DisturbanceInput("force", CONSTANT, on_state={"v": 1.0})
 
 
-# methods, section 4; where it says no: what is ambiguous, at which mode, and the remedies
+# methods, section 4; for unobservable cases the ambiguity, its mode and the remedies
 TABLE = [
-    # plant, disturbances, ambiguous (none: observable), mode, remedies
+    # plant, disturbances, ambiguity (none if observable), mode, remedies
     (INTEGRATOR, [moment(CONSTANT)], None, None, None),
     (INTEGRATOR, [moment(RAMP)], None, None, None),
     (INTEGRATOR, [bias()], ["gyro error"], 0, ["w", "∫w"]),
@@ -67,8 +67,8 @@ TABLE = [
     (YAW_AND_SURGE, [moment(CONSTANT), FORCE], None, None, None),
     (YAW_AND_SURGE, [moment(CONSTANT), FORCE, bias()], ["moment", "gyro error"], 0, ["w", "∫w"]),
 ]  # fmt: skip
-SAID = {"w": "'w' by a sensor of its own", "∫w": "the integral of 'w'"}
-SAID["psi"] = "'psi' by a sensor of its own"
+REMEDY_TEXTS = {"w": "'w' by a sensor of its own", "∫w": "the integral of 'w'"}
+REMEDY_TEXTS["psi"] = "'psi' by a sensor of its own"
 
 
 @pytest.mark.parametrize(("ship", "disturbances", "ambiguous", "mode", "remedies"), TABLE)
@@ -84,7 +84,7 @@ def test_ambiguities_and_their_remedies(
     (ambiguity,) = ambiguities(ship, disturbances)
     assert ambiguity.mode == pytest.approx(mode, abs=1e-12)
     assert list(ambiguity.disturbances) == ambiguous
-    assert list(ambiguity.remedies) == [SAID[cure] for cure in remedies]
+    assert list(ambiguity.remedies) == [REMEDY_TEXTS[cure] for cure in remedies]
     with pytest.raises(UsageError) as raised:
         disturbance_observer(ship, disturbances, frequency=0.1)
     message = str(raised.value)
@@ -320,7 +320,7 @@ def test_gains_of_the_roll_example_in_closed_form(I: float, omega: float) -> Non
 
 
 def test_unscaled_rank_test_fails_for_an_inertia_of_1e12() -> None:
-    """Of 1e16 even one to the last bit."""
+    """With an inertia of 1e16 even a threshold of one rounding error fails."""
     for inertia, tolerance in ((1e12, 1e-10), (1e16, None)):
         ship, disturbances = roll(inertia)
         observer = disturbance_observer(ship, disturbances, frequency=0.05)
@@ -331,7 +331,7 @@ def test_unscaled_rank_test_fails_for_an_inertia_of_1e12() -> None:
 
 
 def test_complex_rate_gives_two_by_two_blocks() -> None:
-    """Ac = λI + N of size d + 1, Cc = [1 0 …]."""
+    """Ac = λI + N of size d + 1, N being the shift matrix, and Cc = [1 0 …]."""
     ramp = Exosystem.exponential(-0.3, 2)
     assert ramp.Ac.tolist() == (-0.3 * np.eye(3) + np.eye(3, k=1)).tolist()
     assert ramp.Cc.tolist() == [[1, 0, 0]]

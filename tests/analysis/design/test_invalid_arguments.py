@@ -1,4 +1,4 @@
-"""Every design refuses every argument that does not fit: by its name, its shape, what it wants."""
+"""Every design rejects invalid arguments with their name, shape and what is expected."""
 
 from collections.abc import Callable
 from typing import Any
@@ -35,8 +35,8 @@ def observed(A: Any, B: Any, C: Any) -> object:  # noqa: ANN401
     return disturbance_observer(plant, (), frequency=0.1)
 
 
-# a design, and arguments that fit it
-FITTING: dict[Callable[..., object], dict[str, Any]] = {
+# each design function with valid arguments
+VALID_ARGUMENTS: dict[Callable[..., object], dict[str, Any]] = {
     kalman_gain: {"A": A, "G": I, "C": ROW, "Q": I, "R": [[1.0]], "N": np.zeros((2, 1))},
     error_covariance: {"A": A, "L": COLUMN, "C": ROW, "W": I, "R": [[1.0]]},
     quality_regulator: {"A": A, "B": COLUMN, "P": I, "R": [[1.0]], "G": I},
@@ -60,15 +60,17 @@ WEIGHTS = {
     quality_filter: ("R1", "R2", "G"), cycle_regulator: ("P", "R", "G"), cascade: ("R1", "R2"),
 }  # fmt: skip
 OPTIONS = ("cycles", "stages", "correlation_secs", "shaping", "border")
-ARGUMENTS = [(of, name) for of, given in FITTING.items() for name in given if name not in OPTIONS]
+ARGUMENTS = [
+    (of, name) for of, given in VALID_ARGUMENTS.items() for name in given if name not in OPTIONS
+]
 of_each_argument = pytest.mark.parametrize(
     ("of", "name"), ARGUMENTS, ids=[f"{of.__name__}-{name}" for of, name in ARGUMENTS]
 )
 
 
-def refusal(of: Callable[..., object], name: str, value: object) -> str:
+def error_message(of: Callable[..., object], name: str, value: object) -> str:
     with pytest.raises(UsageError) as caught:
-        of(**(FITTING[of] | {name: value}))
+        of(**(VALID_ARGUMENTS[of] | {name: value}))
     message = str(caught.value)
     assert "\n" not in message
     assert name in message
@@ -76,9 +78,9 @@ def refusal(of: Callable[..., object], name: str, value: object) -> str:
     return message
 
 
-@pytest.mark.parametrize("of", FITTING, ids=lambda of: of.__name__)
+@pytest.mark.parametrize("of", VALID_ARGUMENTS, ids=lambda of: of.__name__)
 def test_valid_arguments_are_accepted(of: Callable[..., object]) -> None:
-    of(**FITTING[of])
+    of(**VALID_ARGUMENTS[of])
 
 
 @of_each_argument
@@ -86,7 +88,7 @@ def test_valid_arguments_are_accepted(of: Callable[..., object]) -> None:
 def test_wrong_shape_raises_an_error_with_the_argument(
     of: Callable[..., object], name: str, wrong: tuple[int, ...]
 ) -> None:
-    message = refusal(of, name, np.ones(wrong))
+    message = error_message(of, name, np.ones(wrong))
     assert f"of shape ({wrong[0]}," in message
 
 
@@ -95,18 +97,18 @@ def test_wrong_shape_raises_an_error_with_the_argument(
 def test_nan_and_infinity_raise_an_error_with_the_shape(
     of: Callable[..., object], name: str, hole: float
 ) -> None:
-    given = np.array(FITTING[of][name], dtype=float)
+    given = np.array(VALID_ARGUMENTS[of][name], dtype=float)
     given.flat[-1] = hole
-    message = refusal(of, name, given)
+    message = error_message(of, name, given)
     assert str(given.shape) in message
     assert "NaN or infinities; expected finite numbers" in message
 
 
 @of_each_argument
 def test_values_that_are_not_numbers_raise_an_error(of: Callable[..., object], name: str) -> None:
-    for nothing in ("fast", [[1, 2], [3]], None):
-        if nothing is not None or name not in ("N", "G", "noise"):  # these may be left out
-            refusal(of, name, nothing)
+    for value in ("fast", [[1, 2], [3]], None):
+        if value is not None or name not in ("N", "G", "noise"):  # optional arguments
+            error_message(of, name, value)
 
 
 @pytest.mark.parametrize(
@@ -115,13 +117,13 @@ def test_values_that_are_not_numbers_raise_an_error(of: Callable[..., object], n
 def test_asymmetric_or_indefinite_weight_raises_an_error_with_the_shape(
     of: Callable[..., object], name: str
 ) -> None:
-    n = len(np.array(FITTING[of][name]))
+    n = len(np.array(VALID_ARGUMENTS[of][name]))
     indefinite = -np.eye(n)
     indefinite[0, 0] = 1.0 if n > 1 else -1.0
-    message = refusal(of, name, indefinite)
+    message = error_message(of, name, indefinite)
     assert f"{name}, ({n}, {n}), has the eigenvalue -1; expected a positive" in message
     if n > 1:
-        message = refusal(of, name, np.eye(n) + np.triu(np.ones((n, n)), 1))
+        message = error_message(of, name, np.eye(n) + np.triu(np.ones((n, n)), 1))
         assert (
             f"{name}, ({n}, {n}), differs from its transpose by 1; expected a symmetric" in message
         )
@@ -142,14 +144,14 @@ def test_unobservable_pair_raises_an_error_with_mode_and_remedy(
     of: Callable[..., object], change: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(UsageError, match=message) as caught:
-        of(**(FITTING[of] | change))
-    assert any(cure in str(caught.value) for cure in ("measure ", "add an input"))
+        of(**(VALID_ARGUMENTS[of] | change))
+    assert any(remedy in str(caught.value) for remedy in ("measure ", "add an input"))
 
 
 @pytest.mark.parametrize(
     "poles", [[-1 + 1j, -1], [-1 + 1j, -1 + 1j], [-1 + 1j, -1.001 - 1j], [-1 - 1j, -2]]
 )
 def test_pole_without_its_conjugate_raises_an_error(poles: list[complex]) -> None:
-    message = refusal(place_multilevel, "poles", poles)
+    message = error_message(place_multilevel, "poles", poles)
     assert "poles, (2,), have -1" in message
     assert "without its conjugate; expected both" in message

@@ -59,7 +59,7 @@ N = [
 
 
 def truth(rate: StateFunction, x: np.ndarray, u: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """The motion itself at `times`, (len(times), n)."""
+    """Integrate the model itself; return the states at `times`, (len(times), n)."""
     return solve_ivp(
         lambda _, x: rate(x, u), times[[0, -1]], x, "DOP853", times, rtol=1e-13, atol=1e-15
     ).y.T
@@ -71,7 +71,7 @@ def observer_of_the_spacecraft(order: str) -> TickObserver:
 
 
 def errors_along_the_flight(observer: TickObserver, guess: np.ndarray, count: int) -> np.ndarray:
-    """Largest error of a rate after each tick of 1 s, (count + 1,); 40 measurements a tick."""
+    """Return the largest error of a rate after each tick of 1 s, (count + 1,); 40 measurements a tick."""
     times = np.arange(40 * count + 1) / 40
     flight = truth(spacecraft, POINT, NO_INPUT, times)
     x = observer.init(guess, flight[0, :3])
@@ -110,7 +110,7 @@ def test_closed_form_equals_multilevel_placement() -> None:
 
 def test_error_of_the_reduced_observer_decays_with_its_poles() -> None:
     errors = errors_along_the_flight(observer_of_the_spacecraft("reduced"), np.zeros(6), 40)
-    # methods, section 3, to the digits given; the largest of POINT's rates is 0.06
+    # methods, section 3, to the digits given there; the largest rate at POINT is 0.06
     assert errors[0] == 0.06
     assert errors[5] == pytest.approx(5e-3, abs=5e-4)
     assert errors[10] == pytest.approx(4e-4, abs=5e-5)
@@ -291,7 +291,7 @@ def test_invalid_or_unobservable_jacobian_raises_an_error() -> None:
 
 
 def test_frozen_gain_of_the_ship_is_as_good_as_one_per_tick() -> None:
-    """Her rudder swings by 20°, the estimate starts far off."""
+    """The rudder swings by 20°, and the estimate starts with a large error."""
     tick, turn = 2.0, 2 * np.pi / 120
     times = np.arange(401) * tick / 4
     u = np.column_stack(

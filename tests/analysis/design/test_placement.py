@@ -28,13 +28,13 @@ SYSTEMS = settings(derandomize=True, max_examples=60, deadline=None)
 
 @st.composite
 def systems(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A random pair that is well observable, and poles: real, in pairs, and repeated at will."""
+    """Return a random, well observable pair and poles: real, complex and repeated."""
     n = draw(st.integers(1, 6))
     m = draw(st.integers(1, n))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     A, C = rng.standard_normal((n, n)), rng.standard_normal((m, n))
     shown = np.vstack([C @ np.linalg.matrix_power(A, k) for k in range(n)])
-    # beyond that the gain's own last digit moves the polynomial by more than is asked
+    # for larger gains their rounding error alone exceeds the tolerance
     assume(np.linalg.cond(shown) < 1e3)
     pairs = draw(st.integers(0, n // 2))
     kinds = draw(st.integers(1, n))
@@ -82,7 +82,7 @@ def test_gain_does_not_depend_on_the_units_of_the_states(
 def test_gain_of_one_measurement_matches_scipy_and_control(n: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     A, C = rng.standard_normal((n, n)), rng.standard_normal((1, n))
-    poles = butterworth_poles(n, 2.0)  # every pair straddles two levels
+    poles = butterworth_poles(n, 2.0)  # every pair is shared by two levels
     L = place_multilevel(A, C, poles)
     assert L[:, 0] == pytest.approx(np.ravel(control.place(A.T, C.T, poles)), rel=1e-6)
     assert L[:, 0] == pytest.approx(np.ravel(control.acker(A.T, C.T, poles)), rel=1e-6)
@@ -113,7 +113,7 @@ def test_complex_pairs_are_shared_between_levels_of_odd_size(
     sizes: tuple[int, ...], pairs: int
 ) -> None:
     rng = np.random.default_rng(1)
-    # chains of integrators as long as there are levels: level k has one state of each that long
+    # chains of integrators: level k holds one state of each chain of at least that length
     lengths = [sum(size > i for size in sizes) for i in range(sizes[0])]
     A = block_diag(*(np.eye(length, k=1) for length in lengths)).astype(float)
     A += np.tril(rng.uniform(-1, 1, A.shape)) * block_diag(*(np.ones((k, k)) for k in lengths))
@@ -215,7 +215,7 @@ def test_poles_moved_by_rounding_raise_an_error() -> None:
         (4, 2, 1e-14, 1e-10, 2e-10),
         (6, 3, 4e-14, 7e-8, 2e-10),
         (8, 3, 1e-13, 4e-11, 2e-10),
-        (10, 2, 7e-11, 1e-1, 1e-8),  # the last our own: the page's 2e-10 holds of 97 in 100
+        (10, 2, 7e-11, 1e-1, 1e-8),  # last value: ours; the 2e-10 of the page holds for 97 of 100
     ],
 )
 def test_accuracy_over_100_random_systems(
@@ -240,11 +240,11 @@ def test_number_of_levels_of_a_system_of_full_ranks(n: int, m: int) -> None:
     levels = _levels(rng.standard_normal((n, n)), rng.standard_normal((n, m)))
     assert len(levels) - 1 == -(-n // m) - 1
     last = levels[-1].U.shape[1]
-    assert last == n - m * (len(levels) - 1)  # and so large is the last Φ
+    assert last == n - m * (len(levels) - 1)  # which is also the size of the last Φ
 
 
 def test_placing_channels_together_amplifies_the_noise_of_the_yaw_rate() -> None:
-    """At identical poles: 170 times, says the page, of noises it does not tell."""
+    """At identical poles; the page gives a factor of 170 without its noise intensities."""
     yaw, surge = np.array([[-0.05, 1, 0], [0, 0, 1], [0, 0, 0]]), np.array([[-0.004, 1], [0, 0]])
     of_yaw, of_surge = butterworth_poles(3, 0.05), butterworth_poles(2, 0.1)
     A, C = block_diag(yaw, surge), block_diag([[1.0, 0, 0]], [[1.0, 0]])
@@ -253,7 +253,7 @@ def test_placing_channels_together_amplifies_the_noise_of_the_yaw_rate() -> None
     )
     poles = np.concatenate((of_yaw, of_surge))
     together = place_multilevel(A, C, poles)
-    R = np.diag([2e-4, 0.2 / np.sqrt(3)]) ** 2 * 0.1  # of a gyro, and of the paper's log
+    R = np.diag([2e-4, 0.2 / np.sqrt(3)]) ** 2 * 0.1  # of a gyro and of the speed log of the paper
     stds = []
     for L in (apart, together):
         assert polynomial_error(A - L @ C, poles) < 1e-9
@@ -265,7 +265,7 @@ def test_poles_that_scipy_rejects_are_placed() -> None:
     A, C = np.array([[0.0, 1], [0, 0]]), np.array([[1.0, 0]])
     with pytest.raises(ValueError, match="repeated"):  # beyond the rank of C
         control.place(A.T, C.T, [-1.0, -1.0])
-    uneven = np.array([-1 + 1j, -1 - (1 + 1e-15) * 1j])  # conjugates, but not to the bit
+    uneven = np.array([-1 + 1j, -1 - (1 + 1e-15) * 1j])  # conjugates up to rounding
     with pytest.raises(ValueError, match=r"[Cc]onjugate"):
         control.place(A.T, C.T, uneven)
     for poles in ([-1.0, -1.0], uneven):

@@ -44,7 +44,7 @@ def test_a_x_plus_b_u_is_the_derivative_of_the_ship_model(seed: int) -> None:
     delta, rate, n, n_dot = rng.uniform([-35, -2.5, 40, -1], [35, 2.5, 120, 1])
 
     def accelerations(h: float) -> np.ndarray:
-        """w'' and v' a moment later, along the motion itself (delta'' = n'' = 0)."""
+        """Return w'' and v' a short time later along the trajectory (delta'' = n'' = 0)."""
         w2 = yaw_acceleration_rate(TABLE1, w, w_dot, v, n, delta, rate)
         v1 = surge_acceleration(TABLE1, w, v, n)
         w_h, w_dot_h = w + h * w_dot + h * h / 2 * w2, w_dot + h * w2
@@ -141,7 +141,7 @@ def test_matrices_row_by_row() -> None:
         entries = {int(column) + 1: found[column] for column in np.flatnonzero(found)}
         assert entries == pytest.approx(row, rel=1e-15)
     _, port = pseudo_input_matrices(TABLE1, -1.0)
-    changed = {(2, 4), (3, 14)}  # those of w|w|
+    changed = {(2, 4), (3, 14)}  # the entries of w|w|
     assert {(int(i) + 1, int(j) + 1) for i, j in np.argwhere(port != B)} == changed
 
 
@@ -162,7 +162,9 @@ def test_printed_covariance_is_stationary_in_yaw_but_not_in_surge() -> None:
     surge = kalman_gain([[0]], [[1]], [[1]], 0.01, 400).covariance
     assert [*yaw[0], yaw[1, 1]] == pytest.approx([30.27534702, 1.14074580, 0.12079779], abs=1e-8)
     assert surge.item() == pytest.approx(2, rel=1e-12)  # √(QR); printed 2.06180082
-    assert pytest.approx(13.78, abs=1e-12) == 10 + 0.01 * 378  # v' has no other noise and no end
+    assert (
+        pytest.approx(13.78, abs=1e-12) == 10 + 0.01 * 378
+    )  # v' has no other noise and grows without bound
 
 
 def test_discretisation_matches_scipy_and_control(vessel: Vessel) -> None:

@@ -81,9 +81,11 @@ def test_shift_trades_settling_time_against_noise(
     poles, modes = np.linalg.eig(SHIP - K @ RATE)
     times = np.arange(0, 60, 0.01)
     parts = modes[0] * np.linalg.solve(modes, [1, 0])
-    error = np.real(np.exp(np.outer(times, poles)) @ parts)  # of ω, from one in ω
+    error = np.real(np.exp(np.outer(times, poles)) @ parts)  # of ω, starting from one in ω
     settled = times[np.abs(error) > 0.05][-1]
-    assert settled + 0.01 == pytest.approx(settling + 0.05, abs=0.05)  # the page cuts digits off
+    assert settled + 0.01 == pytest.approx(
+        settling + 0.05, abs=0.05
+    )  # the page truncates the digits
 
 
 @pytest.mark.parametrize(
@@ -93,7 +95,7 @@ def test_rate_weight_trades_damping_against_noise(G: float, noise: float, slowes
     optimal = kalman_gain(SHIP, np.eye(2), RATE, R1, R2).covariance[0, 0]
     found = quality_filter(SHIP, RATE, R1, R2, G=np.diag([0, G]))
     of_it = error_covariance(SHIP, found.gain, RATE, R1, R2)[0, 0]
-    assert np.abs(found.poles.imag).max() == 0  # a damping of one
+    assert np.abs(found.poles.imag).max() == 0  # damping ratio of at least one
     assert np.sqrt(of_it / optimal) == pytest.approx(noise, abs=5e-4)
     assert found.poles[-1].real == pytest.approx(slowest, abs=5e-5)
 
@@ -121,7 +123,11 @@ def test_gain_of_the_destabilising_shifts() -> None:
     ("factor", "errors", "best"),
     [
         (1.0, [1, 1.43, 2.08, 2.76, 3.44], 1),
-        (1e-4, [2.91, 1.27, 2.09, 2.97, 3.84], 2),  # taken for ten thousand times less noisy
+        (
+            1e-4,
+            [2.91, 1.27, 2.09, 2.97, 3.84],
+            2,
+        ),  # designed for 1e-4 of the true measurement noise
     ],
 )
 def test_cascade_improves_only_a_first_stage_that_is_too_fast(
@@ -146,7 +152,7 @@ def test_summary_of_a_cascade() -> None:
 def random_regulator(
     seed: int,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """A, B, P, R and G of one to six states."""
+    """Return random A, B, P, R and G of one to six states."""
     rng = np.random.default_rng(seed)
     n, m = rng.integers(1, [7, 4])
     half, rotated, rates = (rng.standard_normal((k, k)) for k in (n, m, n))
@@ -194,7 +200,7 @@ def test_without_shift_and_weight_the_gains_match_control(seed: int) -> None:
     A, B, P, R, _ = random_regulator(seed)
     P, R = (P + P.T) / 2, (R + R.T) / 2
     K, _, _ = control.lqr(A, B, P, R)
-    assume(np.linalg.norm(K) < 1e3)  # an input that hardly moves a mode leaves fewer digits
+    assume(np.linalg.norm(K) < 1e3)  # a weakly controllable mode loses digits
     assert_allclose(quality_regulator(A, B, P, R).gain, -K, rtol=1e-7, atol=1e-8)
     L, _, _ = control.lqe(A, np.eye(len(A)), B.T, P, R)
     assert_allclose(quality_filter(A, B.T, P, R).gain, L, rtol=1e-7, atol=1e-8)
@@ -311,13 +317,13 @@ def test_invalid_cycles_and_stages_raise_an_error() -> None:
         cascade(SHIP, RATE, R1, R2, [[-1], [0]], stages=2, correlation_secs=10)
 
 
-# ---- methods, section 2, what is message there without a table
+# ---- methods, section 2: statements without a table
 
 
 def equation_of(
     A: FloatArray, B: FloatArray, P: FloatArray, R: FloatArray, G: FloatArray, c: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Q and L of the page's one equation, by the library; the shift is not in the cross term."""
+    """Solve the Riccati equation of the page with scipy; the shift is not in the cross term."""
     heavier, across = R + B.T @ G @ B, A.T @ G @ B
     weight, heavier = P + A.T @ G @ A, (heavier + heavier.T) / 2
     shifted = A + c / 2 * np.eye(len(A))
@@ -377,7 +383,7 @@ def test_bound_holds_for_300_random_systems(weighted: bool) -> None:
 
 
 def test_gain_grows_without_bound_over_cycles_without_rate_weight() -> None:
-    """The increments fall as 1/√j."""
+    """The increments of the gain fall as 1/√j."""
     done = cycle_regulator(DOUBLE, PUSH, np.eye(2), 1, 100)
     j = np.arange(1, 101)
     gains = np.array([step.gain[0] for step in done])
@@ -394,7 +400,7 @@ def test_gain_increments_fall_geometrically_with_rate_weight() -> None:
 
 
 def test_cascade_does_not_improve_a_first_stage_that_is_too_slow() -> None:
-    """Taken for ten thousand times noisier, as the page's words are, not its numbers."""
+    """The first filter is designed for 1e4 times the noise, as in the text of the page."""
     first = quality_filter(SHIP, RATE, R1, 1e4 * R2).gain
     found = cascade(SHIP, RATE, R1, R2, first, stages=5, correlation_secs=10)
     assert found.best == 1

@@ -16,7 +16,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def system(seed: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """A, G, C, Q and R of a random system of one to seven states."""
+    """Return A, G, C, Q and R of a random system of one to seven states."""
     rng = np.random.default_rng(seed)
     n, m, q = rng.integers(1, [8, 4, 4])
     rotated = rng.standard_normal((m, m))
@@ -34,7 +34,7 @@ def system(seed: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, F
 def test_gain_matches_control(seed: int) -> None:
     A, G, C, Q, R = system(seed)
     found = kalman_gain(A, G, C, Q, R)
-    W = G @ Q @ G.T  # control wants it symmetric to the bit
+    W = G @ Q @ G.T  # control requires exact symmetry
     L, P, _ = control.lqe(A, np.eye(len(A)), C, (W + W.T) / 2, (R + R.T) / 2)
     assert found.gain == pytest.approx(L, rel=1e-7, abs=1e-7)
     assert found.covariance == pytest.approx(P, rel=1e-7, abs=1e-7)
@@ -77,7 +77,7 @@ def test_correlated_noise_equals_an_uncorrelated_system(seed: int) -> None:
     spread = rng.uniform(-1, 1, (len(Q), len(R)))
     spread /= 1.01 * max(1.0, np.linalg.norm(spread, 2))
     N = np.linalg.cholesky(Q) @ spread @ np.linalg.cholesky(R).T
-    # w = N R⁻¹ v + what v does not tell, and v = y - C x: the first part is known
+    # w = N R⁻¹ v + a part uncorrelated with v, and v = y - C x: the first part is an input
     known = G @ N @ np.linalg.inv(R)
     plain = kalman_gain(A - known @ C, G, C, Q - N @ np.linalg.solve(R, N.T), R)
     found = kalman_gain(A, G, C, Q, R, N)

@@ -16,7 +16,7 @@ from analysis.design.shaping import (
 )
 from shiplog import UsageError
 
-# The steady-state filter's example, as methods.md reads it: an aeroplane in Dryden's gusts
+# The example of the steady-state filter (methods.md): an aeroplane in Dryden gusts
 SIGMA, L = 10.0, 3.49
 DRYDEN = (
     2 * L * SIGMA**2 * np.array([3 * L**2, 0, 1]),
@@ -97,7 +97,7 @@ def test_wave_filter_lowers_the_error_of_the_white_noise_design_by_24_percent() 
     shaped = np.sqrt(kalman_gain(plant.A, plant.G, plant.C, 1, SENSOR).covariance[0, 0])
 
     def white(log_intensity: float) -> float:
-        """σ at sea of the filter that takes the waves for white noise."""
+        """Return the error in waves of the filter designed for white noise instead of waves."""
         K = kalman_gain(YAW, [[1], [0]], RATE, np.exp(log_intensity), SENSOR).gain
         K = np.vstack((K, np.zeros((2, 1))))
         return float(
@@ -149,7 +149,7 @@ def test_two_disturbances_are_added_in_turn() -> None:
 
 
 def spectrum_of(H: TransferFunction) -> tuple[np.ndarray, np.ndarray]:
-    """|H(jω)|² as polynomials of ω."""
+    """Return |H(jω)|² as polynomials in ω."""
 
     def squared(p: np.ndarray) -> np.ndarray:
         at_jw = p * 1j ** np.arange(len(p) - 1, -1, -1)
@@ -247,7 +247,7 @@ def test_two_misprints_of_the_paper_differ_by_whole_numbers() -> None:
     found = kalman_gain(plant.A, plant.G, plant.C, 1, R)
     assert found.gain[PAPERS_ORDER][3, 1] - 2 == pytest.approx(-2.2457, abs=5e-5)
     assert found.poles[-1].real - 1 == pytest.approx(-1.1661, abs=5e-5)
-    # its own numbers prove both: F = A - L C, and the trace of F is the sum of its poles
+    # both follow from F = A - L C, whose trace is the sum of its poles
     (_, printed), (sensed, _) = PRINTED_CLOSED[3][:2], PRINTED_GAIN[3]
     assert -sensed * C0[0, 1] - printed == pytest.approx(PRINTED_GAIN[3][1], abs=1e-4)
     printed_trace = sum(PRINTED_CLOSED[k][k] for k in range(5))
