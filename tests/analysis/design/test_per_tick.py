@@ -71,7 +71,7 @@ def observer_of_the_spacecraft(order: str) -> TickObserver:
 
 
 def errors_along_the_flight(observer: TickObserver, guess: np.ndarray, count: int) -> np.ndarray:
-    """Return the largest error of a rate after each tick of 1 s, (count + 1,); 40 measurements a tick."""
+    """Return the largest rate error after each tick of 1 s, (count + 1,); 40 samples a tick."""
     times = np.arange(40 * count + 1) / 40
     flight = truth(spacecraft, POINT, NO_INPUT, times)
     x = observer.init(guess, flight[0, :3])

@@ -162,9 +162,7 @@ def test_printed_covariance_is_stationary_in_yaw_but_not_in_surge() -> None:
     surge = kalman_gain([[0]], [[1]], [[1]], 0.01, 400).covariance
     assert [*yaw[0], yaw[1, 1]] == pytest.approx([30.27534702, 1.14074580, 0.12079779], abs=1e-8)
     assert surge.item() == pytest.approx(2, rel=1e-12)  # √(QR); printed 2.06180082
-    assert (
-        pytest.approx(13.78, abs=1e-12) == 10 + 0.01 * 378
-    )  # v' has no other noise and grows without bound
+    assert pytest.approx(13.78, abs=1e-12) == 10 + 0.01 * 378  # v' grows without bound
 
 
 def test_discretisation_matches_scipy_and_control(vessel: Vessel) -> None:

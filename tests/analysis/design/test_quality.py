@@ -83,9 +83,7 @@ def test_shift_trades_settling_time_against_noise(
     parts = modes[0] * np.linalg.solve(modes, [1, 0])
     error = np.real(np.exp(np.outer(times, poles)) @ parts)  # of ω, starting from one in ω
     settled = times[np.abs(error) > 0.05][-1]
-    assert settled + 0.01 == pytest.approx(
-        settling + 0.05, abs=0.05
-    )  # the page truncates the digits
+    assert settled + 0.01 == pytest.approx(settling + 0.05, abs=0.05)  # truncated on the page
 
 
 @pytest.mark.parametrize(
@@ -123,11 +121,7 @@ def test_gain_of_the_destabilising_shifts() -> None:
     ("factor", "errors", "best"),
     [
         (1.0, [1, 1.43, 2.08, 2.76, 3.44], 1),
-        (
-            1e-4,
-            [2.91, 1.27, 2.09, 2.97, 3.84],
-            2,
-        ),  # designed for 1e-4 of the true measurement noise
+        (1e-4, [2.91, 1.27, 2.09, 2.97, 3.84], 2),  # designed for 1e-4 R2
     ],
 )
 def test_cascade_improves_only_a_first_stage_that_is_too_fast(
