@@ -9,12 +9,26 @@ from shiplog.types import FloatArray
 
 
 def pseudo_input_matrices(c: Coefficients, side: float) -> tuple[FloatArray, FloatArray]:
-    """A (5, 5) and B (5, 20) of the five-state model x' = A x + B u, with C = [e1, e4].
+    """Compute the matrices of the five-state model x' = A x + B u, with C = [e1, e4].
 
-    x = (w, w', w'', v, v'), u the twenty pseudo-inputs of `pseudo_inputs`, `side` the sign of w.
-    Burylin's (5) without its misprints: u7 is v delta, u9 is n delta E, u19 carries n, row three's
-    ww' has the factor 2, and a twentieth input v' n delta E is there, without which A x + B u is
-    not the derivative.
+    x = (w, w', w'', v, v') with the yaw rate w and the speed v; u are the twenty pseudo-inputs of
+    `pseudo_inputs`. These are Burylin's (5) without its misprints: u7 is v delta, u9 is n delta E,
+    u19 contains n, w w' in the third row has the factor 2, and a twentieth input v' n delta E is
+    added, without which A x + B u is not the derivative.
+
+    Parameters
+    ----------
+    c
+        Coefficients of the ship.
+    side
+        The sign of w, 1 or -1.
+
+    Returns
+    -------
+    A
+        (5, 5).
+    B
+        (5, 20).
     """
     A = np.zeros((5, 5))
     A[0, 1] = 1
@@ -32,9 +46,9 @@ def pseudo_input_matrices(c: Coefficients, side: float) -> tuple[FloatArray, Flo
 
 
 def printed_input_matrix(c: Coefficients) -> FloatArray:
-    """B as Burylin's (5) prints it, for w > 0, its short rows filled up with zeros, (5, 19).
+    """Return B (5, 19) as printed in Burylin's (5) for w > 0, its short rows filled with zeros.
 
-    Kept to be laid beside `pseudo_input_matrices`: with it A x + B u is not the derivative.
+    For comparison with `pseudo_input_matrices`: with it A x + B u is not the derivative.
     """
     b4, b5, b6, b7 = c.alpha1 * c.d, c.alpha2 * c.d, c.alpha1 * c.e, c.alpha2 * c.e
     B = np.zeros((5, 19))
@@ -49,7 +63,24 @@ def printed_input_matrix(c: Coefficients) -> FloatArray:
 def pseudo_inputs(
     x: FloatArray, delta: float, delta_dot: float, n: float, n_dot: float, alpha3: float
 ) -> FloatArray:
-    """The twenty pseudo-inputs u1 ... u20 of the five-state model, (20,)."""
+    """Compute the twenty pseudo-inputs u1 ... u20 of the five-state model.
+
+    Parameters
+    ----------
+    x
+        (5,): (w, w', w'', v, v').
+    delta, delta_dot
+        Rudder angle and its rate.
+    n, n_dot
+        Propeller speed and its rate.
+    alpha3
+        The coefficient in E = exp(-alpha3 v).
+
+    Returns
+    -------
+    FloatArray
+        (20,).
+    """
     w, w_dot, _, v, v_dot = x
     E = exp(-v * alpha3)
     return np.array(
