@@ -1,6 +1,6 @@
 """Batches of small triangular least-squares systems: merge, scale, solve, condition number.
 
-The last axis of every array is the system, and every innermost loop runs projection it, so that the
+The last axis of every array is the system, and every innermost loop runs along it, so that the
 compiler vectorises across systems. The result of one system does not depend on the others in its
 batch.
 
@@ -65,7 +65,7 @@ def solve_single(factor: FloatArray) -> BatchSolutions:
     factor
         (p, p + 1) the factor ``[R Q'y]``; it is not changed.
 
-    Reis_nonzero
+    Returns
     -------
     solutions
         A batch of one.

@@ -129,8 +129,8 @@ class ShipChangeTest:
 
     def result(self) -> tuple[Change, ...]:
         """Return the changes in the order of time."""
-        found = *self._yaw.result(), *self._surge.result()
-        return tuple(sorted(found, key=lambda change: change.at_secs))
+        changes = *self._yaw.result(), *self._surge.result()
+        return tuple(sorted(changes, key=lambda change: change.at_secs))
 
 
 class ChangeTest:
@@ -152,12 +152,8 @@ class ChangeTest:
     def __init__(
         self, equation: Equation, count: int, *, min_relative_change: float = MIN_RELATIVE_CHANGE
     ) -> None:
-        self._equation, self._count, self._min_relative_change, self._seen = (
-            equation,
-            count,
-            min_relative_change,
-            0,
-        )
+        self._equation, self._count, self._row_count = equation, count, 0
+        self._min_relative_change = min_relative_change
         self._size = max(1, equation.overlap // BLOCKS_PER_BUMP, -(-count // MAX_BLOCKS))
         blocks, p = -(-count // self._size), len(equation.names)
         self._factors = np.zeros((blocks, p, p + 1))
@@ -166,9 +162,9 @@ class ChangeTest:
 
     def add(self, rows: Rows) -> None:
         """Add the next rows."""
-        every = np.column_stack((rows.regressors, rows.target, rows.excitation))
-        _add_to_blocks(self._factors, self._tallies, every, self._seen, self._size)
-        self._seen += len(every)
+        columns = np.column_stack((rows.regressors, rows.target, rows.excitation))
+        _add_to_blocks(self._factors, self._tallies, columns, self._row_count, self._size)
+        self._row_count += len(columns)
         self._min_excitation = rows.min_excitation
 
     def result(self) -> tuple[Change, ...]:
@@ -178,30 +174,30 @@ class ChangeTest:
             return ()
         last, guard_blocks = len(blocks.moments), blocks.guard_blocks
         at = _find_blocks(blocks, 0, last, MAX_SPLIT_DEPTH)
-        found: list[Change] = []
+        changes: list[Change] = []
         for before, after in zip(
             [-guard_blocks, *at], [*at[1:], last + guard_blocks], strict=False
         ):
             part = blocks.part(before + guard_blocks, after - guard_blocks)  # between other changes
             fit = detect_change(part)
-            found += _significant_changes(part, fit) if fit else []
-        return tuple(found)
+            changes += _significant_changes(part, fit) if fit else []
+        return tuple(changes)
 
     def _blocks(self) -> Blocks | None:
         """Return the blocks, without regressors that are zero in all rows; None if all are zero."""
         upper = self._factors[:, :, :-1].transpose(0, 2, 1)
         grams, moments = upper @ self._factors[:, :, :-1], upper @ self._factors[:, :, -1:]
         sizes = np.sqrt(np.einsum("kii->i", grams))
-        kept = sizes > 0
-        if not kept.any():
+        is_used = sizes > 0
+        if not is_used.any():
             return None
-        every, units = self._equation.names, sizes[kept]
+        names, units = self._equation.names, sizes[is_used]
         starts = np.minimum(np.arange(len(grams) + 1) * self._size, self._count) - 0.5
         blocks = Blocks(
-            tuple(name for name, there in zip(every, kept, strict=True) if there),
+            tuple(name for name, used in zip(names, is_used, strict=True) if used),
             units,
-            grams[:, kept][:, :, kept] / np.outer(units, units),
-            moments[:, kept, 0] / units,
+            grams[:, is_used][:, :, is_used] / np.outer(units, units),
+            moments[:, is_used, 0] / units,
             self._tallies,
             self._equation.bump_secs / 2 + starts * self._equation.stride_secs,
             self._equation,
@@ -272,9 +268,9 @@ def _change(blocks: Blocks, fit: ChangePointFit, c: int, alternatives: tuple[str
     j = len(blocks.names) + c
     before, difference = fit.values[i], fit.values[j]
     share, of_before, of_difference = difference / before, *fit.influences[:, [i, j]].T
-    every = of_before, of_before + of_difference, (of_difference - share * of_before) / before
+    influences = of_before, of_before + of_difference, (of_difference - share * of_before) / before
     stds = np.sqrt(
-        fit.variance_factor * bartlett_variances(np.column_stack(every), blocks.overlap_blocks)
+        fit.variance_factor * bartlett_variances(np.column_stack(influences), blocks.overlap_blocks)
     )
     is_determined = abs(before) > 2 * stds[0]
     return Change(
@@ -300,12 +296,12 @@ def _alternatives(blocks: Blocks, fit: ChangePointFit) -> tuple[str, ...]:
 
     These are significant alone, and with them the change of the fit is not.
     """
-    found = []
+    changes = []
     for i, name in enumerate(blocks.names):
         if name not in COEFFICIENT_UNITS or i in fit.columns:
             continue
         alone, both = fit_change(blocks, (i,)), fit_change(blocks, (i, *fit.columns))
         is_doubtful = both is None or both.p_values[-1] > SIGNIFICANCE_LEVEL
         if alone is not None and is_significant(blocks, alone) and is_doubtful:
-            found.append(name)
-    return tuple(found)
+            changes.append(name)
+    return tuple(changes)
