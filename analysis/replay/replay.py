@@ -11,7 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.disturbance.observer import Disturbance, DisturbanceSummary, ForceObserver
+from analysis.disturbance.observer import (
+    Disturbance,
+    DisturbanceSummary,
+    ForceObserver,
+    force_models,
+)
 from analysis.filters.base import OUTPUT_STATES, Estimates, Filter, FilterKind
 from analysis.filters.factory import smoothable
 from analysis.filters.smoother import Adjoint, SmoothingPass, smoothed
@@ -352,6 +357,8 @@ def _estimators(plan: Plan, log_name: str) -> tuple[Filter, ForceObserver]:
     """Design the filter and the observer; for a model that diverges neither may exist."""
     model, noise, stats = plan.vessel.paper_coefficients, plan.noise, plan.stats
     settings = plan.disturbance_settings
+    # an invalid setting stays a UsageError that names it; only the model can diverge
+    force_models(settings, settings.wave_frequency, stats)
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             filter_ = plan.filter_kind.make(model, noise, stats, plan.vessel.filter)

@@ -595,3 +595,11 @@ def test_plan_findings_chunk_and_analysis_can_be_pickled_and_copied(
     assert isinstance(plan, Plan)
     replay = Replay(zigzag_log, plan)
     assert_same(flat(concatenate(list(replay.chunks()))), flat(chunk))
+
+
+def test_a_disturbance_setting_too_high_for_the_samples_stays_a_usage_error(
+    zigzag_log: TrialLog,
+) -> None:
+    expected = r"disturbance\.yaw_frequency of 400 rad/s is too high .* lower it below 100"
+    with pytest.raises(UsageError, match=expected):
+        analyse(zigzag_log, settings={"disturbance.yaw_frequency": 400.0})
