@@ -1,4 +1,4 @@
-"""Trials of a ship that changes on her way: one set of coefficients, then another."""
+"""Simulated trials of a ship whose coefficients change during the trial."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
 from shiplog.vessel.ship import ship_from_vessel
 
-RATE_HZ = 10.0  # of the grid, and the fastest a sensor may be
+RATE_HZ = 10.0  # of the integration, and the highest rate of a sensor
 START_NS = 1_767_225_600 * 10**9
 
 
@@ -30,9 +30,9 @@ def changed_trial(
     seed: int = 0,
     vessel_toml: str | None = None,
 ) -> TrialLog:
-    """A trial in which coefficients become `factors` times what they were, at `at_secs`.
+    """Simulate a trial in which coefficients are multiplied by `factors` from `at_secs` on.
 
-    The noise is drawn for itself: it is not that of `simulate` with the same seed.
+    The noise differs from that of `simulate` with the same seed.
     """
     rng = np.random.default_rng(seed)
     ordered = manoeuvre(manoeuvre_name, duration_secs, vessel.approach_rpm, rng)
@@ -76,7 +76,7 @@ def _sail(
     rudder_rate: float,
     times: FloatArray,
 ) -> FloatArray:
-    """Rows of a `Trajectory`, one an instant of `times`; a zig-zag turns the rudder at one."""
+    """Return rows of a `Trajectory`, one per instant; a zig-zag reverses its rudder at one."""
     start, angle, limit = zigzag
     rows = np.zeros((len(times), 14))
     work = np.empty((3, len(state)))
@@ -94,10 +94,15 @@ def _sail(
         turn = min(max(aim - delta, -rudder_rate * h), rudder_rate * h)
         acting = Excitation(delta, turn / h, orders[at, 2], 0.0, 0.0, 0.0, 0.0)
         rows[k, 0] = t
-        rows[k, 1:7] = state
-        rows[k, 7:14] = acting
-        state[:] = runge_kutta_step(
+        # element by element: Numba compiles the assignment of a slice much more slowly
+        for i in range(6):
+            rows[k, 1 + i] = state[i]
+        for i in range(7):
+            rows[k, 7 + i] = acting[i]
+        after_step = runge_kutta_step(
             before if t < change else after, constants, state, acting, t, h, work
         )
+        for i in range(len(state)):
+            state[i] = after_step[i]
         delta += turn
     return rows

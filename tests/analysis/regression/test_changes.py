@@ -24,7 +24,7 @@ from analysis.report.replay_tables import replay_markdown, replay_tables
 from analysis.view.replay_panels import history_panels
 from analysis.view.series_builder import SeriesBuilder
 from benchmarks.changed_ship import changed_trial
-from benchmarks.changes import Case, halfway, told, unchanged
+from benchmarks.changes import Case, halfway, reported_changes, unchanged
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import Gust, RandomForcing
@@ -44,7 +44,7 @@ def test_no_change_is_reported_where_nothing_changed(
     for noise in ("paper", "white"):
         case = Case(vessel, guessed, manoeuvre, noise)
         for secs in (600.0, 1200.0):
-            assert told(unchanged(case, secs, seed=1), case) == ()
+            assert reported_changes(unchanged(case, secs, seed=1), case) == ()
 
 
 @pytest.mark.parametrize("name", ["d", "f", "b2"])
@@ -55,7 +55,7 @@ def test_a_change_by_a_fifth_is_detected_with_its_instant_and_size(
 ) -> None:
     case = Case("table1", guessed, manoeuvre, "white")
     for seed, factor in enumerate((0.8, 1.2)):
-        changes = told(halfway(case, name, factor, seed), case)
+        changes = reported_changes(halfway(case, name, factor, seed), case)
         (found,) = [change for change in changes if change.name == name]
         assert abs(found.at_secs - 600) < 100
         assert abs(found.relative_change - (factor - 1)) < max(
@@ -71,7 +71,7 @@ def test_random_forcing_is_not_a_change(vessel: Vessel) -> None:
             vessel, "zigzag-20-20", duration_secs=1200.0, seed=seed, sensors=suite("paper"),
             random_forcing=RandomForcing(np.radians(0.2), 0.005),
         )  # fmt: skip
-        assert told(TrialLog("random_forcing", trial.channels), ZIGZAG) == ()
+        assert reported_changes(TrialLog("random_forcing", trial.channels), ZIGZAG) == ()
 
 
 def test_the_onset_of_a_steady_moment_is_not_a_change(vessel: Vessel) -> None:
@@ -81,7 +81,7 @@ def test_the_onset_of_a_steady_moment_is_not_a_change(vessel: Vessel) -> None:
             vessel, "zigzag-20-20", duration_secs=1200.0, seed=seed, sensors=suite("paper"),
             gusts=gusts,
         )  # fmt: skip
-        assert told(TrialLog("gust", trial.channels), ZIGZAG) == ()
+        assert reported_changes(TrialLog("gust", trial.channels), ZIGZAG) == ()
 
 
 def test_two_coefficients_that_change_together_are_both_reported(vessel: Vessel) -> None:
@@ -89,7 +89,9 @@ def test_two_coefficients_that_change_together_are_both_reported(vessel: Vessel)
         vessel, "pseudo-random", {"a": 1.2, "d": 0.8}, at_secs=700.0, duration_secs=1500.0,
         sensors=suite("white"), seed=1,
     )  # fmt: skip
-    changes = {change.name: change for change in told(log, replace(ZIGZAG, noise="white"))}
+    changes = {
+        change.name: change for change in reported_changes(log, replace(ZIGZAG, noise="white"))
+    }
     assert set(changes) == {"a", "d"}
     assert changes["a"].relative_change == pytest.approx(0.2, abs=0.02)
     assert changes["d"].relative_change == pytest.approx(-0.2, abs=0.02)
@@ -98,7 +100,7 @@ def test_two_coefficients_that_change_together_are_both_reported(vessel: Vessel)
 def test_alternatives_of_a_change_are_reported() -> None:
     """In a 10/10 zig-zag the magnitude of the yaw rate is constant: f and h are equivalent."""
     case = replace(ZIGZAG, manoeuvre="zigzag-10-10")
-    (found,) = told(halfway(case, "f", 0.8, seed=0), case)
+    (found,) = reported_changes(halfway(case, "f", 0.8, seed=0), case)
     assert "f" in (found.name, *found.alternatives)
     assert found.alternatives
     assert str(found).startswith(" or ".join((found.name, *found.alternatives)) + " changed ")
@@ -223,6 +225,6 @@ def test_a_ship_test_equals_the_tests_of_its_two_equations(vessel: Vessel) -> No
     signals = resample(log, channels=CHANNELS)
     yaw, surge = weak_form(signals, vessel.coefficients)
     found = detected_changes(with_constant(yaw)) + detected_changes(surge)
-    assert found == told(log, ZIGZAG)
+    assert found == reported_changes(log, ZIGZAG)
     equations = WeakForm(SPEED_PROPORTIONAL_RUDDER, len(signals), signals.dt_secs, (1, 1, 1, 1))
     assert ShipChangeTest(equations, model_is_fitted=True).result() == ()
