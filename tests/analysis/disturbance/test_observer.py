@@ -588,7 +588,11 @@ def slowly(stats: SignalStats, interval: float) -> SignalStats:
             None,
             "surge_frequency of 8 rad/s is too high for samples every 2 s; lower it below 5",
         ),
-        ({"yaw_frequency": 1e-9}, None, "poles are so slow for the samples .*; take faster ones"),
+        (
+            {"yaw_frequency": 1e-9},
+            None,
+            "poles are too slow for the sampling .*; choose faster poles",
+        ),
     ],
 )
 def test_what_cannot_be_observed_is_refused_in_one_line(
