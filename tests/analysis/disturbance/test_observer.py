@@ -1,3 +1,5 @@
+import copy
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -47,11 +49,11 @@ def observed(vessel: Vessel, manoeuvre: str, noise: str, gusts: tuple[Gust, ...]
     sensors = suite(noise, {k.replace("__", "."): v for k, v in settings.items()})
     trial = simulate(vessel, manoeuvre, duration_secs=600.0, seed=5, sensors=sensors, gusts=gusts)
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
-    noise_found = noise_of(
+    noise_model = noise_of(
         signal_stats(signals, vessel.coefficients), vessel.coefficients, vessel.filter
     )
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
-    found, summaries = observe_disturbance(signals, vessel.coefficients, noise_found)
+    found, summaries = observe_disturbance(signals, vessel.coefficients, noise_model)
     return signals, found, summaries, truth
 
 
@@ -73,7 +75,7 @@ def test_a_gust_comes_and_goes(vessel: Vessel) -> None:
     assert np.mean(found.yaw[5000:]) == pytest.approx(0, abs=0.05 * size)
 
 
-def test_without_disturbance_what_is_seen_is_the_sensors_noise(vessel: Vessel) -> None:
+def test_without_a_disturbance_the_estimate_is_the_sensors_noise(vessel: Vessel) -> None:
     _, found, summaries, _ = observed(vessel, "zigzag-20-20", "white", ())
     assert np.std(found.yaw[1500:]) == pytest.approx(summaries["yaw"].noise_std, rel=0.4)
     assert np.std(found.surge[3000:]) == pytest.approx(summaries["surge"].noise_std, rel=0.6)
@@ -97,7 +99,7 @@ def test_where_nothing_is_measured_the_disturbance_is_held(vessel: Vessel) -> No
     assert np.ptp(found.yaw[4000:4300]) == 0
 
 
-def test_the_moment_is_told_as_the_rudder_that_would_do_the_same(vessel: Vessel) -> None:
+def test_the_moment_is_converted_to_the_rudder_of_the_same_effect(vessel: Vessel) -> None:
     straight = (Gust(STEP, 100.0),)
     _, found, *_ = observed(vessel, "turning-circle-1", "white", straight)
     # at the approach speed two degrees, and little else while the ship goes nearly straight
@@ -109,7 +111,7 @@ def test_a_force_is_found_in_surge(vessel: Vessel) -> None:
     trial = simulate(vessel, "zigzag-20-20", duration_secs=900.0, sensors=suite("white"))
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
     noise = noise_of(signal_stats(signals, c), c, vessel.filter)
-    # a model that believes in 2 % more thrust sees the ship held back by that much
+    # a model with 2 % more thrust estimates a force that holds the ship back by that much
     found, _ = observe_disturbance(signals, c._replace(h=1.02 * c.h), noise)
     assert np.mean(found.surge[6000:]) == pytest.approx(-0.02 * c.h * 80, rel=0.1)
 
@@ -135,7 +137,7 @@ def sailed(
     stds: tuple[float, float] = (0.0, 0.0),
     rudder: float = radians(10),
 ) -> Signals:
-    """The ship as the paper writes her down, pushed, her rudder swinging; integrated by scipy."""
+    """Integrate the paper's model with scipy, with disturbances and an oscillating rudder."""
 
     def steering(t: float) -> tuple[float, float]:
         turn = 2 * pi / 120
@@ -162,7 +164,7 @@ def sailed(
     return Signals(0, dt, values)
 
 
-def asked(*models: str, **other: object) -> DisturbanceSettings:
+def chosen_models(*models: str, **other: object) -> DisturbanceSettings:
     return DisturbanceSettings(models, **other)
 
 
@@ -181,10 +183,10 @@ def test_a_ramp_is_found_and_a_constant_lags_behind_it(vessel: Vessel, spectrum:
     signals = sailed(vessel.coefficients, *push, secs=900.0)
     last, noise = slice(8000, None), quiet()
     ramp, _ = observe_disturbance(
-        signals, vessel.coefficients, noise, asked("ramp", spectrum=spectrum)
+        signals, vessel.coefficients, noise, chosen_models("ramp", spectrum=spectrum)
     )
     constant, _ = observe_disturbance(
-        signals, vessel.coefficients, noise, asked("constant", spectrum=spectrum)
+        signals, vessel.coefficients, noise, chosen_models("constant", spectrum=spectrum)
     )
     times = signals.time_secs[last] - 100.0
     assert ramp.yaw[last] == pytest.approx(slope * times, rel=0.01)
@@ -205,14 +207,14 @@ def test_a_ramp_of_many_small_gusts_is_found_under_white_noise(vessel: Vessel) -
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
     c = vessel.coefficients
     found, summaries = observe_disturbance(
-        signals, c, noise_of(signal_stats(signals, c), c, vessel.filter), asked("ramp")
+        signals, c, noise_of(signal_stats(signals, c), c, vessel.filter), chosen_models("ramp")
     )
     up = slice(2800, 4000)
     assert np.std(found.yaw[up] - truth[up]) < 2 * summaries["yaw"].noise_std + 0.05 * truth[-1]
     assert np.mean(found.yaw[5800:]) == pytest.approx(truth[-1], rel=0.1)
 
 
-WAVE = radians(0.15) * OMEGA**2  # rad/s^3: yaws her by 0.15 deg/s
+WAVE = radians(0.15) * OMEGA**2  # rad/s^3: a yaw rate of 0.15 deg/s
 SURGING = 0.05  # m/s^2
 
 
@@ -236,7 +238,7 @@ def test_a_wave_is_found_in_amplitude_and_phase(vessel: Vessel, models: tuple[st
     stds = radians(0.005), 0.02
     signals = sailed(vessel.coefficients, wave, surging, secs=1000.0, stds=stds)
     found, summaries = observe_disturbance(
-        signals, vessel.coefficients, quiet(stds), asked(*models), OMEGA
+        signals, vessel.coefficients, quiet(stds), chosen_models(*models), OMEGA
     )
     settled = slice(5000, None)
     times = signals.time_secs[settled]
@@ -247,8 +249,8 @@ def test_a_wave_is_found_in_amplitude_and_phase(vessel: Vessel, models: tuple[st
         turning, _ = phasor(seen[settled], times)
         assert abs(turning) == pytest.approx(amplitude, rel=0.03)
         assert np.angle(turning) == pytest.approx(phase, abs=0.03)
-        off = seen[settled] - amplitude * np.sin(OMEGA * times + phase)
-        assert np.std(off) < 0.03 * amplitude + 1.5 * summaries[name].noise_std
+        residual = seen[settled] - amplitude * np.sin(OMEGA * times + phase)
+        assert np.std(residual) < 0.03 * amplitude + 1.5 * summaries[name].noise_std
         assert summaries[name].amplitude == pytest.approx(amplitude, rel=0.03)
         assert summaries[name].unit == DISTURBANCE_UNITS[name][0]
 
@@ -256,7 +258,7 @@ def test_a_wave_is_found_in_amplitude_and_phase(vessel: Vessel, models: tuple[st
 def test_on_a_clock_of_one_second_a_wave_is_found_as_well(vessel: Vessel) -> None:
     signals = sailed(vessel.coefficients, wave, surging, secs=1000.0, dt=1.0)
     found, _ = observe_disturbance(
-        signals, vessel.coefficients, quiet(), asked("constant", "wave"), OMEGA
+        signals, vessel.coefficients, quiet(), chosen_models("constant", "wave"), OMEGA
     )
     times = signals.time_secs[500:]
     yaw, surge = (phasor(seen[500:], times)[0] for seen in (found.yaw_wave, found.surge_wave))
@@ -265,26 +267,26 @@ def test_on_a_clock_of_one_second_a_wave_is_found_as_well(vessel: Vessel) -> Non
 
 
 @pytest.mark.parametrize("models", [("constant", "wave"), ("ramp", "wave")], ids="+".join)
-def test_step_and_wave_are_told_apart(vessel: Vessel, models: tuple[str, ...]) -> None:
+def test_step_and_wave_are_separated(vessel: Vessel, models: tuple[str, ...]) -> None:
     step = 1e-6
     stds = radians(0.005), 0.02
     signals = sailed(
         vessel.coefficients, lambda t: step * (t >= 500) + wave(t), surging, secs=1000.0, stds=stds
     )
     found, summaries = observe_disturbance(
-        signals, vessel.coefficients, quiet(stds), asked(*models), OMEGA
+        signals, vessel.coefficients, quiet(stds), chosen_models(*models), OMEGA
     )
     before, after = slice(4500, 4990), slice(7000, None)
     assert np.max(np.abs(found.yaw[before])) < 0.1 * step
     assert np.mean(found.yaw[after]) == pytest.approx(step, rel=0.05)
     assert np.std(found.yaw[after]) < 2 * summaries["yaw"].noise_std
     assert np.mean(found.yaw_wave[after]) == pytest.approx(0, abs=0.01 * WAVE)
-    # without a wave in the exosystem it is taken for the moment itself
+    # without a wave in the exosystem the wave appears in the moment itself
     alone, _ = observe_disturbance(signals, vessel.coefficients, quiet(stds))
     assert np.std(alone.yaw[after]) > 0.3 * step
 
 
-def test_a_simulated_log_with_gust_and_wave_tells_both(vessel: Vessel) -> None:
+def test_gust_and_wave_of_a_simulated_log_are_both_estimated(vessel: Vessel) -> None:
     c = vessel.coefficients
     trial = simulate(
         vessel,
@@ -297,7 +299,7 @@ def test_a_simulated_log_with_gust_and_wave_tells_both(vessel: Vessel) -> None:
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
     noise = noise_of(signal_stats(signals, c), c, vessel.filter)
-    found, _ = observe_disturbance(signals, c, noise, asked("constant", "wave"), OMEGA)
+    found, _ = observe_disturbance(signals, c, noise, chosen_models("constant", "wave"), OMEGA)
     settled = slice(4000, None)
     _, size = phasor(truth[settled], signals.time_secs[settled])
     assert np.mean(found.yaw[settled]) == pytest.approx(size, rel=0.05)
@@ -308,7 +310,7 @@ def test_a_simulated_log_with_gust_and_wave_tells_both(vessel: Vessel) -> None:
 def test_the_amplitude_is_found_within_a_minute(vessel: Vessel) -> None:
     signals = sailed(vessel.coefficients, lambda t: wave(t) * (t >= 100), stds=(radians(0.005), 0))
     found, _ = observe_disturbance(
-        signals, vessel.coefficients, quiet(), asked("constant", "wave"), OMEGA
+        signals, vessel.coefficients, quiet(), chosen_models("constant", "wave"), OMEGA
     )
     period = round(2 * pi / OMEGA / 0.1)
     tops = [np.ptp(found.yaw_wave[k : k + period]) / 2 for k in range(1500, 5500, period)]
@@ -316,14 +318,14 @@ def test_the_amplitude_is_found_within_a_minute(vessel: Vessel) -> None:
 
 
 @pytest.mark.parametrize("models", SUBSETS, ids="+".join)
-def test_what_noise_leaves_in_each_part_is_what_is_said(
+def test_the_error_due_to_noise_in_each_part_is_the_one_reported(
     vessel: Vessel, models: tuple[str, ...]
 ) -> None:
-    # hardly turning, she is as linear as the observer was designed for
+    # a ship that hardly turns is as linear as the observer assumes
     stds = radians(0.02), 0.1
     signals = sailed(vessel.coefficients, secs=4000.0, stds=stds, rudder=radians(0.1))
     found, summaries = observe_disturbance(
-        signals, vessel.coefficients, quiet(stds), asked(*models), OMEGA
+        signals, vessel.coefficients, quiet(stds), chosen_models(*models), OMEGA
     )
     for name, summary in summaries.items():
         seen = getattr(found, name)[6000:]
@@ -333,14 +335,14 @@ def test_what_noise_leaves_in_each_part_is_what_is_said(
         else:
             assert np.std(seen) == pytest.approx(summary.noise_std, rel=0.35)
             if name.endswith("wave"):
-                assert summary.amplitude < np.std(seen)  # of noise there is no wave
+                assert summary.amplitude < np.std(seen)  # noise has no wave
 
 
 def test_the_std_of_a_wave_is_that_of_its_amplitude(vessel: Vessel) -> None:
     stds = radians(0.02), 0.1
     signals = sailed(vessel.coefficients, wave, secs=4000.0, stds=stds, rudder=radians(0.1))
     found, summaries = observe_disturbance(
-        signals, vessel.coefficients, quiet(stds), asked("constant", "wave"), OMEGA
+        signals, vessel.coefficients, quiet(stds), chosen_models("constant", "wave"), OMEGA
     )
     period = round(2 * pi / OMEGA / 0.1)
     cut = found.yaw_wave[6000:]
@@ -353,22 +355,22 @@ def test_the_std_of_a_wave_is_that_of_its_amplitude(vessel: Vessel) -> None:
     assert np.std(amplitudes) == pytest.approx(summaries["yaw_wave"].noise_std, rel=0.35)
 
 
-def test_waves_that_shake_a_nonlinear_ship_do_not_lose_the_observer(vessel: Vessel) -> None:
+def test_the_observer_does_not_diverge_in_waves_on_a_nonlinear_ship(vessel: Vessel) -> None:
     size = radians(0.15)  # of 1 rad/s: they begin at once, and the estimate swings out far
     signals = sailed(
         vessel.coefficients, lambda t: size * np.sin(t) * (t >= 100), rudder=radians(35)
     )
     found, _ = observe_disturbance(
-        signals, vessel.coefficients, quiet(), asked("ramp", "wave"), 1.0
+        signals, vessel.coefficients, quiet(), chosen_models("ramp", "wave"), 1.0
     )
     assert np.std(found.yaw[4500:]) < 1e-6
     times = signals.time_secs[4500:]
     assert found.yaw_wave[4500:] == pytest.approx(size * np.sin(times), abs=0.03 * size)
 
 
-def poles_at(c: Coefficients, observing: ForceObserver, w: float, every: int) -> np.ndarray:
+def poles_at(c: Coefficients, observer: ForceObserver, w: float, every: int) -> np.ndarray:
     """Poles of yaw's error at a yaw rate, from differences of the loop itself, 1/s."""
-    state, dt = observing._state, 0.1
+    state, dt = observer._state, 0.1
 
     def after(x: np.ndarray) -> np.ndarray:
         start = state._replace(w=x[0], w_dot=x[1], moment=x[2:].copy())
@@ -376,7 +378,7 @@ def poles_at(c: Coefficients, observing: ForceObserver, w: float, every: int) ->
         measured[0] = w
         still = np.zeros(every + 1)
         _, end = observe_chunk(
-            c, observing._observer, start, measured, np.full(every, np.nan), still, still, dt
+            c, observer._observer, start, measured, np.full(every, np.nan), still, still, dt
         )
         return np.array([end.w, end.w_dot, *end.moment])
 
@@ -399,10 +401,10 @@ def test_in_a_turn_the_poles_stay_where_they_were_placed(
     values = dict(signals.values)
     values["yaw_rate"] = np.where(np.arange(len(signals)) % every, np.nan, values["yaw_rate"])
     stats = signal_stats(replace(signals, values=values), c)
-    observing = ForceObserver(c, quiet(), stats, asked(*models), OMEGA)
-    as_designed = np.sort(poles_at(c, observing, stats.yaw_rate_rms, every).real)
+    observer = ForceObserver(c, quiet(), stats, chosen_models(*models), OMEGA)
+    as_designed = np.sort(poles_at(c, observer, stats.yaw_rate_rms, every).real)
     for turning in (0.0, 0.5, 1.0):
-        found = np.sort(poles_at(c, observing, radians(turning), every).real)
+        found = np.sort(poles_at(c, observer, radians(turning), every).real)
         exact = "wave" in models
         slack = 0.003 if exact else 0.2 * every**0.5 * 0.05
         assert found == pytest.approx(as_designed, rel=0.06, abs=slack), turning
@@ -421,12 +423,12 @@ def gapped(signals: Signals, name: str, gap: slice) -> Signals:
 @pytest.mark.parametrize(
     ("part", "sensor", "memory"), [("yaw", "yaw_rate", 20.0), ("surge", "speed", 50.0)]
 )
-def test_a_ramp_goes_on_for_the_observers_memory_and_is_then_held(
+def test_a_ramp_continues_for_the_observers_memory_and_is_then_held(
     vessel: Vessel, part: str, sensor: str, memory: float
 ) -> None:
     push = ramp_moment(50.0, 2e-9), ramp_moment(50.0, 2e-5)
     signals = gapped(sailed(vessel.coefficients, *push), sensor, slice(4000, 5000))
-    found, _ = observe_disturbance(signals, vessel.coefficients, quiet(), asked("ramp"))
+    found, _ = observe_disturbance(signals, vessel.coefficients, quiet(), chosen_models("ramp"))
     seen = getattr(found, part)[3999:5000]
     steps, last = np.diff(seen), round(memory / 0.1)
     assert steps[:last] == pytest.approx(np.full(last, steps[0]), rel=1e-6)
@@ -437,9 +439,11 @@ def test_a_ramp_goes_on_for_the_observers_memory_and_is_then_held(
 @pytest.mark.parametrize(
     "models", [("wave",), ("constant", "wave"), ("ramp", "wave")], ids="+".join
 )
-def test_without_samples_a_wave_turns_on(vessel: Vessel, models: tuple[str, ...]) -> None:
+def test_without_samples_a_wave_continues(vessel: Vessel, models: tuple[str, ...]) -> None:
     signals = gapped(sailed(vessel.coefficients, wave, surging), "yaw_rate", slice(4000, 5000))
-    found, _ = observe_disturbance(signals, vessel.coefficients, quiet(), asked(*models), OMEGA)
+    found, _ = observe_disturbance(
+        signals, vessel.coefficients, quiet(), chosen_models(*models), OMEGA
+    )
     times, seen = signals.time_secs[4000:5000], found.yaw_wave[4000:5000]
     turning, _ = phasor(seen, times)
     assert abs(turning) == pytest.approx(WAVE, rel=0.02)
@@ -466,30 +470,30 @@ def broken(vessel: Vessel) -> Signals:
 def in_chunks(
     signals: Signals, cuts: list[int], make: Callable[[], ForceObserver]
 ) -> tuple[dict[str, np.ndarray], dict]:
-    observing, edges, found = make(), [0, *sorted(cuts), len(signals)], []
+    observer, edges, found = make(), [0, *sorted(cuts), len(signals)], []
     for start, stop in pairwise(edges):
         if stop > start:
             after = min(stop, len(signals) - 1)
             following = {name: float(signals[name][after]) for name in ("rudder", "rpm")}
-            found.append(observing.step(signals.part(start, stop), following))
+            found.append(observer.step(signals.part(start, stop), following))
     arrays = {
         part: np.concatenate([getattr(chunk, part) for chunk in found])
         for part in PARTS
         if getattr(found[0], part) is not None
     }
-    return arrays, observing.result()
+    return arrays, observer.result()
 
 
 @pytest.mark.parametrize("models", SUBSETS, ids="+".join)
 @settings(derandomize=True, max_examples=15, deadline=None)
 @given(cuts=st.lists(st.integers(0, 3000), max_size=12))
-def test_where_a_log_is_cut_changes_no_bit(
+def test_where_a_log_is_cut_does_not_change_a_bit(
     vessel: Vessel, broken: Signals, models: tuple[str, ...], cuts: list[int]
 ) -> None:
     stats = signal_stats(broken, vessel.coefficients)
 
     def make() -> ForceObserver:
-        return ForceObserver(vessel.coefficients, quiet(), stats, asked(*models), OMEGA)
+        return ForceObserver(vessel.coefficients, quiet(), stats, chosen_models(*models), OMEGA)
 
     (whole, summaries), (parts, part_summaries) = (
         in_chunks(broken, [], make),
@@ -501,14 +505,16 @@ def test_where_a_log_is_cut_changes_no_bit(
     assert summaries == part_summaries
 
 
-# ---- what is asked for
+# ---- settings
 
 
 @pytest.mark.parametrize("models", SUBSETS, ids="+".join)
-def test_only_what_was_asked_for_is_there(vessel: Vessel, models: tuple[str, ...]) -> None:
+def test_only_the_disturbances_requested_are_estimated(
+    vessel: Vessel, models: tuple[str, ...]
+) -> None:
     signals = sailed(vessel.coefficients, wave, surging, secs=100.0)
     found, summaries = observe_disturbance(
-        signals, vessel.coefficients, quiet(), asked(*models), OMEGA
+        signals, vessel.coefficients, quiet(), chosen_models(*models), OMEGA
     )
     waves = "wave" in models
     assert (found.yaw_wave is not None) == (found.surge_wave is not None) == waves
@@ -528,24 +534,28 @@ def test_the_union_of_the_models_is_observed(vessel: Vessel) -> None:
     signals = sailed(vessel.coefficients, wave, secs=100.0)
 
     def seen(*models: str) -> Disturbance:
-        return observe_disturbance(signals, vessel.coefficients, quiet(), asked(*models), OMEGA)[0]
+        return observe_disturbance(
+            signals, vessel.coefficients, quiet(), chosen_models(*models), OMEGA
+        )[0]
 
     assert np.array_equal(seen("ramp").yaw, seen("constant", "ramp").yaw)
     assert np.array_equal(seen("ramp", "wave").yaw_wave, seen(*DISTURBANCES).yaw_wave)
     assert np.array_equal(seen("constant", "constant").yaw, seen("constant").yaw)
 
 
-def test_a_frequency_of_no_wave_is_not_looked_at(vessel: Vessel) -> None:
+def test_the_frequency_is_ignored_without_a_wave(vessel: Vessel) -> None:
     signals = sailed(vessel.coefficients, secs=100.0)
-    found, _ = observe_disturbance(signals, vessel.coefficients, quiet(), asked("constant"), 1e9)
+    found, _ = observe_disturbance(
+        signals, vessel.coefficients, quiet(), chosen_models("constant"), 1e9
+    )
     assert found.yaw_wave is None
 
 
-def test_an_observer_that_lost_the_ship_says_nothing(vessel: Vessel) -> None:
+def test_an_observer_that_diverges_returns_nan(vessel: Vessel) -> None:
     signals = sailed(vessel.coefficients, secs=300.0)
     c = vessel.coefficients._replace(h=-10 * vessel.coefficients.h)  # backwards, hard
     found, summaries = observe_disturbance(
-        signals, c, quiet(), asked("constant", yaw_frequency=1e-4, surge_frequency=1e-4)
+        signals, c, quiet(), chosen_models("constant", yaw_frequency=1e-4, surge_frequency=1e-4)
     )
     assert np.isnan(found.surge[-1])
     assert np.nanmax(np.abs(found.surge)) < 1e6
@@ -557,7 +567,7 @@ def slowly(stats: SignalStats, interval: float) -> SignalStats:
 
 
 @pytest.mark.parametrize(
-    ("change", "frequency", "said"),
+    ("change", "frequency", "message"),
     [
         ({"models": ()}, None, r"disturbance.models must be a list of some of constant, ramp, wa"),
         ({"models": ("tide",)}, None, r"disturbance.models must be .* got \('tide',\)"),
@@ -591,20 +601,20 @@ def slowly(stats: SignalStats, interval: float) -> SignalStats:
         (
             {"yaw_frequency": 1e-9},
             None,
-            "poles are too slow for the sampling .*; choose faster poles",
+            "poles are too slow for the sampling interval .*; choose faster poles",
         ),
     ],
 )
-def test_what_cannot_be_observed_is_refused_in_one_line(
-    vessel: Vessel, change: dict, frequency: float | None, said: str
+def test_what_cannot_be_estimated_is_rejected_in_one_line(
+    vessel: Vessel, change: dict, frequency: float | None, message: str
 ) -> None:
     stats = slowly(signal_stats(sailed(vessel.coefficients, secs=60.0), vessel.coefficients), 2.0)
-    with pytest.raises(UsageError, match=said) as raised:
+    with pytest.raises(UsageError, match=message) as raised:
         ForceObserver(vessel.coefficients, quiet(), stats, DisturbanceSettings(**change), frequency)
     assert "\n" not in str(raised.value)
 
 
-def test_a_model_that_is_not_finite_is_refused(vessel: Vessel) -> None:
+def test_a_model_that_is_not_finite_is_rejected(vessel: Vessel) -> None:
     stats = signal_stats(sailed(vessel.coefficients, secs=60.0), vessel.coefficients)
     with pytest.raises(UsageError, match="NaN or infinities"):
         ForceObserver(vessel.coefficients._replace(a=np.nan), quiet(), stats)
@@ -633,25 +643,25 @@ def test_every_log_is_observed_by_every_model(path: Path) -> None:
     chunks = list(held_throughout(resample_chunks(log.chunks(), plan.clock), holding))
     for models in SUBSETS:
         for spectrum in ("butterworth", "binomial"):
-            observing = ForceObserver(
+            observer = ForceObserver(
                 plan.vessel.coefficients,
                 plan.noise,
                 plan.stats,
-                asked(*models, spectrum=spectrum),
+                chosen_models(*models, spectrum=spectrum),
                 OMEGA if "wave" in models else None,
             )
             for _, held, following in chunks:
-                found = observing.step(held, following)
+                found = observer.step(held, following)
                 for part in ("yaw", "surge", "yaw_wave", "surge_wave"):
                     if getattr(found, part) is not None:
                         assert np.isfinite(getattr(found, part)).all(), (models, spectrum, part)
-            for summary in observing.result().values():
+            for summary in observer.result().values():
                 assert np.isfinite(
                     [summary.mean, summary.rms, summary.at_end, summary.noise_std]
                 ).all()
 
 
-def test_a_wave_too_quick_for_one_sensor_is_left_out_of_that_alone(vessel: Vessel) -> None:
+def test_a_wave_too_fast_for_one_sensor_is_estimated_in_the_other_alone(vessel: Vessel) -> None:
     trial = simulate(
         vessel, "zigzag-20-20", duration_secs=300.0, sensors=suite("white", {"speed.rate_hz": 0.2})
     )
@@ -661,3 +671,12 @@ def test_a_wave_too_quick_for_one_sensor_is_left_out_of_that_alone(vessel: Vesse
     assert found.disturbance.surge_wave is None
     assert "surge_wave" not in found.findings.disturbances
     assert any("no wave is estimated in surge" in text for text in found.findings.warnings)
+
+
+def test_summaries_survive_pickling_and_deepcopy(vessel: Vessel) -> None:
+    signals = sailed(vessel.coefficients, wave, secs=100.0)
+    chosen = chosen_models("constant", "wave")
+    _, summaries = observe_disturbance(signals, vessel.coefficients, quiet(), chosen, OMEGA)
+    pickled = pickle.loads(pickle.dumps(summaries))  # noqa: S301 - our own bytes
+    assert pickled == summaries
+    assert copy.deepcopy(summaries) == summaries

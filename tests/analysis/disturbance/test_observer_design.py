@@ -19,7 +19,7 @@ EVERY = [
     for spectrum in ("butterworth", "binomial")
     if degree is not None or wave is not None
 ]
-FINE = 1e-4  # s: between samples that near, what is discrete is continuous to four digits
+FINE = 1e-4  # s: at this interval the discrete gains equal the continuous ones to four digits
 
 
 def sampling(interval: float, dt: float | None = None) -> Sampling:
@@ -27,7 +27,7 @@ def sampling(interval: float, dt: float | None = None) -> Sampling:
 
 
 def exosystem(model: ForceModel) -> tuple[np.ndarray, np.ndarray]:
-    """Written down once more: A of slow part and wave, and what they add up to."""
+    """Return A of slow part and wave, and the row of their sum, independently of the design."""
     blocks, row = [], []
     if model.degree is not None:
         blocks.append(np.eye(model.degree + 1, k=1))
@@ -45,8 +45,8 @@ def augmented(plant: np.ndarray, model: ForceModel) -> np.ndarray:
     return A
 
 
-def kept(plant: np.ndarray, model: ForceModel, interval: float) -> np.ndarray:
-    """By what the error is multiplied from correction to correction."""
+def error_transition(plant: np.ndarray, model: ForceModel, interval: float) -> np.ndarray:
+    """Return the transition matrix of the error from correction to correction."""
     correction = force_observer(plant, model, sampling(interval)).force.correction
     A = augmented(plant, model)
     return (np.eye(len(A)) - np.outer(correction, np.eye(1, len(A)))) @ expm(A * interval)
@@ -55,20 +55,20 @@ def kept(plant: np.ndarray, model: ForceModel, interval: float) -> np.ndarray:
 @pytest.mark.parametrize("plant", [YAW, SURGE], ids=["yaw", "surge"])
 @pytest.mark.parametrize("model", EVERY)
 @pytest.mark.parametrize("interval", [0.1, 2.0])
-def test_plant_and_slow_part_have_the_spectrum_asked_for_and_the_wave_its_own_frequency(
+def test_plant_and_slow_part_have_the_spectrum_requested_and_the_wave_its_own_frequency(
     plant: np.ndarray, model: ForceModel, interval: float
 ) -> None:
     slow = 0 if model.degree is None else model.degree + 1
     poles = list(POLE_PATTERNS[model.spectrum](len(plant) + slow, 0.05))
     if model.wave is not None:
         poles += [-0.12 + 0.6j, -0.12 - 0.6j]
-    wanted = np.exp(np.array(poles) * interval)
-    assert polynomial_error(kept(plant, model, interval), wanted) < 1e-9
+    expected = np.exp(np.array(poles) * interval)
+    assert polynomial_error(error_transition(plant, model, interval), expected) < 1e-9
 
 
 def test_a_wave_decays_no_slower_than_the_slow_part() -> None:
     model = ForceModel(0, 0.15, "butterworth", 0.05)
-    found = np.log(np.linalg.eigvals(kept(YAW, model, 0.1))) / 0.1
+    found = np.log(np.linalg.eigvals(error_transition(YAW, model, 0.1))) / 0.1
     assert np.min(np.abs(found - (-0.05 + 0.15j))) < 1e-8
 
 
@@ -93,7 +93,7 @@ def test_the_roll_example(spectrum: str, gain: list[float]) -> None:
 )
 def test_the_errors_of_the_roll_example(secs: int, error: list[float]) -> None:
     inertia = 1000.0
-    step = kept(np.zeros((1, 1)), ForceModel(1, None, "butterworth", 0.05), FINE)
+    step = error_transition(np.zeros((1, 1)), ForceModel(1, None, "butterworth", 0.05), FINE)
     off = np.linalg.matrix_power(step, round(secs / FINE)) @ [0, 0.25 / inertia, 0.005 / inertia]
     assert off * [1, inertia, inertia] == pytest.approx(error, abs=3e-6)
 
@@ -110,8 +110,8 @@ def test_the_gains_of_yaw_with_a_ramp_and_a_wave(monkeypatch: pytest.MonkeyPatch
     poles = np.array([*POLE_PATTERNS["butterworth"](3, 0.1), *pair])
     monkeypatch.setattr("analysis.disturbance.observer_design._poles", lambda *_: poles)
     found = force_observer(NOMOTO, ForceModel(1, 0.6, "butterworth", 0.1), sampling(FINE))
-    wanted = [0.71568542, 0.01046024, 0.00044444, -0.07732315, -0.38629581]
-    assert found.force.correction / FINE == pytest.approx(wanted, rel=2e-3)
+    expected = [0.71568542, 0.01046024, 0.00044444, -0.07732315, -0.38629581]
+    assert found.force.correction / FINE == pytest.approx(expected, rel=2e-3)
 
 
 @pytest.mark.parametrize("model", EVERY)
@@ -126,7 +126,7 @@ def test_between_instants_the_force_moves_as_its_exosystem(model: ForceModel) ->
 
 
 @pytest.mark.parametrize("model", EVERY)
-def test_what_is_held_is_the_slow_part_alone(model: ForceModel) -> None:
+def test_only_the_slow_part_is_held(model: ForceModel) -> None:
     force = force_observer(YAW, model, sampling(1.0, 0.5)).force
     slow = 0 if model.degree is None else model.degree + 1
     assert force.motion[1][:slow].tolist() == np.eye(slow, len(force.mean[0])).tolist()
@@ -135,33 +135,35 @@ def test_what_is_held_is_the_slow_part_alone(model: ForceModel) -> None:
     assert force.mean[1][slow:].tolist() == force.mean[0][slow:].tolist()
 
 
-def test_it_is_held_after_the_observers_memory_or_the_longest_usual_interval() -> None:
+def test_the_slow_part_is_held_after_the_observers_memory_or_the_longest_interval() -> None:
     ramp = ForceModel(1, None, "butterworth", 0.05)
     for longest, patience in ((3.0, 20 / 0.5), (60.0, 60 / 0.5)):
         assert force_observer(YAW, ramp, Sampling(1.0, longest, 0.5)).force.patience == patience
 
 
 @pytest.mark.parametrize("model", EVERY)
-def test_the_error_that_noise_leaves_is_that_of_the_discrete_lyapunov_equation(
+def test_the_error_due_to_noise_is_that_of_the_discrete_lyapunov_equation(
     model: ForceModel,
 ) -> None:
     found = force_observer(YAW, model, sampling(1.0))
     M = found.force.correction[:, None]
-    P = control.dlyap(kept(YAW, model, 1.0), M @ M.T)
-    wanted = [np.sqrt(row @ P[2:, 2:] @ row) for row in found.force.parts]
-    assert found.stds == pytest.approx(wanted, rel=1e-6)
+    P = control.dlyap(error_transition(YAW, model, 1.0), M @ M.T)
+    expected = [np.sqrt(row @ P[2:, 2:] @ row) for row in found.force.parts]
+    assert found.stds == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("plant", [YAW, SURGE], ids=["yaw", "surge"])
 @pytest.mark.parametrize("model", EVERY)
-def test_the_transient_is_as_long_as_is_said(plant: np.ndarray, model: ForceModel) -> None:
+def test_the_transient_is_as_long_as_reported(plant: np.ndarray, model: ForceModel) -> None:
     if model.degree is None:
         return
     found, p = force_observer(plant, model, sampling(0.1)), len(plant)
-    step = kept(plant, model, 0.1)
-    off = np.linalg.matrix_power(step, round(found.settling_secs / 0.1)) @ np.eye(len(step))[p]
-    # the paper's time is a little short for the constant, of which by then an eighth may be left
-    assert abs(off[p]) < (0.13 if model.degree == 0 else 0.05)
+    step = error_transition(plant, model, 0.1)
+    remaining = (
+        np.linalg.matrix_power(step, round(found.settling_secs / 0.1)) @ np.eye(len(step))[p]
+    )
+    # the paper's time is a little short for a constant: the error may still be an eighth
+    assert abs(remaining[p]) < (0.13 if model.degree == 0 else 0.05)
 
 
 def designed(**change: object) -> ForceDesign:
@@ -169,12 +171,12 @@ def designed(**change: object) -> ForceDesign:
     return force_observer(YAW, ForceModel(**model), sampling(0.1))
 
 
-def test_what_cannot_be_designed_is_refused_in_one_line() -> None:
+def test_what_cannot_be_designed_is_rejected_in_one_line() -> None:
     with pytest.raises(
-        UsageError, match="poles are too slow for the sampling interval and lost in"
+        UsageError, match="poles are too slow for the sampling interval and lost in rounding"
     ):
         designed(frequency=1e-9)
     with pytest.raises(UsageError, match="cannot be seen"):
-        designed(wave=np.pi / 0.1)  # Nyquist's: of one state of the two no sample tells
+        designed(wave=np.pi / 0.1)  # Nyquist's: one of the two states is not observable
     with pytest.raises(UsageError, match=r"A, \(2, 2\), has NaN"):
         force_observer(YAW * np.nan, EVERY[0], sampling(0.1))
