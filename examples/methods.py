@@ -20,7 +20,7 @@ from scipy.stats import chi2
 from analysis.design.discrete import discretise
 from analysis.design.shaping import wave_filter
 from analysis.filters.base import STATES
-from analysis.filters.wave_fit import Wave
+from analysis.filters.noise_model import Wave
 from analysis.replay.plan import Plan, plan_replay
 from analysis.replay.replay import Findings, Replay, ReplayChunk
 from analysis.signals.concat import concatenate
@@ -649,7 +649,7 @@ def kvlcc2_disturbances(runs: Sequence[Replays]) -> None:
         settings = {"disturbance.models": models}
         summaries = [run.series_and_findings(settings)[1].disturbances for run in runs]
         yaw = np.median([degrees(summary["rudder"].rms) for summary in summaries])
-        yaw_std = np.median([degrees(summary["rudder"].std) for summary in summaries])
+        yaw_std = np.median([degrees(summary["rudder"].noise_std) for summary in summaries])
         surge = np.median([summary["surge"].rms for summary in summaries]) * 1e3
         cells = [number(float(value), 3) for value in (yaw, yaw_std, surge)]
         rows.append((", ".join(models), *cells))

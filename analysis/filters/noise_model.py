@@ -1,10 +1,48 @@
 """The noise that a filter assumes."""
 
 from dataclasses import dataclass
+from math import inf
 
 from shiplog.types import FloatArray
 
-from .wave_fit import Wave
+MIN_CONTRAST = 1.5  # standard errors
+
+
+@dataclass(frozen=True)
+class Wave:
+    """The shaping filter of a wave in the yaw rate, and the evidence for it.
+
+    Attributes
+    ----------
+    frequency
+        Natural frequency, rad/s.
+    damping
+        Damping ratio.
+    std
+        Standard deviation of the wave, rad/s.
+    evidence
+        Twice the log likelihood ratio of the spectrum with the wave to that without it.
+    needed
+        The evidence that noise alone reaches in at most one log of a hundred.
+    contrast
+        Height of the spectrum above its neighbourhood, in standard errors.
+    """
+
+    frequency: float
+    damping: float
+    std: float
+    evidence: float
+    needed: float = 0.0
+    contrast: float = inf
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether there is a wave: the spectrum is likelier with it and has a peak there.
+
+        The likelihood alone also increases for the low-pass of a sensor or a steep red part, which
+        the background model does not contain; neither is higher in its middle than on both sides.
+        """
+        return self.evidence > self.needed and self.contrast > MIN_CONTRAST
 
 
 @dataclass(frozen=True, eq=False)

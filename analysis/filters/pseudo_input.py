@@ -24,7 +24,7 @@ from shiplog.types import FloatArray, Signals
 from shiplog.vessel.settings import FilterSettings
 
 from .base import NOISE_SETTINGS, OUTPUT_STATES, STATES, Estimates, FilterKind, Trace
-from .kernels import ACCEPTED, REJECTED, correct, innovate, propagate
+from .kernels import ACCEPTED, REJECTED, copy_matrix, copy_vector, correct, innovate, propagate
 from .noise_model import NoiseModel
 
 
@@ -191,11 +191,13 @@ def _filter(
             K = Pc / S
             correct(x, P, K, Pc, innovation, S)
             if keep:
-                Ks[k, output], es[k, output], Ss[k, output] = K, innovation, S
+                copy_vector(Ks[k, output], K)
+                es[k, output], Ss[k, output] = innovation, S
         for i in range(size):
             rows[k, i], rows[k, size + i] = x[i], max(P[i, i], 0.0)
         if keep:
-            xs[k], Ps[k] = x, P
+            copy_vector(xs[k], x)
+            copy_matrix(Ps[k], P)
         _predict(c, x, delta[k], delta_dot, n[k], n_dot, dt)
         propagate(P, F, Q, FP)
     return rows, innovations, gated, (xs, Ps, Ks, es, Ss)

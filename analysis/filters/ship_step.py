@@ -18,7 +18,7 @@ from shiplog.types import FloatArray
 
 
 @compiled
-def predict(
+def predict_ship(
     c: Coefficients,
     x: FloatArray,
     F: FloatArray,

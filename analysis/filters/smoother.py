@@ -24,7 +24,7 @@ from shiplog.compiled import compiled
 from shiplog.types import FloatArray, Signals
 
 from .base import Estimates, SmoothableFilter, Trace
-from .kernels import propagate
+from .kernels import copy_matrix, copy_vector, propagate
 
 MIN_VARIANCE_SHARE = 1e-9  # of a smoothed variance in the filtered: below it is rounding
 
@@ -172,7 +172,8 @@ def _backward(
         _multiply_transposed(F[k], slope, row)
         propagate(curvature, F[k].T, zero, work)
         _multiply(transition, F[k], work)
-        slopes[k], curvatures[k] = slope, curvature
+        copy_vector(slopes[k], slope)
+        copy_matrix(curvatures[k], curvature)
         for output in range(1, -1, -1):
             if np.any(K[k, output] != 0.0):
                 _before_correction(
@@ -190,7 +191,7 @@ def _multiply_transposed(F: FloatArray, slope: FloatArray, work: FloatArray) -> 
         work[i] = 0.0
         for j in range(size):
             work[i] += F[j, i] * slope[j]
-    slope[:] = work
+    copy_vector(slope, work)
 
 
 @compiled
@@ -202,7 +203,7 @@ def _multiply(transition: FloatArray, F: FloatArray, work: FloatArray) -> None:
             work[i, j] = 0.0
             for m in range(size):
                 work[i, j] += transition[i, m] * F[m, j]
-    transition[:] = work
+    copy_matrix(transition, work)
 
 
 @compiled
@@ -251,7 +252,7 @@ def _smoothed(
     states, covariances = np.empty_like(x), np.empty_like(P)
     work, zero = np.empty((size, size)), np.zeros((size, size))
     for k in range(len(x)):
-        covariances[k] = curvatures[k]
+        copy_matrix(covariances[k], curvatures[k])
         propagate(covariances[k], P[k], zero, work)
         for i in range(size):
             states[k, i] = x[k, i]

@@ -41,9 +41,9 @@ from .gains import (
     relinearised_gain,
     stated_poles,
 )
-from .kernels import ACCEPTED, REJECTED, correct, innovate, propagate
+from .kernels import ACCEPTED, REJECTED, copy_matrix, copy_vector, correct, innovate, propagate
 from .noise_model import NoiseModel
-from .ship_step import linearise, output_row, output_rows, predict
+from .ship_step import linearise, output_row, output_rows, predict_ship
 
 OPTIMAL, CONSTANT, RELINEARISED = range(3)  # kinds of gain
 _STATES = 3  # w, w' and v; those of a wave follow
@@ -297,7 +297,7 @@ def _filter(
     Ks, es, Ss = np.zeros((kept, 2, size)), np.zeros((kept, 2)), np.ones((kept, 2))
     F, FP, Pc = np.zeros((size, size)), np.empty((size, size)), np.empty(size)
     J = np.zeros((3, 3))
-    F[3:, 3:] = wave
+    copy_matrix(F[3:, 3:], wave)
     for k in range(count):
         delta_dot, n_dot = (delta[k + 1] - delta[k]) / dt, (n[k + 1] - n[k]) / dt
         for output in range(2):
@@ -314,14 +314,15 @@ def _filter(
             K = _gain(correction, Pc, S, J, output, ages)
             correct(x, P, K, Pc, innovation, S)
             if keep:
-                Ks[k, output], es[k, output], Ss[k, output] = K, innovation, S
-        xs[k] = x
+                copy_vector(Ks[k, output], K)
+                es[k, output], Ss[k, output] = innovation, S
+        copy_vector(xs[k], x)
         output_row(c, x, P, delta[k], delta_dot, n[k], rows[k])
         if keep:
-            Ps[k] = P
-        predict(c, x, F, delta[k], delta_dot, n[k], n_dot, dt)
+            copy_matrix(Ps[k], P)
+        predict_ship(c, x, F, delta[k], delta_dot, n[k], n_dot, dt)
         if keep:
-            Fs[k] = F
+            copy_matrix(Fs[k], F)
         propagate(P, F, Q, FP)
     return xs, rows, innovations, gated, (Ps, Fs, Ks, es, Ss)
 

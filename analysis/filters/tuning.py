@@ -11,9 +11,8 @@ from shiplog.vessel.settings import FilterSettings
 
 from .base import Estimates, FilterKind
 from .factory import filter_kind
-from .noise_model import NoiseModel
+from .noise_model import NoiseModel, Wave
 from .three_state import EXTENDED
-from .wave_fit import Wave, fit_wave
 
 PAPER_RATIO = 0.01 / 400  # Burylin's Q over his R, 1/s²; no filter trusts its model more by default
 MAX_RATIO = 1e8  # 1/s²; above it the estimate is the measurement itself
@@ -178,6 +177,8 @@ def _fitted_wave(
     ungated = replace(settings, gate=OPEN_GATE)
     innovations = _filter_head(stats, model, noise, ungated, kind).innovations[:, 0]
     std = MAD_TO_STD * float(np.nanmedian(np.abs(innovations)))
+    from .wave_fit import fit_wave  # noqa: PLC0415 - scipy.fft takes long to import
+
     return fit_wave(
         np.where(np.abs(innovations) <= SPIKE_STDS * std, innovations, np.nan),
         stats.dt_secs,

@@ -12,7 +12,6 @@ Guillaumin, Lilly and Early, "The debiased Whittle likelihood", 2019; Guillaumin
 and Simons, "The debiased spatial Whittle likelihood", 2022, of what is missing.
 """
 
-from dataclasses import dataclass
 from math import exp, inf, log, nan, pi, sqrt
 
 import numpy as np
@@ -22,6 +21,7 @@ from analysis.design.matrices import as_number
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
+from .noise_model import Wave
 from .whittle import (
     DAMPING,
     FREQUENCY,
@@ -48,29 +48,7 @@ ENOUGH = 1e-3  # of the log likelihood: a step that gains and promises less is t
 # what is said of it
 LEAST_DECAY = 0.5  # ζ ω0 times a segment: a wave that fades more slowly shows no fading
 FALSE_CLAIMS = 0.01  # the share of logs without a wave that may claim one
-LEAST_CONTRAST = 1.5  # standard errors
 PEAK_ORDINATES = 5.0  # at the least, in a peak and in its flanks: fewer scatter too much
-
-
-@dataclass(frozen=True)
-class Wave:
-    """The shaping filter of a wave in the yaw rate, and what speaks for there being one."""
-
-    frequency: float  # rad/s
-    damping: float
-    std: float  # rad/s
-    evidence: float  # 2 log likelihood ratio of the spectrum with the wave against the one without
-    needed: float = 0.0  # what evidence noise alone reaches in one log of 100 at the most
-    contrast: float = inf  # by how much the spectrum is higher than beside it, standard errors
-
-    @property
-    def stands_out(self) -> bool:
-        """Whether there is a wave: it is likelier than none, and a peak.
-
-        Likelier alone is also what a sensor's low-pass or a steep red part makes it, for which the
-        background has no room; but neither is higher in its middle than on either side.
-        """
-        return self.evidence > self.needed and self.contrast > LEAST_CONTRAST
 
 
 def fit_wave(

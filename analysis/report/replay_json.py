@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from analysis.disturbance.observer import DisturbanceSummary
-from analysis.filters.wave_fit import Wave
+from analysis.filters.noise_model import Wave
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit
 from analysis.replay.replay import Findings

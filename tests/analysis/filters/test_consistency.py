@@ -21,8 +21,7 @@ from filter_runs import (
 from gaussian import band, draws, normalised_squared
 
 from analysis.filters.factory import make_filter
-from analysis.filters.noise_model import NoiseModel
-from analysis.filters.wave_fit import Wave
+from analysis.filters.noise_model import NoiseModel, Wave
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import Vessel

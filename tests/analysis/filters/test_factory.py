@@ -11,8 +11,7 @@ from trial_logs import InChunks, as_log
 from analysis.filters.base import Estimates, Filter
 from analysis.filters.factory import filter_states, make_filter
 from analysis.filters.kernels import MAX_REJECTED_IN_A_ROW
-from analysis.filters.noise_model import NoiseModel
-from analysis.filters.wave_fit import Wave
+from analysis.filters.noise_model import NoiseModel, Wave
 from analysis.signals.hold import InputHold, held_throughout, last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from recorders.simulated.sensors import suite

@@ -7,8 +7,7 @@ from gaussian import held
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 
 from analysis.filters.gains import LinearAxis, linear_axes, relinearised_gain
-from analysis.filters.noise_model import NoiseModel
-from analysis.filters.wave_fit import Wave
+from analysis.filters.noise_model import NoiseModel, Wave
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import UsageError, Vessel
 from shiplog.compiled import compiled

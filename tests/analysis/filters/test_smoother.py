@@ -20,9 +20,8 @@ from gaussian import apart
 
 from analysis.filters.base import Filter, Trace
 from analysis.filters.factory import filter_states, make_filter
-from analysis.filters.noise_model import NoiseModel
+from analysis.filters.noise_model import NoiseModel, Wave
 from analysis.filters.smoother import SmoothingPass, smooth, smoothed
-from analysis.filters.wave_fit import Wave
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import signal_stats
 from recorders.simulated.sensors import suite

@@ -20,10 +20,9 @@ from scipy.integrate import solve_ivp
 
 from analysis.filters.factory import filter_states, make_filter
 from analysis.filters.gains import linear_axes
-from analysis.filters.noise_model import NoiseModel
-from analysis.filters.ship_step import output_row, predict
+from analysis.filters.noise_model import NoiseModel, Wave
+from analysis.filters.ship_step import output_row, predict_ship
 from analysis.filters.tuning import noise_of
-from analysis.filters.wave_fit import Wave
 from analysis.replay.residuals import assess_innovations
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
@@ -73,7 +72,7 @@ def drawn(rng: np.random.Generator) -> tuple[np.ndarray, float, float, float, fl
 
 def step(c: Coefficients, x: np.ndarray, u: tuple[float, ...], dt: float) -> np.ndarray:
     moved = x.copy()
-    predict(c, moved, np.zeros((len(x), len(x))), *u, dt)
+    predict_ship(c, moved, np.zeros((len(x), len(x))), *u, dt)
     return moved
 
 
@@ -96,7 +95,7 @@ def test_the_transition_is_the_derivative_of_the_step(vessel: Vessel, seed: int)
     c, dt = vessel.coefficients, 0.7
     x, *u = drawn(np.random.default_rng(seed))
     F = np.zeros((3, 3))
-    predict(c, x.copy(), F, *u, dt)
+    predict_ship(c, x.copy(), F, *u, dt)
     for j, h in enumerate((1e-6, 1e-6, 1e-4)):
         off = h * np.eye(3)[j]
         slope = (step(c, x + off, u, dt) - step(c, x - off, u, dt)) / (2 * h)

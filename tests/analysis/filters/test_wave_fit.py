@@ -9,7 +9,8 @@ from scipy.signal import butter, freqs, lfilter, sosfilt, tf2ss, welch
 from scipy.stats import gamma
 
 from analysis.design.shaping import wave_filter
-from analysis.filters.wave_fit import LEAST_CONTRAST, Wave, _likeliest, fit_wave
+from analysis.filters.noise_model import MIN_CONTRAST, Wave
+from analysis.filters.wave_fit import _likeliest, fit_wave
 from analysis.filters.whittle import Spectrum, mean_periodogram, spectrum_of, unlikelihood
 from shiplog import UsageError
 from shiplog.types import FloatArray
@@ -336,7 +337,7 @@ def test_a_wave_stands_out_where_it_is_likely_and_a_peak() -> None:
     assert Wave(0.6, 0.1, 2e-4, evidence=1.0).stands_out
     assert not Wave(0.6, 0.1, 2e-4, evidence=20.0, needed=21.0).stands_out
     assert not Wave(0.6, 0.1, 2e-4, evidence=22.0, needed=21.0, contrast=1.0).stands_out
-    assert Wave(0.6, 0.1, 2e-4, 22.0, 21.0, LEAST_CONTRAST + 0.1).stands_out
+    assert Wave(0.6, 0.1, 2e-4, 22.0, 21.0, MIN_CONTRAST + 0.1).stands_out
 
 
 # ---- the likelihood
