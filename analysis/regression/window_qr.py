@@ -241,7 +241,8 @@ def _push_rows(
     """Add rows (m, p + 1), overwritten, with tallies (m, 3); write the windows that end in them."""
     length, p, _ = state.suffixes.shape
     factors, others = np.zeros((p, p + 1, BATCH_SIZE)), np.empty((p, p + 1, BATCH_SIZE))
-    first, waiting = np.int64(0), np.int64(0)  # a literal 0 would compile `solve_batch` once more
+    zero: int = np.int64(0)  # type: ignore[assignment] # a literal compiles `solve_batch` again
+    first, waiting = zero, zero
     for t in range(len(rows)):
         index = state.row_count[0] % length
         if index == 0 and state.row_count[0] > 0:
@@ -267,7 +268,7 @@ def _push_rows(
         if waiting == BATCH_SIZE or t + 1 == len(rows):
             merge_factors(factors, others, waiting)
             solve_batch(factors, waiting, first, windows.solutions)
-            first, waiting = first + waiting, np.int64(0)
+            first, waiting = first + waiting, zero
 
 
 @compiled
