@@ -18,7 +18,7 @@ GROUP = "shiplog.recorders"
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
-    """Add a subcommand for each source; one that cannot be loaded says so when it is used."""
+    """Add a subcommand for each source; one that cannot be loaded reports it when used."""
     sources = parser.add_subparsers(metavar="SOURCE", required=True)
     for name in extension_names(GROUP):
         try:

@@ -1,7 +1,7 @@
 """Periodogram of a residual, and Whittle's likelihood of white noise, red noise and a wave.
 
-Whittle's likelihood, of the mean that the periodogram has whatever is missing: the transform of the
-autocovariance times the taper's own. Sources: as in `wave_fit`.
+The mean of the periodogram is exact, whichever samples are missing: the transform of the
+autocovariance times that of the taper. Sources: see `wave_fit`.
 """
 
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ from scipy.fft import dct, irfft, next_fast_len, rfft
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray
 
-HIGHEST_SHARE = 0.9  # of half the sensor's rate
-BEGIN = 0.7  # of the lowest frequency: where the spectrum is fitted from
-CYCLES = 6.0  # of the lowest frequency in a segment: the taper blurs two ordinates to either side
-SEGMENT = 16_384  # instants: in most logs more than is needed to resolve a wave
-TAPERED = 0.2  # the share of a segment that a cosine fades out; it costs a ninth of what is known
-FEWEST = 100  # measurements
-FEWEST_ORDINATES = 32
-ROUNDING = 1e-12  # of the largest value: a residual that changes by less is constant
+MAX_BAND_SHARE = 0.9  # of half the sampling rate
+BAND_START_SHARE = 0.7  # of the lowest frequency: the lower end of the band that is fitted
+MIN_CYCLES_PER_SEGMENT = 6.0  # the taper blurs two ordinates to either side
+SEGMENT_SAMPLES = 16_384  # enough to resolve a wave in most logs
+TAPER_SHARE = 0.2  # of a segment, cosine; it costs a ninth of the information
+MIN_SAMPLES = 100
+MIN_ORDINATES = 32
+MIN_RELATIVE_VARIATION = 1e-12  # of the largest value: below, a residual is constant
 
 # the logarithms that are fitted; powers in units of the mean ordinate of the band
 WHITE, RED, RATE, POWER, FREQUENCY, DAMPING = range(6)
@@ -28,64 +28,64 @@ WHITE, RED, RATE, POWER, FREQUENCY, DAMPING = range(6)
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """The periodogram, averaged over segments, up to half the sensor's rate; and how it was made.
+    """Periodogram averaged over segments, up to half the sampling rate, and how it was computed.
 
-    In units of its mean over the band in which it is fitted, which begins at ordinate `first`.
+    Its unit is its mean over the fitted band, which begins at ordinate `first`.
     """
 
     omega: FloatArray  # (k,) rad/s
     power: FloatArray  # (k,)
     unit: float  # rad^2/s^2: white noise of this variance has that mean
     first: int
-    searched: tuple[float, float]  # rad/s, from where to where a wave may be
-    overlap: FloatArray  # (length,) of the tapers with themselves, by lag; the middle one twice
-    half: int  # of the transform's length
+    searched: tuple[float, float]  # rad/s, limits of the search for a wave
+    overlap: FloatArray  # (length,) autocorrelation of the tapers; the middle lag counts twice
+    half: int  # half the length of the transform
     dt_secs: float
-    weight: float  # how many independent ordinates one counts for
+    weight: float  # independent ordinates per ordinate
 
     @property
     def fitted(self) -> FloatArray:
-        """The ordinates of the band."""
+        """Ordinates of the fitted band."""
         return self.power[self.first :]
 
     @property
     def begin(self) -> float:
-        """Of the band, rad/s."""
+        """Lower end of the band, rad/s."""
         return float(self.omega[self.first])
 
     @property
     def end(self) -> float:
-        """Of the band, rad/s."""
+        """Upper end of the band, rad/s."""
         return float(self.omega[-1])
 
     @property
     def resolution(self) -> float:
-        """From ordinate to ordinate, rad/s."""
+        """Distance of the ordinates, rad/s."""
         return float(self.omega[1])
 
 
 def spectrum_of(
     residual: FloatArray, dt_secs: float, half_rate: float, lowest: float, frequency: float | None
 ) -> Spectrum | None:
-    """None where it would tell nothing."""
+    """Compute the spectrum of a residual (n,), rad/s; None where it is too short or constant."""
     at = np.flatnonzero(np.isfinite(residual))
-    if len(at) < FEWEST:
+    if len(at) < MIN_SAMPLES:
         return None
     values, taper = _segments(residual[at[0] : at[-1] + 1])
     length = taper.shape[1]
-    slowest = CYCLES * 2 * pi / (length * dt_secs)
-    lowest, highest = max(lowest, slowest), HIGHEST_SHARE * half_rate
+    slowest = MIN_CYCLES_PER_SEGMENT * 2 * pi / (length * dt_secs)
+    lowest, highest = max(lowest, slowest), MAX_BAND_SHARE * half_rate
     searched = (lowest, highest) if frequency is None else (frequency, frequency)
     half = next_fast_len(length // 2 + 1, real=True)
     omega = pi / (half * dt_secs) * np.arange(half)
     omega = omega[: np.searchsorted(omega, half_rate)]
-    first = int(np.searchsorted(omega, BEGIN * min(lowest, searched[0])))
-    if searched[0] < slowest or searched[1] < searched[0] or len(omega) - first < FEWEST_ORDINATES:
+    first = int(np.searchsorted(omega, BAND_START_SHARE * min(lowest, searched[0])))
+    if searched[0] < slowest or searched[1] < searched[0] or len(omega) - first < MIN_ORDINATES:
         return None
     energy = float(np.sum(taper**2))
     power = _squared(values * taper, 2 * half)[: len(omega)] / energy
     unit = float(np.mean(power[first:]))
-    if unit <= ROUNDING**2 * float(np.max(residual[at] ** 2)):
+    if unit <= MIN_RELATIVE_VARIATION**2 * float(np.max(residual[at] ** 2)):
         return None
     double = next_fast_len(2 * length, real=True)
     overlap = irfft(_squared(taper, double), double)[:length] / energy
@@ -99,14 +99,14 @@ def spectrum_of(
 
 def _segments(residual: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Of equal length (s, length), zero where nothing was measured, and their tapers."""
-    count = ceil(len(residual) / SEGMENT)
+    count = ceil(len(residual) / SEGMENT_SAMPLES)
     length = ceil(len(residual) / count)
     values = np.full((count, length), nan)
     values.flat[: len(residual)] = residual - np.mean(residual[np.isfinite(residual)])
     known = np.isfinite(values)
     from scipy.signal.windows import tukey  # noqa: PLC0415 - scipy.signal takes long to import
 
-    return np.where(known, values, 0.0), tukey(length, TAPERED) * known
+    return np.where(known, values, 0.0), tukey(length, TAPER_SHARE) * known
 
 
 def _squared(rows: FloatArray, size: int) -> FloatArray:
@@ -114,29 +114,31 @@ def _squared(rows: FloatArray, size: int) -> FloatArray:
     return np.asarray(np.sum(np.abs(rfft(rows, size)) ** 2, axis=0))
 
 
-def unlikelihood(seen: Spectrum, theta: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+def negative_log_likelihood(
+    spectrum: Spectrum, theta: FloatArray
+) -> tuple[float, FloatArray, FloatArray]:
     """Minus Whittle's log likelihood, its slope (6,) and Fisher's information (6, 6)."""
     slope, information = np.zeros(6), np.zeros((6, 6))
-    value = _whittle(seen.fitted, np.exp(theta), _shapes(seen, theta), slope, information)
-    return seen.weight * value, seen.weight * slope, seen.weight * information
+    value = _whittle(spectrum.fitted, np.exp(theta), _shapes(spectrum, theta), slope, information)
+    return spectrum.weight * value, spectrum.weight * slope, spectrum.weight * information
 
 
-def mean_periodogram(seen: Spectrum, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+def mean_periodogram(spectrum: Spectrum, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The mean periodogram (k,) of white noise and red part, and that of the wave."""
-    shapes = _shapes(seen, theta)
+    shapes = _shapes(spectrum, theta)
     white, red, power = np.exp(theta[[WHITE, RED, POWER]])
     return white + red * shapes[0], power * shapes[2]
 
 
-def _shapes(seen: Spectrum, theta: FloatArray) -> FloatArray:
+def _shapes(spectrum: Spectrum, theta: FloatArray) -> FloatArray:
     """The mean periodogram (5, k) of a red part of unit variance and its slope in its rate.
 
     And that of a wave of unit variance, and its slopes in frequency and damping.
     """
-    folded = np.zeros((5, seen.half + 1))
+    folded = np.zeros((5, spectrum.half + 1))
     rate, frequency, damping = np.exp(theta[[RATE, FREQUENCY, DAMPING]])
-    _folded(seen.overlap, seen.dt_secs, rate, frequency, damping, folded)
-    return np.asarray(dct(folded, type=1, axis=1)[:, seen.first : len(seen.omega)])
+    _folded(spectrum.overlap, spectrum.dt_secs, rate, frequency, damping, folded)
+    return np.asarray(dct(folded, type=1, axis=1)[:, spectrum.first : len(spectrum.omega)])
 
 
 @compiled

@@ -2,8 +2,8 @@
 
 For every run, the likelihood ratio compares the parameters of all runs with the run's own. Twice
 its logarithm is a chi-squared variable with p degrees of freedom where the model is true and the
-ship the same. A run that says little about the parameters contributes little, whatever its own
-estimates are.
+ship the same. A run with little information about the parameters contributes little, whatever
+its own estimates are.
 
 References
 ----------

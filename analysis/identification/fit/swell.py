@@ -10,7 +10,7 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
-MIN_CYCLES = 4.0  # in a segment: slower waves cannot be told from other slow errors
+MIN_CYCLES = 4.0  # in a segment: slower waves cannot be distinguished from other slow errors
 MIN_PERIOD_SECS = 2.0  # faster waves do not disturb a fit
 OVERSAMPLING = 4  # frequencies for each one that the segment's length resolves
 MIN_SLOW_SHARE = 0.5  # of an output's slow variance that the wave has to explain

@@ -11,7 +11,12 @@ from scipy.stats import gamma
 from analysis.design.shaping import wave_filter
 from analysis.filters.noise_model import MIN_CONTRAST, Wave
 from analysis.filters.wave_fit import _likeliest, fit_wave
-from analysis.filters.whittle import Spectrum, mean_periodogram, spectrum_of, unlikelihood
+from analysis.filters.whittle import (
+    Spectrum,
+    mean_periodogram,
+    negative_log_likelihood,
+    spectrum_of,
+)
 from shiplog import UsageError
 from shiplog.types import FloatArray
 
@@ -140,10 +145,10 @@ def test_the_fitted_filter_has_the_spectrum_that_welch_sees() -> None:
     residual = at_sea(3, 8000.0, dt, *true)
     found = fitted(residual, dt)
     shaping = wave_filter(found.std**2, found.frequency, found.damping)
-    hertz, seen = welch(residual, 1 / dt, nperseg=2048)
+    hertz, spectrum = welch(residual, 1 / dt, nperseg=2048)
     kept = (hertz > 0.04) & (hertz < 1.0)  # |H|^2 is not aliased there
     _, H = freqs(shaping.numerator, shaping.denominator, 2 * pi * hertz[kept])
-    ratio = seen[kept] / (2 * (np.abs(H) ** 2 + dt))
+    ratio = spectrum[kept] / (2 * (np.abs(H) ** 2 + dt))
     assert [np.mean(part) for part in np.array_split(ratio, 8)] == pytest.approx([1] * 8, abs=0.1)
 
 
@@ -185,9 +190,9 @@ def slowly(residual: FloatArray) -> FloatArray:
     """Every fifth instant, give or take one."""
     at = np.arange(5, len(residual) - 5, 5)
     at += np.random.default_rng(0).integers(-1, 2, len(at))
-    seen = np.full(len(residual), np.nan)
-    seen[at] = residual[at]
-    return seen
+    spectrum = np.full(len(residual), np.nan)
+    spectrum[at] = residual[at]
+    return spectrum
 
 
 @pytest.mark.parametrize(("sensor", "interval"), [(with_gaps, 1.0), (slowly, 5.0)])
@@ -344,13 +349,13 @@ def test_a_wave_stands_out_where_it_is_likely_and_a_peak() -> None:
 
 
 def seen_of(residual: FloatArray, dt: float) -> Spectrum:
-    seen = spectrum_of(residual, dt, pi / dt, 0.25, None)
-    assert seen is not None
-    return seen
+    spectrum = spectrum_of(residual, dt, pi / dt, 0.25, None)
+    assert spectrum is not None
+    return spectrum
 
 
 def brute_means(
-    residual: FloatArray, dt: float, seen: Spectrum, covariances: list[FloatArray]
+    residual: FloatArray, dt: float, spectrum: Spectrum, covariances: list[FloatArray]
 ) -> list[FloatArray]:
     """E |sum w x e^-iωt|^2 / sum w^2 as a double sum over what was measured."""
     n = len(residual)
@@ -358,7 +363,7 @@ def brute_means(
     edge = np.minimum(k, 1 - k) / 0.1
     taper = np.where(edge < 1, 0.5 - 0.5 * np.cos(pi * edge), 1.0) * np.isfinite(residual)
     lags = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
-    waves = taper * np.exp(-1j * np.outer(seen.omega[seen.first :], np.arange(n) * dt))
+    waves = taper * np.exp(-1j * np.outer(spectrum.omega[spectrum.first :], np.arange(n) * dt))
     return [
         np.einsum("kt,kt->k", waves @ covariance[lags], waves.conj()).real / np.sum(taper**2)
         for covariance in covariances
@@ -369,25 +374,28 @@ def test_the_mean_periodogram_is_the_double_sum_over_what_was_measured() -> None
     dt, (frequency, damping, std) = 0.5, (0.8, 0.15, 1.3)
     residual = with_gaps(at_sea(8, 200.0, dt, frequency, damping, std))
     residual[[0, -1]] = 1.0
-    seen = seen_of(residual, dt)
+    spectrum = seen_of(residual, dt)
     F, _, C, P = discrete(frequency, damping, std, dt)
     tau = np.arange(len(residual))
     wave = np.array([(C @ np.linalg.matrix_power(F, k) @ P @ C.T)[0, 0] for k in tau])
     red = 4.0 * np.exp(-0.2 * tau * dt)
     white = np.where(tau == 0, 0.7, 0.0)
     theta = np.log([0.7, 4.0, 0.2, std**2, frequency, damping])
-    background, of_wave = mean_periodogram(seen, theta)
-    expected = brute_means(residual, dt, seen, [red + white, wave])
+    background, of_wave = mean_periodogram(spectrum, theta)
+    expected = brute_means(residual, dt, spectrum, [red + white, wave])
     assert background == pytest.approx(expected[0], rel=1e-9)
     assert of_wave == pytest.approx(expected[1], rel=1e-9)
 
 
 def test_the_slope_of_the_likelihood_is_its_difference() -> None:
-    seen = seen_of(with_gaps(at_sea(9, 300.0, 0.5, 0.8, 0.15, 1.3)), 0.5)
+    spectrum = seen_of(with_gaps(at_sea(9, 300.0, 0.5, 0.8, 0.15, 1.3)), 0.5)
     theta = np.log([0.4, 0.3, 0.3, 0.7, 0.9, 0.2])
-    _, slope, _ = unlikelihood(seen, theta)
+    _, slope, _ = negative_log_likelihood(spectrum, theta)
     for i, step in enumerate(1e-5 * np.eye(6)):
-        above, below = unlikelihood(seen, theta + step)[0], unlikelihood(seen, theta - step)[0]
+        above, below = (
+            negative_log_likelihood(spectrum, theta + step)[0],
+            negative_log_likelihood(spectrum, theta - step)[0],
+        )
         assert slope[i] == pytest.approx((above - below) / 2e-5, rel=1e-6, abs=1e-6)
 
 
@@ -395,9 +403,9 @@ def test_the_slope_of_the_likelihood_is_its_difference() -> None:
 def test_no_grid_of_parameters_holds_a_likelier_wave(seed: int) -> None:
     dt = 0.5
     residual = at_sea(seed, 200.0, dt, 0.9, 0.1, 0.8)
-    seen = seen_of(residual, dt)
-    found, _ = _likeliest(seen, np.full(6, np.nan))
-    least = unlikelihood(seen, found)[0] / seen.weight
+    spectrum = seen_of(residual, dt)
+    found, _ = _likeliest(spectrum, np.full(6, np.nan))
+    least = negative_log_likelihood(spectrum, found)[0] / spectrum.weight
     tau = dt * np.arange(len(residual))
     red = np.exp(found[1] - np.exp(found[2]) * tau)
     for frequency in np.concatenate((np.geomspace(0.26, 5.6, 40), np.exp(found[4]) * SPREAD)):
@@ -408,25 +416,25 @@ def test_no_grid_of_parameters_holds_a_likelier_wave(seed: int) -> None:
             poles = frequency * (-damping + np.array([1j, -1j]) * np.sqrt(1 - damping**2))
             residues = poles / (poles - poles[::-1])  # of s / (s^2 + 2 ζ ω0 s + ω0^2)
             covariances.append(np.real(residues @ np.exp(np.outer(poles, tau))))
-        of_red, *waves = fast_means(seen, covariances)
+        of_red, *waves = fast_means(spectrum, covariances)
         for of_wave in waves:
             for white in np.exp(found[0]) * np.array([0.7, 0.9, 1.0, 1.1, 1.4]):
                 for power in np.exp(found[3]) * np.array([0.03, 0.1, 0.3, 0.7, 0.9, 1, 1.1, 1.5]):
                     mean = white + of_red + power * of_wave
-                    assert np.sum(seen.fitted / mean + np.log(mean)) > least - 1e-3
+                    assert np.sum(spectrum.fitted / mean + np.log(mean)) > least - 1e-3
 
 
 SPREAD = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
 
 
-def fast_means(seen: Spectrum, covariances: list[FloatArray]) -> list[FloatArray]:
+def fast_means(spectrum: Spectrum, covariances: list[FloatArray]) -> list[FloatArray]:
     """As `brute_means` of what has no gaps, lag by lag."""
-    n = len(seen.overlap)
-    overlap = seen.overlap.copy()
-    overlap[seen.half] /= 2
+    n = len(spectrum.overlap)
+    overlap = spectrum.overlap.copy()
+    overlap[spectrum.half] /= 2
     overlap[1:] *= 2
-    tau = seen.dt_secs * np.arange(n)
-    cosines = np.cos(np.outer(seen.omega[seen.first :], tau))
+    tau = spectrum.dt_secs * np.arange(n)
+    cosines = np.cos(np.outer(spectrum.omega[spectrum.first :], tau))
     return [cosines @ (overlap * covariance) for covariance in covariances]
 
 
@@ -474,7 +482,7 @@ def test_a_short_log_is_searched_above_six_periods_of_its_length() -> None:
         ({"std": 0.0}, "the wave's std is 0"),
         ({"damping": np.inf}, "the wave's damping, .* infinities"),
         ({"damping": 1.2}, "the wave's damping is 1.2; expected one of at most 1"),
-        ({"frequency": 4.0, "interval": 10.0}, "sample every 1 s shows none beyond 3.14"),
+        ({"frequency": 4.0, "interval": 10.0}, "sample every 1 s resolves none above 3.14"),
     ],
 )
 def test_what_is_out_of_range_is_refused(given: dict[str, float], said: str) -> None:
