@@ -1,16 +1,28 @@
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported: small matrices
 
 import pytest
-from places import RECORDINGS
+from places import RECORDINGS, SAMPLE_DATA
 from trial_logs import as_log
 
 from analysis.replay.replay import Analysis, analyse
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
 from shiplog import TrialLog, Vessel, load_vessel
+from shiplog.compiled import is_compiled
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile the loops of a replay once, before parallel workers each compile them."""
+    if hasattr(config, "workerinput") or is_compiled("analysis"):
+        return
+    command = [sys.executable, "-m", "shiplog", "replay", SAMPLE_DATA / "zigzag_20_20.mcap"]
+    quiet = subprocess.DEVNULL
+    subprocess.run([*command, "-o", os.devnull], stdout=quiet, stderr=quiet, check=False)
 
 
 @pytest.fixture(scope="session")
