@@ -4,7 +4,6 @@ import argparse
 import os
 import sys
 import tomllib
-from importlib.metadata import entry_points
 from pathlib import Path
 
 from shiplog.cli.console import print_tables, print_warnings, progress, write_json
@@ -17,15 +16,11 @@ from shiplog.cli.paths import (
 )
 from shiplog.cli.verb import ExitCode, Verb
 from shiplog.errors import ShiplogError, UsageError
+from shiplog.extensions import extension_names
 from shiplog.files import atomic_write
 from shiplog.vessel.settings import DISTURBANCES
 
 DEFAULT_REVIEW = "identified.rrd"
-
-
-def _names(group: str) -> str:
-    """List what is installed of an extension point, without importing it."""
-    return ", ".join(sorted({entry.name for entry in entry_points(group=group)}))
 
 
 # ---- replay
@@ -46,7 +41,7 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--filter",
         metavar="NAME",
-        help=f"the state estimator: {_names('shiplog.filters')} "
+        help=f"the state estimator: {', '.join(extension_names('shiplog.filters'))} "
         "(default: that of the vessel file, else pseudo-input)",
     )
     parser.add_argument(
@@ -166,8 +161,8 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         metavar="NAME",
-        help=f"{_names('shiplog.ship_models')}, or auto: the one with the smallest error in "
-        "cross-validation (default: burylin; burylin-tied where T3 is fixed)",
+        help=f"{', '.join(extension_names('shiplog.ship_models'))}, or auto: the one with the "
+        "smallest error in cross-validation (default: burylin; burylin-tied where T3 is fixed)",
     )
     parser.add_argument(
         "--validate",

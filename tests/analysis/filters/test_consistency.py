@@ -40,11 +40,11 @@ AMONG_WAVES = replace(OF_THREE, wave=Wave(frequency=0.6, damping=0.1, std=4e-4, 
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """Errors and covariances, (m, n, s) and (m, n, s, s), and errors of what is told, (m, n, 5)."""
+    """Errors and covariances, (m, n, s) and (m, n, s, s), and errors of the output, (m, n, 5)."""
 
     errors: np.ndarray
     covariances: np.ndarray
-    told: np.ndarray
+    outputs: np.ndarray
 
     def squares(self, at: int) -> float:
         """The normalised squared errors of all runs at an instant, summed."""
@@ -114,8 +114,8 @@ def judged(
         expected = true if own == 5 else told_of(c, true[:, :3], *inputs.T, stats.dt_secs)
         ways = (trace.states, trace.covariances), smoothed
         for kept, (x, P) in zip(found, ways, strict=True):
-            told, _, _ = filtering.to_estimates(signals, last_inputs(signals), x, P)
-            kept.append((x[:, :own] - true[:, :own], P[:, :own, :own], told - expected))
+            outputs, _, _ = filtering.to_estimates(signals, last_inputs(signals), x, P)
+            kept.append((x[:, :own] - true[:, :own], P[:, :own, :own], outputs - expected))
     filtered, smoothed = (Ensemble(*map(np.array, zip(*runs, strict=True))) for runs in found)
     return filtered, smoothed
 
@@ -157,7 +157,7 @@ def test_a_smoothers_errors_are_as_large_as_they_are_said_to_be(ensembles: Pair)
 def test_a_smoother_is_no_further_from_the_truth_than_the_filter_in_any_state(
     ensembles: Pair,
 ) -> None:
-    filtered, smoothed = (np.sqrt(np.mean(one.told**2, axis=(0, 1))) for one in ensembles)
+    filtered, smoothed = (np.sqrt(np.mean(one.outputs**2, axis=(0, 1))) for one in ensembles)
     assert np.all(smoothed <= filtered * (1 + 1e-12)), (filtered, smoothed)
 
 

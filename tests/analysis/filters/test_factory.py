@@ -174,8 +174,10 @@ def test_a_trace_is_kept_without_changing_what_is_said(
     filtering = made(vessel, stats, kind, wave)
     found, trace = filtering.trace(signals, last_inputs(signals))
     same(found, made(vessel, stats, kind, wave).step(signals, last_inputs(signals)))
-    told = filtering.to_estimates(signals, last_inputs(signals), trace.states, trace.covariances)
-    for name, values in zip(("states", "stds", "wave"), told, strict=True):
+    estimates = filtering.to_estimates(
+        signals, last_inputs(signals), trace.states, trace.covariances
+    )
+    for name, values in zip(("states", "stds", "wave"), estimates, strict=True):
         expected = getattr(found, name)
         assert values is expected is None or np.array_equal(values, expected), name
 
@@ -250,7 +252,7 @@ def test_covariances_stay_symmetric_and_positive_over_a_long_run_with_gaps(
 def test_the_inputs_are_never_asked_for_beyond_the_instant_that_follows(
     vessel: Vessel, kind: str
 ) -> None:
-    """What follows a chunk moves the next one, not what is said of this."""
+    """What follows a chunk changes the next estimates, not those of the chunk."""
     signals = straight_run(vessel, 2, 200)
     stats = signal_stats(signals, vessel.coefficients)
     found = [

@@ -36,7 +36,7 @@ TABLE1 = load_vessel("table1")[0].coefficients
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A ship drawn at random, twelve instants of her, and what is told of noise."""
+    """A ship drawn at random, twelve instants of it, and the noise assumed."""
 
     c: Coefficients
     dt: float

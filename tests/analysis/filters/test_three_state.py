@@ -198,11 +198,11 @@ def test_what_is_no_state_is_the_slope_of_what_is_one(vessel: Vessel, kind: str)
     stats = usual_of(c, signals, first=np.array([2e-3, 7.0]))
     filtering = make_filter(c, NOISE, stats, FilterSettings(kind=kind))
     states = filtering.step(signals, last_inputs(signals)).states
-    for told, of in ((2, 1), (4, 3)):
+    for derivative, of in ((2, 1), (4, 3)):
         x = states[:, of]
         slope = (x[:-4] - 8 * x[1:-3] + 8 * x[3:-1] - x[4:]) / (12 * dt)
         away = np.abs(states[2:-2, 0]) > 1e-5  # where w|w| has no corner
-        assert states[2:-2, told][away] == pytest.approx(slope[away], rel=1e-6, abs=1e-13)
+        assert states[2:-2, derivative][away] == pytest.approx(slope[away], rel=1e-6, abs=1e-13)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -380,8 +380,8 @@ def test_a_wave_that_is_told_of_is_told_from_the_ships_own_turning(
     noise = NoiseModel(np.array([9e-5, 0.1]), np.array([1e-4, 1e-3]))
     rough = replace(noise, wave=replace(WAVE, std=1e-3))
     off = []
-    for told in (noise, rough):
-        estimates = filter_states(signals, c, told, FilterSettings(kind=kind))
+    for assumed in (noise, rough):
+        estimates = filter_states(signals, c, assumed, FilterSettings(kind=kind))
         off.append(np.std(errors(trial, signals, estimates.states[:, 0], "yaw_rate")[200:]))
     assert np.std((estimates.wave - waves)[200:]) < 0.2 * np.std(waves)
     assert off[1] < 0.25 * off[0]

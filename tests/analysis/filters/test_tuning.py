@@ -33,13 +33,13 @@ def signals(zigzag: SimulatedTrial) -> Signals:
     return resample(TrialLog("trial", zigzag.channels), channels=NAMES)
 
 
-def told(signals: Signals, c: Coefficients, **settings: object) -> NoiseModel:
+def noise_from_log(signals: Signals, c: Coefficients, **settings: object) -> NoiseModel:
     return noise_of(signal_stats(signals, c), c, FilterSettings(**settings))
 
 
 @pytest.mark.parametrize("kind", FILTERS)
 def test_what_the_vessel_file_states_is_taken(signals: Signals, vessel: Vessel, kind: str) -> None:
-    noise = told(
+    noise = noise_from_log(
         signals,
         vessel.coefficients,
         kind=kind,
@@ -60,16 +60,16 @@ def test_a_bandwidth_is_the_fourth_root_of_yaws_ratio_and_the_square_root_of_sur
     signals: Signals, vessel: Vessel, kind: str
 ) -> None:
     c = vessel.coefficients
-    noise = told(signals, c, kind=kind, yaw_bandwidth=0.3, surge_bandwidth=0.05)
+    noise = noise_from_log(signals, c, kind=kind, yaw_bandwidth=0.3, surge_bandwidth=0.05)
     np.testing.assert_allclose(noise.process_ratio, [0.3**4, 0.05**2], rtol=1e-12)
     assert noise.tuned == (False, False)
-    noise = told(signals, c, kind=kind, yaw_bandwidth=0.3, process_ratio=RATIO)
+    noise = noise_from_log(signals, c, kind=kind, yaw_bandwidth=0.3, process_ratio=RATIO)
     np.testing.assert_allclose(noise.process_ratio, [0.3**4, RATIO], rtol=1e-12)
 
 
 def test_the_papers_filter_has_a_ratio_and_no_bandwidths(signals: Signals, vessel: Vessel) -> None:
     given = {"process_ratio": RATIO, "yaw_bandwidth": 0.3, "surge_bandwidth": 0.05}
-    noise = told(signals, vessel.coefficients, kind="pseudo-input", **given)
+    noise = noise_from_log(signals, vessel.coefficients, kind="pseudo-input", **given)
     np.testing.assert_allclose(noise.process_ratio, [RATIO, RATIO], rtol=1e-12)
 
 
@@ -82,7 +82,7 @@ def test_what_one_output_lacks_the_log_tells_and_the_others_is_kept(
         {"surge_bandwidth": 0.2, "speed_std": 0.2},
         {"yaw_bandwidth": 0.2, "yaw_rate_std": 1e-4},
     )
-    noise = told(signals, c, kind="extended", **given[output])
+    noise = noise_from_log(signals, c, kind="extended", **given[output])
     assert noise.tuned == noise.measured == (output == 0, output == 1)
     assert noise.process_ratio[1 - output] == pytest.approx((0.2**4, 0.2**2)[1 - output])
     assert noise.measurement_std[1 - output] == (1e-4, 0.2)[1 - output]
@@ -95,8 +95,8 @@ def unlikelihood(
     """-2 log of the likelihood of one output's innovations, for a ratio of that output."""
     ratios = noise.process_ratio.copy()
     ratios[output] = ratio
-    told = replace(noise, process_ratio=ratios)
-    filtering = make_filter(c, told, stats, FilterSettings(kind=kind))
+    tuned = replace(noise, process_ratio=ratios)
+    filtering = make_filter(c, tuned, stats, FilterSettings(kind=kind))
     found = filtering.step(stats.head, last_inputs(stats.head))
     e, s = found.innovations[:, output], found.innovation_stds[:, output]
     known = np.isfinite(e)
@@ -152,8 +152,8 @@ def test_where_the_gain_is_not_the_best_the_noise_is_the_extended_filters(
     signals: Signals, vessel: Vessel, kind: str
 ) -> None:
     head = signals.part(0, 1500)
-    found = told(head, vessel.coefficients, kind=kind)
-    expected = told(head, vessel.coefficients, kind="extended")
+    found = noise_from_log(head, vessel.coefficients, kind=kind)
+    expected = noise_from_log(head, vessel.coefficients, kind="extended")
     assert np.array_equal(found.process_ratio, expected.process_ratio)
     assert np.array_equal(found.measurement_std, expected.measurement_std)
 
@@ -164,7 +164,7 @@ def test_a_wrong_model_is_given_more_process_noise_than_the_true_one(
 ) -> None:
     c = vessel.coefficients
     wrong = c._replace(d=0.7 * c.d, a=0.7 * c.a)
-    ratios = [told(signals, model, kind=kind).process_ratio[0] for model in (c, wrong)]
+    ratios = [noise_from_log(signals, model, kind=kind).process_ratio[0] for model in (c, wrong)]
     if kind == "pseudo-input":
         assert ratios[0] < 3 * PAPER_RATIO
         assert ratios[1] > 10 * ratios[0]
@@ -179,7 +179,9 @@ def test_spikes_make_no_process_noise(signals: Signals, vessel: Vessel, kind: st
     values = {name: array.copy() for name, array in signals.values.items()}
     for name, std in zip(("yaw_rate", "speed"), signal_stats(signals, c).noise_std, strict=True):
         values[name][rng.choice(len(signals), 25)] += 40 * std
-    clean, spiked = (told(s, c, kind=kind) for s in (signals, replace(signals, values=values)))
+    clean, spiked = (
+        noise_from_log(s, c, kind=kind) for s in (signals, replace(signals, values=values))
+    )
     assert np.all(spiked.process_ratio < 3 * clean.process_ratio)
     estimates = filter_states(replace(signals, values=values), c, spiked, FilterSettings(kind=kind))
     assert estimates.gated.sum(axis=0).tolist() == pytest.approx([25, 25], abs=3)
@@ -198,9 +200,9 @@ def test_a_wave_is_told_of_where_it_is_asked_for_and_stands_out(
 ) -> None:
     c = vessel.coefficients
     rough, given = waved(signals, 5e-4), {"kind": "extended", "process_ratio": RATIO}
-    assert told(rough, c, **given).wave is None
-    assert told(signals, c, **given, wave=True).wave is None
-    wave = told(rough, c, **given, wave=True).wave
+    assert noise_from_log(rough, c, **given).wave is None
+    assert noise_from_log(signals, c, **given, wave=True).wave is None
+    wave = noise_from_log(rough, c, **given, wave=True).wave
     assert wave is not None
     assert wave.frequency == pytest.approx(0.6, rel=0.05)
     assert wave.std == pytest.approx(5e-4, rel=0.25)
@@ -208,7 +210,7 @@ def test_a_wave_is_told_of_where_it_is_asked_for_and_stands_out(
 
 def test_a_wave_that_is_stated_is_told_of_as_stated(signals: Signals, vessel: Vessel) -> None:
     given = {"wave_frequency": 0.7, "wave_damping": 0.2, "wave_std": 1e-5}
-    noise = told(
+    noise = noise_from_log(
         signals, vessel.coefficients, kind="extended", process_ratio=RATIO, wave=True, **given
     )
     assert noise.wave is not None
@@ -222,7 +224,8 @@ def test_with_its_wave_told_of_a_log_takes_less_process_noise(
     """A filter that must follow the waves follows the sensor's noise, too."""
     rough, c = waved(signals, 5e-4), vessel.coefficients
     plain, knowing = (
-        told(rough, c, kind="extended", surge_bandwidth=0.05, wave=wave) for wave in (False, True)
+        noise_from_log(rough, c, kind="extended", surge_bandwidth=0.05, wave=wave)
+        for wave in (False, True)
     )
     assert knowing.wave is not None
     assert knowing.process_ratio[0] < 0.01 * plain.process_ratio[0]

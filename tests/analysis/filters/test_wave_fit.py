@@ -438,7 +438,7 @@ def fast_means(spectrum: Spectrum, covariances: list[FloatArray]) -> list[FloatA
     return [cosines @ (overlap * covariance) for covariance in covariances]
 
 
-# ---- what cannot be told
+# ---- what cannot be fitted
 
 
 @pytest.mark.parametrize(
