@@ -1,7 +1,7 @@
 """Compilation of numerical loops by numba, with a cache of machine code on disk.
 
-`compiled` is numba's `njit` with a type. Its cache folder is named after all sources of the three
-packages, so that a change in any of them compiles everything anew.
+`compiled` is numba's `njit` with a type. Its cache folder is named after all sources that the
+machine code depends on, so that a change in any of them compiles everything anew.
 """
 
 import os
@@ -22,8 +22,25 @@ from .extensions import extension_sources
 F = TypeVar("F", bound=Callable[..., object])
 
 PROJECT_FOLDER = Path(__file__).parents[1]
-PACKAGES = ("shiplog", "recorders", "analysis")
+# Folders and files with compiled functions, or with what these call and read; a test checks it.
+COMPILED_SOURCES = (
+    "shiplog/compiled.py",
+    "shiplog/ships",
+    "recorders/simulated",
+    "analysis/disturbance",
+    "analysis/filters",
+    "analysis/regression",
+    "analysis/signals",
+    "analysis/replay/residuals.py",
+    "analysis/view/decimation.py",
+)
 MIN_AGE_TO_DELETE_SECS = 86_400.0  # a younger cache may belong to a running process
+
+
+def compiled_sources() -> list[Path]:
+    """Return the files of the three packages that the machine code depends on."""
+    places = [PROJECT_FOLDER / place for place in COMPILED_SOURCES]
+    return [path for p in places for path in (p.rglob("*.py") if p.is_dir() else [p])]
 
 
 def _cache_folder() -> Path:
@@ -35,8 +52,7 @@ def _cache_folder() -> Path:
     of another package become a part of our loops, too.
     """
     digest = sha256()
-    own = (path for package in PACKAGES for path in (PROJECT_FOLDER / package).rglob("*.py"))
-    for path in sorted({*own, *extension_sources("shiplog.ship_models")}):
+    for path in sorted({*compiled_sources(), *extension_sources("shiplog.ship_models")}):
         digest.update(path.read_bytes())
     parent = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _default_cache_parent()
     return parent / f"shiplog-{digest.hexdigest()[:16]}"
@@ -78,8 +94,9 @@ def compiled(function: F) -> F:
 
 
 def is_compiled(package: str) -> bool:
-    """Whether the cache has machine code of one of the `PACKAGES` from an earlier run."""
-    folders = {path.parent.name for path in (PROJECT_FOLDER / package).rglob("*.py")}
+    """Whether the cache has machine code of a package, such as "analysis", from an earlier run."""
+    own = (path for path in compiled_sources() if path.is_relative_to(PROJECT_FOLDER / package))
+    folders = {path.parent.name for path in own}
     return any(next(CACHE_FOLDER.rglob(f"{folder}_*/*.nbi"), None) for folder in folders)
 
 

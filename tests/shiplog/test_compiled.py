@@ -1,12 +1,22 @@
 """Machine code is cached for later runs, by the sources it was compiled from."""
 
+import ast
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import shiplog
+from shiplog.compiled import PROJECT_FOLDER, compiled_sources
+
+SOURCES = [
+    path.relative_to(PROJECT_FOLDER)
+    for package in ("shiplog", "recorders", "analysis")
+    for path in sorted((PROJECT_FOLDER / package).rglob("*.py"))
+]
 
 # prints which packages have machine code before and after a loop of shiplog is called
 CODE = """
@@ -60,3 +70,50 @@ def test_machine_code_of_old_sources_is_deleted_after_a_day(tmp_path: Path) -> N
     words_printed(tmp_path, tmp_path)
     assert not old.exists()
     assert recent.exists()
+
+
+def imported_names(tree: ast.Module, path: Path) -> dict[str, Path]:
+    """Return the file of the project that each name of a module is imported from."""
+    names = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            base = path.parent if node.level else Path()
+            place = base.joinpath(*(node.module or "").split("."))
+            for alias in node.names:
+                files = (
+                    place / f"{alias.name}.py",
+                    place.with_suffix(".py"),
+                    place / "__init__.py",
+                )
+                present = [file for file in files if (PROJECT_FOLDER / file).is_file()]
+                if present:
+                    names[alias.asname or alias.name] = present[0]
+    return names
+
+
+def is_compiled_function(node: ast.AST) -> bool:
+    decorators = node.decorator_list if isinstance(node, ast.FunctionDef) else []
+    return any("compiled" in ast.unparse(d) or "overload_for" in ast.unparse(d) for d in decorators)
+
+
+def names_used(function: ast.FunctionDef) -> set[str]:
+    """Return the names in a function's body; annotations do not affect its machine code."""
+    body = ast.Module(function.body, [])
+    within = [node.args for node in ast.walk(body) if isinstance(node, ast.FunctionDef)]
+    types = {n for args in within for n in ast.walk(args)} | {
+        n
+        for node in ast.walk(body)
+        if isinstance(node, ast.AnnAssign)
+        for n in ast.walk(node.annotation)
+    }
+    return {n.id for n in ast.walk(body) if isinstance(n, ast.Name) and n not in types}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=str)
+def test_the_cache_depends_on_all_that_compiled_functions_use(path: Path) -> None:
+    hashed = {source.relative_to(PROJECT_FOLDER) for source in compiled_sources()}
+    tree = ast.parse((PROJECT_FOLDER / path).read_text(encoding="utf-8"))
+    imported = imported_names(tree, path)
+    for function in filter(is_compiled_function, ast.walk(tree)):
+        assert path in hashed
+        assert {imported[name] for name in names_used(function) & set(imported)} <= hashed
