@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 
 from shiplog.cli.console import print_tables, print_warnings, progress, write_json
-from shiplog.cli.options import assigned_numbers, assigned_texts
+from shiplog.cli.options import add_source_option, assigned_numbers, assigned_sources
 from shiplog.cli.paths import (
     require_distinct,
     require_inputs,
@@ -31,13 +31,7 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--vessel", help="a preset or a vessel.toml, instead of the one the log carries"
     )
-    parser.add_argument(
-        "--source",
-        action="append",
-        default=[],
-        metavar="CHANNEL=SOURCE",
-        help="use this source of a channel that has several",
-    )
+    add_source_option(parser)
     parser.add_argument(
         "--filter",
         metavar="NAME",
@@ -83,7 +77,7 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
     output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
     require_suffix(".rrd", output)
     settings = replay_settings(arguments)
-    preferred = assigned_texts(arguments.source, "--source", "speed=doppler")
+    sources = assigned_sources(arguments.source)
     require_distinct([output, arguments.json], [arguments.log, arguments.vessel])
     require_inputs(arguments.log)
     require_outputs(output, arguments.json)
@@ -101,9 +95,11 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
         compiling_beside(arguments.filter, smooth=arguments.smooth) as compilation,
     ):
         on_progress("read")
-        log = open_log(arguments.log).select_sources(preferred)
+        log = open_log(arguments.log)
         try:
-            plan = plan_replay(log, vessel, settings=settings, on_progress=on_progress)
+            plan = plan_replay(
+                log, vessel, settings=settings, sources=sources, on_progress=on_progress
+            )
         except ShiplogError:
             print_warnings(log.warnings)  # they may explain the error
             raise
@@ -158,6 +154,7 @@ def _show_review(path: str | Path, *, view: bool) -> None:
 
 def _configure_identify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", metavar="LOG", nargs="+", help="logs of one ship, loaded alike")
+    add_source_option(parser)
     parser.add_argument(
         "--model",
         metavar="NAME",
@@ -208,6 +205,7 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
     require_suffix(".rrd", review)
     require_suffix(".toml", arguments.output)
     fixed = assigned_numbers(arguments.fix, "--fix", "T3=0.5")
+    sources = assigned_sources(arguments.source)
     require_inputs(*arguments.log, *arguments.validate)
     require_outputs(*outputs)
     from analysis.identification.identify import identify
@@ -228,6 +226,7 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
             validation_logs=[open_log(path) for path in arguments.validate],
             fixed=fixed,
             vessel=vessel,
+            sources=sources,
             on_progress=on_progress,
         )
         text = vessel_toml(ship, on_progress) if arguments.output else ""

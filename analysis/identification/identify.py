@@ -42,6 +42,7 @@ def identify(
     validation_logs: LogSource | Sequence[LogSource] = (),
     fixed: Mapping[str, float] | None = None,
     vessel: Vessel | None = None,
+    sources: Mapping[str, str] | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> IdentifiedShip:
     """Fit a ship model to one or more logs of the same ship by output error.
@@ -61,6 +62,8 @@ def identify(
     vessel
         Gives the ship's length, the parameters alpha1, alpha2 and alpha3 of the rudder, and the
         steering gear; if None, the vessel file that the logs carry.
+    sources
+        The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
     on_progress
         Given each step and the share of the whole work that is done.
 
@@ -93,7 +96,7 @@ def identify(
         require_two_runs(len(to_fit))
     steps = _Steps(on_progress, auto=model == AUTO)
     steps.begin("read")
-    runs, held_out = distinct_runs(to_fit, to_predict)
+    runs, held_out = distinct_runs(to_fit, to_predict, sources)
     ship = common_vessel([*runs, *held_out], vessel)
     steps.begin("fit")
     candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)

@@ -1,19 +1,17 @@
 """Logs as a fit takes them: resampled, split at input gaps, checked for one common ship."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
 
 from analysis.identification.fit.segment import Segment, initial_level, split_into_segments
-from shiplog.checks.channel_stats import LogStats
-from shiplog.checks.data_quality import data_warnings
-from shiplog.checks.log_stats import compute_log_stats
 from shiplog.checks.rudder_sign import rudder_sign_warning
 from shiplog.errors import LogError, UsageError
-from shiplog.resampling import resample
-from shiplog.types import FloatArray, Log
+from shiplog.resampling import choose_clock, resample_chunks
+from shiplog.screening import screen_log
+from shiplog.types import FloatArray, Log, concatenate_signals
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, IdentifierSettings
 from shiplog.vessel.vessel import Vessel
 from shiplog.vessel.vessel_parser import parse_vessel
@@ -51,13 +49,15 @@ class Run:
     data_lost: bool
 
 
-def run_from_log(log: Log) -> Run:
+def run_from_log(log: Log, sources: Mapping[str, str] | None = None) -> Run:
     """Resample a log, split it into segments and check its data.
 
     Parameters
     ----------
     log
         A log with `REQUIRED_CHANNELS`; `OPTIONAL_CHANNELS` and positions are used if present.
+    sources
+        The source to use, by the name of a channel that has several.
 
     Returns
     -------
@@ -69,31 +69,34 @@ def run_from_log(log: Log) -> Run:
     LogError
         A channel is missing, or rudder and revolutions are not known together long enough.
     """
-    stats = compute_log_stats(log, strict=True)
-    missing = [name for name in REQUIRED_CHANNELS if name not in stats]
-    if missing:
-        present = ", ".join(sorted({channel.name for channel in stats}))
-        raise LogError(
-            f"no channel {missing[0]!r} in {log.name}; it has {present or 'none'}; "
-            f"an identification needs {', '.join(REQUIRED_CHANNELS)}"
-        )
-    signals = resample(log, None, REQUIRED_CHANNELS, OPTIONAL_CHANNELS)
+    screened = screen_log(
+        log,
+        REQUIRED_CHANNELS,
+        ("heading", "position"),
+        purpose="an identification",
+        sources=sources,
+    )
+    stats = screened.screening.stats
+    clock = choose_clock(screened, stats, None, REQUIRED_CHANNELS, OPTIONAL_CHANNELS)
+    signals = concatenate_signals(resample_chunks(screened.chunks(), clock))
     segments = split_into_segments(signals, log.name)
     toml = log.vessel_toml
     vessel = parse_vessel(toml, f"vessel.toml in {log.name}") if toml is not None else None
-    has_position = "position" in stats
-    warnings = (*log.warnings, *_data_warnings(log, stats))
+    rudder_sign = rudder_sign_warning(screened)
+    warnings = [*screened.warnings, *([rudder_sign] if rudder_sign else [])]
     return Run(
         name=log.name,
         segments=segments,
-        positions=tuple(_positions(log, each) if has_position else None for each in segments),
+        positions=tuple(_positions(screened, segment) for segment in segments),
         vessel=vessel,
         warnings=tuple(text if log.name in text else f"{log.name}: {text}" for text in warnings),
         data_lost=log.data_lost,
     )
 
 
-def distinct_runs(logs: Sequence[Log], held_out: Sequence[Log]) -> tuple[list[Run], list[Run]]:
+def distinct_runs(
+    logs: Sequence[Log], held_out: Sequence[Log], sources: Mapping[str, str] | None = None
+) -> tuple[list[Run], list[Run]]:
     """Prepare logs for fitting and for validation, each with a unique name.
 
     Parameters
@@ -102,6 +105,8 @@ def distinct_runs(logs: Sequence[Log], held_out: Sequence[Log]) -> tuple[list[Ru
         The logs to fit.
     held_out
         The logs to predict.
+    sources
+        The source to use, by the name of a channel that has several, in each log that has it.
 
     Returns
     -------
@@ -115,7 +120,7 @@ def distinct_runs(logs: Sequence[Log], held_out: Sequence[Log]) -> tuple[list[Ru
     """
     runs: list[Run] = []
     for log in (*logs, *held_out):
-        run = run_from_log(log)
+        run = run_from_log(log, sources)
         for other in runs:
             if _same_data(run, other):
                 raise UsageError(
@@ -140,14 +145,6 @@ def _numbered(name: str, number: int) -> str:
 
 def _renamed(run: Run, name: str) -> Run:
     return replace(run, name=name, segments=tuple(replace(t, name=name) for t in run.segments))
-
-
-def _data_warnings(log: Log, stats: LogStats) -> Iterator[str]:
-    optional = tuple(name for name in ("heading", "position") if name in stats)
-    yield from data_warnings(stats, (*REQUIRED_CHANNELS, *optional))
-    rudder_sign = rudder_sign_warning(log)
-    if rudder_sign:
-        yield rudder_sign
 
 
 def _positions(log: Log, segment: Segment) -> FloatArray | None:

@@ -4,7 +4,7 @@ The first pass collects statistics of the raw channels and defines the clock; th
 the log, collects statistics of the signals and fits the regression of the whole trial.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,12 +17,11 @@ from analysis.signals.hold import InputHold
 from analysis.signals.signal_stats import SignalStats, SignalStatsCollector
 from shiplog import Channel, LogError, Signals, Vessel
 from shiplog.checks.channel_stats import LogStats
-from shiplog.checks.data_quality import data_warnings
 from shiplog.checks.gyro_bias import GyroBiasCheck
-from shiplog.checks.log_stats import compute_log_stats
 from shiplog.checks.rudder_sign import RudderSignCheck
 from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, choose_clock, resample_chunks
+from shiplog.screening import ScreenedLog, Screening, screen_log
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
 from shiplog.types import FloatArray, Log
 from shiplog.vessel.settings import MIN_WINDOW_SECS
@@ -40,17 +39,24 @@ class FirstPass:
 
     Attributes
     ----------
-    log_stats
-        Statistics of each raw channel.
+    log
+        The log as screened.
     clock
         The uniform clock on which the log is replayed.
-    warnings
-        Problems of the data, each in a sentence.
     """
 
-    log_stats: LogStats
+    log: ScreenedLog
     clock: Clock
-    warnings: tuple[str, ...]
+
+    @property
+    def screening(self) -> Screening:
+        """What is used of the log."""
+        return self.log.screening
+
+    @property
+    def log_stats(self) -> LogStats:
+        """Statistics of each channel as screened."""
+        return self.log.screening.stats
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +79,19 @@ class SecondPass:
     warnings: tuple[str, ...]
 
 
-def first_pass(log: Log, on_progress: ProgressCallback) -> FirstPass:
-    """Collect the statistics of a log's channels and define the clock of its replay.
+def first_pass(
+    log: Log, sources: Mapping[str, str] | None, on_progress: ProgressCallback
+) -> FirstPass:
+    """Screen a log and define the clock of its replay.
+
+    Parameters
+    ----------
+    log
+        The log as recorded.
+    sources
+        The source to use, by the name of a quantity that has several.
+    on_progress
+        Called with the step and its share done.
 
     Raises
     ------
@@ -82,23 +99,15 @@ def first_pass(log: Log, on_progress: ProgressCallback) -> FirstPass:
         Where a required channel is missing or a channel cannot be used.
     """
     on_progress("check the log", 0.0)
-    log_stats = compute_log_stats(log, strict=True)
-    missing = [name for name in REQUIRED_CHANNELS if name not in log_stats]
-    if missing:
-        present = ", ".join(sorted({channel.name for channel in log_stats}))
-        raise LogError(
-            f"no channel {missing[0]!r} in {log_stats.name}; it has {present or 'no channels'}; "
-            f"a replay needs {', '.join(REQUIRED_CHANNELS)}"
-        )
-    optional = tuple(name for name in OPTIONAL_CHANNELS if name in log_stats)
-    warnings = (*log.warnings, *data_warnings(log_stats, (*REQUIRED_CHANNELS, *optional)))
-    clock = choose_clock(log, log_stats, channels=REQUIRED_CHANNELS, optional=("heading",))
-    return FirstPass(log_stats, clock, warnings)
+    screened = screen_log(
+        log, REQUIRED_CHANNELS, OPTIONAL_CHANNELS, purpose="a replay", sources=sources
+    )
+    stats = screened.screening.stats
+    clock = choose_clock(screened, stats, channels=REQUIRED_CHANNELS, optional=("heading",))
+    return FirstPass(screened, clock)
 
 
-def second_pass(
-    log: Log, first: FirstPass, vessel: Vessel, on_progress: ProgressCallback
-) -> SecondPass:
+def second_pass(first: FirstPass, vessel: Vessel, on_progress: ProgressCallback) -> SecondPass:
     """Collect the statistics of the signals and fit both equations to the whole trial.
 
     The equations need the sampling intervals on the clock, which are known only after the pass.
@@ -107,10 +116,8 @@ def second_pass(
 
     Parameters
     ----------
-    log
-        The log.
     first
-        Results of its first pass.
+        Results of the first pass over the log.
     vessel
         The vessel; without coefficients, the rudder is taken to act in proportion to the speed.
     on_progress
@@ -121,7 +128,7 @@ def second_pass(
     LogError
         Where an output has too few samples.
     """
-    log_stats, clock = first.log_stats, first.clock
+    log, log_stats, clock = first.log, first.log_stats, first.clock
     alphas, window_secs = (
         vessel.coefficients or SPEED_PROPORTIONAL_RUDDER,
         vessel.identifier.window_secs,

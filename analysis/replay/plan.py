@@ -21,6 +21,7 @@ from shiplog import Vessel
 from shiplog.checks.channel_stats import LogStats
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.resampling import Clock
+from shiplog.screening import Screening
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Log
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings
@@ -43,8 +44,8 @@ class Plan:
 
     Attributes
     ----------
-    log_stats
-        Statistics of each raw channel.
+    screening
+        What is used of the log, with the statistics of its channels.
     clock
         The uniform clock on which the log is replayed.
     vessel
@@ -65,7 +66,7 @@ class Plan:
         Problems found so far, each in a sentence.
     """
 
-    log_stats: LogStats
+    screening: Screening
     clock: Clock
     vessel: Vessel
     model_origin: str
@@ -83,6 +84,11 @@ class Plan:
         return self.log_stats.name
 
     @property
+    def log_stats(self) -> LogStats:
+        """Statistics of each channel of the log."""
+        return self.screening.stats
+
+    @property
     def model_is_fitted(self) -> bool:
         """Whether the coefficients were fitted to the log itself."""
         return self.model_origin == FITTED_MODEL
@@ -94,6 +100,7 @@ def plan_replay(
     *,
     filter: FilterKind | str | None = None,  # noqa: A002 - as on the command line
     settings: Mapping[str, object] | None = None,
+    sources: Mapping[str, str] | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> Plan:
     """Make the plan of a replay, from two passes over the log.
@@ -109,6 +116,8 @@ def plan_replay(
         The filter, or its name; by default the one that the settings or the vessel name.
     settings
         Settings that take precedence over the vessel's, such as ``{"filter.gate": 4.0}``.
+    sources
+        The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
     on_progress
         Called with each step and its share done.
 
@@ -126,10 +135,10 @@ def plan_replay(
     """
     vessel, origin = _stated_vessel(log, vessel, settings or {})
     vessel, kind = _with_filter(vessel, filter)
-    first = first_pass(log, on_progress)
-    second = second_pass(log, first, vessel, on_progress)
+    first = first_pass(log, sources, on_progress)
+    second = second_pass(first, vessel, on_progress)
     on_progress("choose the model", 0.0)
-    warnings = [*first.warnings, *second.warnings]
+    warnings = [*first.log.warnings, *second.warnings]
     if vessel.coefficients is None:
         vessel, model_warnings = _with_first_model(vessel, second, log.name)
         origin = FITTED_MODEL
@@ -139,7 +148,7 @@ def plan_replay(
     noise, noise_warnings = _noise(vessel, kind, first, second.stats)
     disturbance, wave_warnings = _disturbance_settings(vessel, kind, second.stats, noise)
     return Plan(
-        log_stats=first.log_stats,
+        screening=first.screening,
         clock=first.clock,
         vessel=vessel,
         model_origin=origin,

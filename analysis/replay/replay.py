@@ -28,6 +28,7 @@ from analysis.signals.hold import InputHold, held_throughout
 from shiplog import LogError, Signals, Vessel, open_log
 from shiplog.errors import UsageError
 from shiplog.progress import ProgressCallback, no_progress
+from shiplog.screening import ScreenedLog
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Log
 
@@ -140,6 +141,7 @@ def analyse(
     *,
     filter: FilterKind | str | None = None,  # noqa: A002 - as on the command line
     settings: Mapping[str, object] | None = None,
+    sources: Mapping[str, str] | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> Analysis:
     """Replay a log: filter it, estimate disturbances and coefficients, test the residuals.
@@ -157,6 +159,8 @@ def analyse(
         The filter, or its name; by default the one that the settings or the vessel name.
     settings
         Settings that take precedence over the vessel's, such as ``{"filter.gate": 4.0}``.
+    sources
+        The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
     on_progress
         Called with each of `PROGRESS_STEPS` and its share done.
 
@@ -177,7 +181,9 @@ def analyse(
     """
     if isinstance(log, str | os.PathLike):
         log = open_log(log)
-    plan = plan_replay(log, vessel, filter=filter, settings=settings, on_progress=on_progress)
+    plan = plan_replay(
+        log, vessel, filter=filter, settings=settings, sources=sources, on_progress=on_progress
+    )
     replay = Replay(log, plan, on_progress=on_progress)
     whole = concatenate(list(replay.chunks()))
     return Analysis(
@@ -217,7 +223,8 @@ class Replay:
     def __init__(
         self, log: Log, plan: Plan, *, on_progress: ProgressCallback = no_progress
     ) -> None:
-        self._log, self.plan, self._on_progress = log, plan, on_progress
+        self._log = ScreenedLog(log, plan.screening)
+        self.plan, self._on_progress = plan, on_progress
         self._started = False
         self._findings: Findings | None = None
 

@@ -1,5 +1,6 @@
 """Option texts such as `NAME=VALUE` as values."""
 
+import argparse
 import re
 from collections.abc import Sequence
 
@@ -17,6 +18,22 @@ def assigned_texts(texts: Sequence[str], option: str, example: str) -> dict[str,
         if not re.fullmatch(r"[^=]+=[^=]+", text):
             raise UsageError(f"{option} takes NAME=VALUE, such as {example}, not {text!r}")
     return dict(text.split("=") for text in texts)
+
+
+def add_source_option(parser: argparse.ArgumentParser) -> None:
+    """Add the option ``--source``, which `assigned_sources` reads."""
+    parser.add_argument(
+        "--source",
+        action="append",
+        default=[],
+        metavar="CHANNEL=SOURCE",
+        help="use this source of a channel that has several, such as yaw_rate=TI",
+    )
+
+
+def assigned_sources(texts: Sequence[str]) -> dict[str, str]:
+    """Parse the values of the option ``--source``: the source by the name of its channel."""
+    return assigned_texts(texts, "--source", "yaw_rate=TI")
 
 
 def assigned_numbers(texts: Sequence[str], option: str, example: str) -> dict[str, float]:

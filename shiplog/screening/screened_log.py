@@ -1,0 +1,78 @@
+"""A log without its unusable values, read chunk by chunk."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from shiplog.checks.channel_stats import LogStats, without_impossible
+from shiplog.types import Channel, Log
+
+
+@dataclass(frozen=True, eq=False)
+class Screening:
+    """What is used of a log: plain data, which can be pickled and applied in any number of passes.
+
+    Attributes
+    ----------
+    stats
+        Statistics of the channels as screened; counts of defects are those of the raw log.
+    sources
+        The chosen source, by the name of each quantity that has several or was chosen by the user.
+    warnings
+        Problems of the data, each in a sentence.
+    """
+
+    stats: LogStats
+    sources: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+class ScreenedLog:
+    """A log as its users take it; a `shiplog.types.Log`.
+
+    Values that are not possible are NaN, and each quantity has one source.
+
+    Parameters
+    ----------
+    log
+        The log as recorded.
+    screening
+        What is used of it, from `screen_log`.
+    """
+
+    def __init__(self, log: Log, screening: Screening) -> None:
+        self._log = log.select_sources(screening.sources) if screening.sources else log
+        self.screening = screening
+
+    @property
+    def name(self) -> str:
+        """The name of the file."""
+        return self._log.name
+
+    @property
+    def metadata(self) -> Mapping[str, str]:
+        """Text about the trial, by key."""
+        return self._log.metadata
+
+    @property
+    def vessel_toml(self) -> str | None:
+        """The attached vessel file."""
+        return self._log.vessel_toml
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Problems met in reading the file, and problems of the data."""
+        return (*self._log.warnings, *self.screening.warnings)
+
+    @property
+    def data_lost(self) -> bool:
+        """Whether a part of the file could not be read."""
+        return self._log.data_lost
+
+    def chunks(self) -> Iterator[tuple[Channel, ...]]:
+        """Iterate over the screened samples in chunks, each topic in the order of reception."""
+        for chunk in self._log.chunks():
+            yield tuple(map(without_impossible, chunk))
+
+    def select_sources(self, sources: Mapping[str, str]) -> "ScreenedLog":
+        """Return the log with other sources; as those were not screened, screen the log anew."""
+        return ScreenedLog(self._log.select_sources(sources), self.screening)
