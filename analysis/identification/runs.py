@@ -7,11 +7,19 @@ from itertools import count
 import numpy as np
 
 from analysis.identification.fit.segment import Segment, initial_level, split_into_segments
+from shiplog.checks.channel_stats import ChannelStats
 from shiplog.checks.rudder_sign import rudder_sign_warning
 from shiplog.errors import LogError, UsageError
+from shiplog.geodesy import LocalFrame, positions_of
 from shiplog.resampling import choose_clock, resample_chunks
 from shiplog.screening import screen_log
-from shiplog.types import FloatArray, Log, concatenate_signals
+from shiplog.types import (
+    FloatArray,
+    Log,
+    TimeArray,
+    concatenate_channels,
+    concatenate_signals,
+)
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, IdentifierSettings
 from shiplog.vessel.vessel import Vessel
 from shiplog.vessel.vessel_parser import parse_vessel
@@ -82,12 +90,14 @@ def run_from_log(log: Log, sources: Mapping[str, str] | None = None) -> Run:
     segments = split_into_segments(signals, log.name)
     toml = log.vessel_toml
     vessel = parse_vessel(toml, f"vessel.toml in {log.name}") if toml is not None else None
+    position = stats.get("position")
+    fixes = _north_east(screened, position) if position is not None else None
     rudder_sign = rudder_sign_warning(screened)
     warnings = [*screened.warnings, *([rudder_sign] if rudder_sign else [])]
     return Run(
         name=log.name,
         segments=segments,
-        positions=tuple(_positions(screened, segment) for segment in segments),
+        positions=tuple(_interpolated(*fixes, each) if fixes else None for each in segments),
         vessel=vessel,
         warnings=tuple(text if log.name in text else f"{log.name}: {text}" for text in warnings),
         data_lost=log.data_lost,
@@ -147,22 +157,34 @@ def _renamed(run: Run, name: str) -> Run:
     return replace(run, name=name, segments=tuple(replace(t, name=name) for t in run.segments))
 
 
-def _positions(log: Log, segment: Segment) -> FloatArray | None:
-    """Interpolate the fixes of the log's first position source at a segment's samples, (n, 2)."""
-    parts = [c for chunk in log.chunks() for c in chunk if c.name == "position"]
+def _north_east(log: Log, stats: ChannelStats) -> tuple[TimeArray, FloatArray]:
+    """Return the times, (n,) ns, of the fixes of a position channel and their north and east.
+
+    Only usable fixes are returned; north and east, (n, 2) m, are relative to the first one.
+    """
+    selected = (stats.select(chunk) for chunk in log.chunks())
+    parts = [part for part in selected if part is not None]
     if not parts:
-        return None
-    source = parts[0].source
-    fixes = [part for part in parts if part.source == source]
-    measured_ns = np.concatenate([part.measured_ns for part in fixes])
-    values = np.concatenate([part.values for part in fixes])
-    valid = np.isfinite(values).all(axis=1)
-    secs = (measured_ns[valid] - segment.signals.start_ns) * 1e-9
+        return np.zeros(0, np.int64), np.zeros((0, 2))
+    channel = concatenate_channels(parts)
+    positions = positions_of(channel.fields, channel.values)
+    frame, measured = LocalFrame.at_first(positions), positions.measured
+    if frame is None:
+        return np.zeros(0, np.int64), np.zeros((0, 2))
+    return channel.measured_ns[measured], frame.north_east(positions)[measured]
+
+
+def _interpolated(
+    measured_ns: TimeArray, north_east: FloatArray, segment: Segment
+) -> FloatArray | None:
+    """Interpolate fixes at a segment's samples, (n, 2) m; None with fewer than two fixes."""
+    secs = (measured_ns - segment.signals.start_ns) * 1e-9
     if len(secs) < 2:
         return None
     time = segment.signals.time_secs
-    columns = [np.interp(time, secs, column, np.nan, np.nan) for column in values[valid].T]
-    return np.column_stack(columns)
+    return np.column_stack(
+        [np.interp(time, secs, column, np.nan, np.nan) for column in north_east.T]
+    )
 
 
 def common_vessel(runs: Sequence[Run], given: Vessel | None) -> Vessel | None:

@@ -7,11 +7,10 @@ import numpy as np
 from analysis.signals.concat import concatenate
 from shiplog import Channel
 from shiplog.checks.channel_stats import ChannelStats
+from shiplog.geodesy import LocalFrame, positions_of
 from shiplog.resampling import Clock
 from shiplog.types import FloatArray, Signals
-from shiplog.units import GEOGRAPHIC
 
-EARTH_RADIUS = 6_371_008.8  # m, mean
 MAX_COMPASS_GAP = 1 << 20  # instants; after a longer gap the yaw rate is integrated alone
 
 
@@ -53,7 +52,7 @@ class Tracker:
         self._recorded = position if position is not None and position.valid > 1 else None
         self._start_ns, self._reckoning = clock.start_ns, _DeadReckoner(clock)
         self._fixes: list[Track] = []  # since the last step
-        self._origin_position: FloatArray | None = None  # the first position
+        self._frame: LocalFrame | None = None  # its datum is the first position
 
     @property
     def origin(self) -> str:
@@ -68,11 +67,12 @@ class Tracker:
         channel = self._recorded.select(chunk) if self._recorded else None
         if channel is None:
             return
-        known = np.isfinite(channel.values).all(axis=1)
-        if known.any():
-            at = (channel.measured_ns[known] - self._start_ns) * 1e-9
-            north, east = self._in_metres(channel, channel.values[known, :2]).T
-            self._fixes.append(Track(at, north, east))
+        positions = positions_of(channel.fields, channel.values)
+        self._frame = self._frame or LocalFrame.at_first(positions)
+        if self._frame is not None:
+            local, measured = self._frame.to_local(positions), positions.measured
+            at = (channel.measured_ns[measured] - self._start_ns) * 1e-9
+            self._fixes.append(Track(at, local.north[measured], local.east[measured]))
 
     def step(self, chunk: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
         """Return the part of the track that has become known.
@@ -90,19 +90,6 @@ class Tracker:
             return self._reckoning.step(chunk, yaw_rate, speed)
         fixes, self._fixes = self._fixes, []
         return concatenate([EMPTY_TRACK, *fixes])
-
-    def _in_metres(self, channel: Channel, positions: FloatArray) -> FloatArray:
-        """Return positions as north and east of the first one, (n, 2) m."""
-        if self._origin_position is None:
-            self._origin_position = positions[0]
-        if channel.fields != GEOGRAPHIC:
-            return positions - self._origin_position
-        per_radian = np.array(
-            [EARTH_RADIUS, EARTH_RADIUS * np.cos(np.radians(self._origin_position[0]))]
-        )
-        return np.asarray(
-            np.radians(positions) * per_radian - np.radians(self._origin_position) * per_radian
-        )
 
 
 class _DeadReckoner:

@@ -10,6 +10,7 @@ import numpy as np
 from shiplog.types import Channel, ChannelsByName
 from shiplog.units import CATALOGUE
 
+from .fixes import FixScreening
 from .stuck import StuckStats
 
 GAP_PERIODS = 5.0  # an interval longer than this many typical ones is a gap,
@@ -90,6 +91,8 @@ class ChannelStats:
         Share of the valid values below zero.
     strict
         Whether impossible values count as not measured.
+    fixes
+        Of positions, which fixes are used, whether `strict` or not; None for other channels.
     """
 
     name: str
@@ -117,6 +120,7 @@ class ChannelStats:
     median: float
     negative_share: float
     strict: bool = False
+    fixes: FixScreening | None = None
 
     @property
     def topic(self) -> str:
@@ -131,12 +135,18 @@ class ChannelStats:
     def select(self, chunk: tuple[Channel, ...]) -> Channel | None:
         """Return this channel's samples in a chunk of the log; None where it has none.
 
-        With `strict`, impossible values are NaN.
+        With `strict`, impossible values are NaN; position fixes that are not used always are.
         """
         for channel in chunk:
             if channel.topic == self.topic and channel.fields == self.fields:
-                return without_impossible(channel) if self.strict else channel
+                return self.screened(channel)
         return None
+
+    def screened(self, channel: Channel) -> Channel:
+        """Return a part of this channel with NaN in place of values that are not used."""
+        if self.fixes:
+            return self.fixes.apply(channel)
+        return without_impossible(channel) if self.strict else channel
 
 
 @dataclass(frozen=True, eq=False)

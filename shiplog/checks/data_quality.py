@@ -126,25 +126,21 @@ def _value_warnings(channel: ChannelStats) -> Iterator[str]:
             "froze: check it, and set these values to nan in a CSV of the log"
         )
     yield from _impossible_warnings(channel)
+    if channel.fixes:
+        yield from channel.fixes.warnings()
 
 
 def _impossible_warnings(channel: ChannelStats) -> Iterator[str]:
     count = channel.impossible.count
     if not count:
         return
-    if channel.fields:
-        yield (
-            f"{_count(count, 'impossible position')}, beyond 90 deg of latitude or 180 deg of "
-            "longitude; check the receiver and the columns of the layout"
-        )
-    else:
-        kind = CATALOGUE[channel.name]
-        yield (
-            f"{_count(count, 'impossible value')}, the worst "
-            f"{_displayed(channel, channel.impossible.extent)}; possible are "
-            f"{_displayed(channel, kind.lowest)} to {_displayed(channel, kind.highest)}: "
-            "check the unit in the layout and the sensor"
-        )
+    kind = CATALOGUE[channel.name]
+    yield (
+        f"{_count(count, 'impossible value')}, the worst "
+        f"{_displayed(channel, channel.impossible.extent)}; possible are "
+        f"{_displayed(channel, kind.lowest)} to {_displayed(channel, kind.highest)}: "
+        "check the unit in the layout and the sensor"
+    )
 
 
 def _displayed(channel: ChannelStats, value: float) -> str:

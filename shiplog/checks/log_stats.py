@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from shiplog.geodesy import positions_of
 from shiplog.types import Channel, FloatArray, Log, TimeArray
-from shiplog.units import CATALOGUE, GEOGRAPHIC
+from shiplog.units import CATALOGUE
 
 from .channel_stats import GAP_SECS, ChannelStats, LogStats, Occurrences, gap_threshold_secs
+from .fixes import FixScreen
 from .quantiles import Quantiles
 from .stuck import StuckCheck
 
@@ -17,7 +19,6 @@ Mask = NDArray[np.bool_]
 
 MIN_INTERVALS = 10  # fewer do not show whether a channel is irregular
 LAST_INSTANT_NS = np.iinfo(np.int64).max
-MAX_DEGREES = {"latitude": 90.0, "longitude": 180.0}
 
 
 def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
@@ -45,7 +46,8 @@ def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
             if channel.key not in collectors:
                 collectors[channel.key] = _ChannelStatsCollector(channel, strict=strict)
             collectors[channel.key].add(channel)
-    return LogStats(log.name, tuple(collector.result() for collector in collectors.values()))
+    max_speed = max((c.max_value for c in collectors.values() if c.name == "speed"), default=0.0)
+    return LogStats(log.name, tuple(c.result(max_speed) for c in collectors.values()))
 
 
 class _ChannelStatsCollector:
@@ -55,6 +57,9 @@ class _ChannelStatsCollector:
         self._channel, self._strict = channel, strict  # the channel for its name, unit and fields
         kind = CATALOGUE.get(channel.name)
         self._stuck = None if kind is not None and kind.commanded else StuckCheck()
+        self._fixes = (
+            FixScreen() if channel.name == "position" and len(channel.fields) > 1 else None
+        )
         self._samples = self._duplicates = self._missing = self._valid = self._negative = 0
         self._start = self._last = self._last_valid = 0
         self._span = self._valid_span = (LAST_INSTANT_NS, -LAST_INSTANT_NS)
@@ -67,6 +72,16 @@ class _ChannelStatsCollector:
         self._intervals, self._values = Quantiles(), Quantiles()
         self._valid_intervals = self._intervals  # one object until the first invalid sample
 
+    @property
+    def name(self) -> str:
+        """Name of the channel."""
+        return self._channel.name
+
+    @property
+    def max_value(self) -> float:
+        """Largest valid value that is possible; 0 without any."""
+        return min(max(self._value_range[1], 0.0), CATALOGUE[self.name].highest)
+
     def add(self, channel: Channel) -> None:
         """Add the next samples of the channel."""
         if not len(channel):
@@ -74,6 +89,9 @@ class _ChannelStatsCollector:
         if not self._samples:
             self._start = self._last = self._last_valid = int(channel.measured_ns[0])
         rows = channel.values.reshape(len(channel), -1)
+        if self._fixes:
+            self._fixes.add(channel)
+            rows = _without_altitude(channel)
         valid = _valid(channel, rows, strict=self._strict)
         if not valid.all() and self._valid_intervals is self._intervals:
             self._valid_intervals = deepcopy(self._intervals)
@@ -124,7 +142,7 @@ class _ChannelStatsCollector:
     def _add_values(self, channel: Channel, rows: FloatArray, valid: Mask) -> None:
         if not valid.all() or channel.fields or not self._strict:
             times = channel.measured_ns
-            self._missing += int(np.count_nonzero(np.isnan(rows).all(axis=1)))
+            self._missing += _missing(channel)
             infinite = np.flatnonzero(np.isinf(rows).any(axis=1))
             if len(infinite):
                 self._infinite = self._with_more(
@@ -161,8 +179,9 @@ class _ChannelStatsCollector:
             return replace(occurrences, count=occurrences.count + count)
         return Occurrences(count, float(at_ns - self._start) * 1e-9, extent)
 
-    def result(self) -> ChannelStats:
-        """Return the statistics of all samples added."""
+    def result(self, max_speed: float) -> ChannelStats:
+        """Return the statistics of all samples added; `max_speed` of the log, m/s."""
+        fixes = self._fixes.result(max_speed) if self._fixes else None
         channel, interval = self._channel, _median_secs(self._intervals)
         all_valid = self._valid_intervals is self._intervals
         irregular_share, interval_range = _regularity(self._intervals.values * 1e-9, interval)
@@ -185,13 +204,16 @@ class _ChannelStatsCollector:
             infinite=self._infinite,
             impossible=self._impossible,
             stuck=self._stuck.result(interval) if self._stuck else None,
-            valid=self._valid,
-            valid_span_ns=self._valid_span if self._valid else (0, 0),
+            valid=fixes.usable if fixes else self._valid,
+            valid_span_ns=(
+                fixes.usable_span_ns if fixes else self._valid_span if self._valid else (0, 0)
+            ),
             valid_interval_secs=interval if all_valid else _median_secs(self._valid_intervals),
             value_range=self._value_range,
             median=self._values.median(),
             negative_share=self._negative / self._valid if self._valid else 0.0,
             strict=self._strict,
+            fixes=fixes,
         )
 
     def _gaps(self, interval: float) -> tuple[tuple[float, float], ...]:
@@ -210,14 +232,27 @@ def _valid(channel: Channel, rows: FloatArray, *, strict: bool) -> Mask:
     return np.asarray((rows[:, 0] >= kind.lowest) & (rows[:, 0] <= kind.highest))
 
 
+def _missing(channel: Channel) -> int:
+    """Count the samples that were not measured: all components NaN, or one of a position."""
+    missing = np.isnan(channel.values.reshape(len(channel), -1))
+    if channel.name == "position":
+        return int(np.count_nonzero(missing[:, :2].any(axis=1)))
+    return int(np.count_nonzero(missing.all(axis=1)))
+
+
+def _without_altitude(channel: Channel) -> FloatArray:
+    """Return the components of the positions that are needed, (n, 2); NaN where there is none.
+
+    The altitude is optional. Latitude 0, longitude 0 is no position for the statistics.
+    """
+    positions = positions_of(channel.fields, channel.values)
+    measured = positions.measured & ~positions.at_zero
+    return np.where(measured[:, None], channel.values[:, :2], np.nan)
+
+
 def _excess(channel: Channel, rows: FloatArray) -> FloatArray:
     """By how much each sample exceeds the limits of what is possible, (n,); <= 0 within them."""
     kind = CATALOGUE.get(channel.name)
-    if channel.fields == GEOGRAPHIC:
-        limits = np.array([MAX_DEGREES.get(field, np.inf) for field in channel.fields])
-        with np.errstate(invalid="ignore"):  # an infinite altitude
-            excess = np.abs(rows) - limits
-        return np.asarray(np.nan_to_num(excess, nan=-np.inf).max(axis=1))
     if channel.fields or kind is None:
         return np.full(len(rows), -np.inf)
     return np.asarray(np.maximum(kind.lowest - rows[:, 0], rows[:, 0] - kind.highest))

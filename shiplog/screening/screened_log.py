@@ -71,7 +71,13 @@ class ScreenedLog:
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """Iterate over the screened samples in chunks, each topic in the order of reception."""
         for chunk in self._log.chunks():
-            yield tuple(map(without_impossible, chunk))
+            yield tuple(self._screened(channel) for channel in chunk)
+
+    def _screened(self, channel: Channel) -> Channel:
+        for stats in self.screening.stats:
+            if (stats.topic, stats.fields) == channel.key:
+                return stats.screened(channel)
+        return without_impossible(channel)
 
     def select_sources(self, sources: Mapping[str, str]) -> "ScreenedLog":
         """Return the log with other sources; as those were not screened, screen the log anew."""

@@ -3,10 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.replay.track import EARTH_RADIUS, Track, Tracker
+from analysis.replay.track import Track, Tracker
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Channel, Signals, TrialLog, resample
 from shiplog.checks.log_stats import compute_log_stats
+from shiplog.geodesy.ellipsoid import chord, geodesic
 from shiplog.resampling import Clock
 
 
@@ -73,9 +74,10 @@ def test_positions_on_the_globe_become_metres() -> None:
     )
     signals = Signals(0, 1.0, {"yaw_rate": np.zeros(3)})
     track, _ = tracked(TrialLog("x", (fix,)), signals, np.zeros(3), np.zeros(3))
-    metre = np.pi / 180 * EARTH_RADIUS
-    assert track.north == pytest.approx([0, 0.001 * metre, 0.001 * metre])
-    assert track.east == pytest.approx([0, 0, 0.001 * metre], rel=1e-3)
+    arc, _ = geodesic(60.0, 10.0, np.array([60.001]), np.array([10.0]))
+    parallel = chord(values[1:2, 0], values[1:2, 1], values[2:, 0], values[2:, 1])
+    assert track.north == pytest.approx([0, arc[0], arc[0]], abs=0.01)
+    assert track.east == pytest.approx([0, 0, parallel[0]], abs=0.01)
 
 
 def test_after_a_long_compass_gap_the_yaw_rate_is_integrated_alone(
