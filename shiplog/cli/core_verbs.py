@@ -2,10 +2,16 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from .console import print_warnings, progress, write_json
+from shiplog.text_table import TextTable
+
+from .console import print_tables, print_warnings, progress, write_json
 from .paths import require_distinct, require_inputs, require_outputs
 from .verb import ExitCode, Verb
+
+if TYPE_CHECKING:
+    from shiplog.mcap.info import LogInfo
 
 
 def _configure_info(parser: argparse.ArgumentParser) -> None:
@@ -23,18 +29,39 @@ def _info(arguments: argparse.Namespace) -> ExitCode:
     if arguments.json:
         write_json(found.to_dict(), arguments.json)
         return ExitCode.DATA_LOST if found.data_lost else ExitCode.OK
-    print(f"{found.name}: {(found.end_ns - found.start_ns) * 1e-9:.1f} s")
-    rows = [("topic", "samples", "unit", "positive")]
-    rows += [(c.topic, str(c.samples), c.unit, c.positive) for c in found.channels]
-    widths = [max(len(row[i]) for row in rows) for i in range(3)]
-    for topic, samples, unit, positive in rows:
-        line = f"  {topic:<{widths[0]}}  {samples:>{widths[1]}}  {unit:<{widths[2]}}  {positive}"
-        print(line.rstrip())
+    state = "finished" if found.finished else "not finished"
+    state += ", damaged" if found.data_lost else ""
+    duration_secs = (found.end_ns - found.start_ns) * 1e-9
+    print(f"{found.name}: from {found.start_utc}, {duration_secs:.1f} s, {state}")
+    print_tables(_info_tables(found))
     for key, value in found.metadata.items():
         print(f"  {key}: {value}")
     print(f"  vessel.toml: {'attached' if found.has_vessel else 'none'}")
     print_warnings(found.warnings)
     return ExitCode.DATA_LOST if found.data_lost else ExitCode.OK
+
+
+def _info_tables(info: "LogInfo") -> list[TextTable]:
+    """Tables of a log's channels and of its foreign topics; those without rows are omitted."""
+    channels = tuple(
+        (
+            channel.topic,
+            str(channel.samples),
+            "" if channel.rate_hz is None else f"{channel.rate_hz:.4g}",
+            "" if channel.lowest is None else f"{channel.lowest:.4g}",
+            "" if channel.highest is None else f"{channel.highest:.4g}",
+            channel.display_unit or channel.unit,
+            channel.positive,
+        )
+        for channel in info.channels
+    )
+    foreign = tuple((one.topic, str(one.messages), one.schema) for one in info.foreign)
+    headings = ("topic", "samples", "rate [Hz]", "lowest", "highest", "unit", "positive")
+    tables = (
+        TextTable("channels", headings, channels),
+        TextTable("topics of other programs", ("topic", "messages", "schema"), foreign),
+    )
+    return [table for table in tables if table.rows]
 
 
 def _configure_convert(parser: argparse.ArgumentParser) -> None:
@@ -61,7 +88,7 @@ def _convert(arguments: argparse.Namespace) -> ExitCode:
 
 
 INFO = Verb(
-    "list what is in a log, without reading it all",
+    "list what is in a log: times, rates, ranges, foreign topics",
     _configure_info,
     _info,
     ("shiplog info trial.mcap", "shiplog info trial.mcap --json -"),

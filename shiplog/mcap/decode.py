@@ -52,6 +52,29 @@ class SampleBlock:
 
 
 @dataclass
+class ForeignMessages:
+    """The messages of one topic of another program, counted but not decoded.
+
+    Attributes
+    ----------
+    count
+        The number of messages.
+    first_ns, last_ns
+        The earliest and the latest time of reception, ns.
+    """
+
+    count: int
+    first_ns: int
+    last_ns: int
+
+    def add(self, received_ns: TimeArray) -> None:
+        """Count further messages, given their (n,) times of reception."""
+        self.count += len(received_ns)
+        self.first_ns = min(self.first_ns, int(received_ns.min()))
+        self.last_ns = max(self.last_ns, int(received_ns.max()))
+
+
+@dataclass
 class McapContents:
     """What the scan of a file has collected so far.
 
@@ -73,6 +96,8 @@ class McapContents:
         The number of such messages, by channel id.
     keep_undescribed
         Whether to keep them, because a later record may describe their channel.
+    foreign
+        The messages of other programs, by channel id.
     metadata
         Text about the trial, by key.
     vessel_toml
@@ -98,6 +123,7 @@ class McapContents:
     undescribed: list[tuple[bytes, int, Offsets]] = field(default_factory=list)
     undescribed_counts: dict[int, int] = field(default_factory=dict)
     keep_undescribed: bool = True
+    foreign: dict[int, ForeignMessages] = field(default_factory=dict)
     metadata: dict[str, str] = field(default_factory=dict)
     vessel_toml: str | None = None
     in_order: bool = True
@@ -234,7 +260,12 @@ def _collect_channel(
             contents.undescribed.append((data, channel_id, offsets))
         return
     schema = schema_of(contents.channels[channel_id], contents.schemas)
-    if schema is None or (contents.selected is not None and channel_id not in contents.selected):
+    if schema is None:
+        received = gather(data, offsets, MESSAGE_HEAD)["received"].astype(np.int64)
+        start = ForeignMessages(0, int(received[0]), int(received[0]))
+        contents.foreign.setdefault(channel_id, start).add(received)
+        return
+    if contents.selected is not None and channel_id not in contents.selected:
         return
     block = _fixed_width_block(data, offsets, schema) or _undecoded_block(data, offsets)
     contents.blocks.setdefault(channel_id, []).append(block)

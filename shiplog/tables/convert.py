@@ -45,7 +45,7 @@ def convert(source: Path, target: Path, layout: Path | None = None) -> tuple[Tri
     UsageError
         The suffixes or the layout do not fit the files.
     LogError, LayoutError
-        The source cannot be read.
+        The source cannot be read, or has no samples; then no file is written.
     """
     if target.suffix.lower() not in SUFFIXES:
         raise UsageError(
@@ -55,6 +55,7 @@ def convert(source: Path, target: Path, layout: Path | None = None) -> tuple[Tri
     if source.resolve() == target.resolve():
         raise UsageError(f"source and target are the same file; name another target: {target}")
     log = _read_any(source, layout)
+    _require_samples(log, source)
     warnings = list(log.warnings)
     if source.suffix.lower() == target.suffix.lower() == ".mcap":
         log, sort_warnings = sorted_by_time(log)
@@ -65,6 +66,13 @@ def convert(source: Path, target: Path, layout: Path | None = None) -> tuple[Tri
     writers = {".mcap": write, ".csv": write_csv, ".parquet": write_parquet}
     writers[target.suffix.lower()](log, target)
     return log, warnings
+
+
+def _require_samples(log: TrialLog, source: Path) -> None:
+    """Refuse a log without samples, with the reader's warnings, which list foreign topics."""
+    if not any(len(channel) for channel in log):
+        causes = "; ".join(log.warnings) or "record it again"
+        raise LogError(f"nothing to convert, no samples of shiplog: {causes}: {source}")
 
 
 def _read_any(source: Path, layout: Path | None) -> TrialLog:

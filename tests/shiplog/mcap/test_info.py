@@ -3,14 +3,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import Writer as McapWriter
 
 from recorders.record import record
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Channel, LogError, LogWriter
 from shiplog.mcap.info import read_log_info
+from shiplog.tables.convert import convert
 
 
-def test_a_finished_log_is_described_from_its_summary(
+def test_a_finished_log_is_described_with_rates_and_ranges(
     zigzag: SimulatedTrial, tmp_path: Path
 ) -> None:
     record(zigzag, tmp_path / "z.mcap")
@@ -18,6 +20,14 @@ def test_a_finished_log_is_described_from_its_summary(
     yaw = info.channels[0]
     assert (yaw.topic, yaw.unit, yaw.samples) == ("/yaw_rate/simulated", "rad/s", 5001)
     assert yaw.positive == "bow to starboard"
+    assert yaw.rate_hz == pytest.approx(10, rel=0.01)
+    assert yaw.display_unit == "deg/s"
+    assert yaw.lowest is not None
+    assert yaw.highest is not None
+    assert -5 < yaw.lowest < -0.1
+    assert 0.1 < yaw.highest < 5
+    assert info.finished
+    assert not info.foreign
     assert info.has_vessel
     assert info.metadata["manoeuvre"] == "zigzag-20-20"
     assert info.to_dict()["duration_secs"] == pytest.approx(500, abs=0.1)
@@ -52,14 +62,54 @@ def test_a_damaged_summary_is_not_used(tmp_path: Path) -> None:
     assert info.data_lost
 
 
-def test_only_the_summary_of_a_finished_log_is_read(
+def test_only_the_summary_of_a_huge_log_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     at = np.arange(100) * 10**8
     with LogWriter(tmp_path / "a.mcap") as writer:
         writer.write(Channel("speed", "log", "m/s", at, at, np.ones(100)))
     monkeypatch.delattr("zstandard.ZstdDecompressor")
-    assert read_log_info(tmp_path / "a.mcap").channels[0].samples == 100
+    monkeypatch.setattr("shiplog.mcap.info.MAX_MESSAGES_TO_READ", 99)
+    info = read_log_info(tmp_path / "a.mcap")
+    assert info.channels[0].samples == 100
+    assert "only the summary of 100 messages" in info.warnings[0]
+
+
+def _write_foreign(path: Path, *, finish: bool) -> None:
+    """Write ten messages of another program, 1 s apart from 100 s on, in one MCAP chunk."""
+    with path.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start()
+        schema = writer.register_schema("std/Text", "ros2msg", b"string data")
+        channel = writer.register_channel("/chatter", "cdr", schema)
+        for i in range(10):
+            at = (100 + i) * 10**9
+            writer.add_message(channel, at, b"text", at)
+        writer.finish()
+    if not finish:
+        data = path.read_bytes()
+        path.write_bytes(data[: -len(data) // 4])
+
+
+@pytest.mark.parametrize("finish", [True, False])
+def test_foreign_topics_are_listed_whether_the_file_is_finished_or_cut(
+    tmp_path: Path, *, finish: bool
+) -> None:
+    _write_foreign(tmp_path / "bag.mcap", finish=finish)
+    info = read_log_info(tmp_path / "bag.mcap")
+    (topic,) = info.foreign
+    assert (topic.topic, topic.schema, topic.messages) == ("/chatter", "std/Text", 10)
+    assert (topic.first_ns, topic.last_ns) == (100 * 10**9, 109 * 10**9)
+    assert (info.start_ns, info.end_ns) == (topic.first_ns, topic.last_ns)
+    assert info.finished is finish
+    assert not info.channels
+
+
+def test_a_log_of_foreign_topics_alone_is_not_converted(tmp_path: Path) -> None:
+    _write_foreign(tmp_path / "bag.mcap", finish=True)
+    with pytest.raises(LogError, match=r"nothing to convert.*/chatter"):
+        convert(tmp_path / "bag.mcap", tmp_path / "out.mcap")
+    assert not (tmp_path / "out.mcap").exists()
 
 
 def test_a_file_that_is_not_mcap_is_rejected(tmp_path: Path) -> None:
