@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,7 @@ class FixScreening:
     counts
         (m,) number of fixes in each stretch.
     distances
-        (m,) m from each stretch to the nearest in time of the fixes used; NaN without any.
+        (m,) largest distance in m from a stretch to the used fix before it; NaN without any.
     max_speed
         The speed that a ship cannot exceed from one fix to the next, m/s.
     """
@@ -80,8 +81,8 @@ class FixScreening:
         if len(zero):
             yield (
                 f"{_fixes(int(zero.sum()))} at latitude 0, longitude 0, the first "
-                f"{self._secs(self.zero):.1f} s after its start; the receiver had no fix: they are "
-                "not used; start the log after the first fix"
+                f"{self._secs(self.zero):.1f} s after its start; the receiver had no position: "
+                "they are not used; check the receiver and its antenna"
             )
         if not self.zero.all():
             yield self._unreachable_warning()
@@ -214,7 +215,9 @@ class FixScreen:
         held_ns = times[np.maximum.accumulate(np.where(changed, np.arange(len(times)), 0))]
         secs = np.abs(times[1:] - held_ns[:-1]) * 1e-9
         zero = positions.at_zero
-        split = (distances > BLOCK_STEP + BLOCK_SPEED * secs) | (secs > BLOCK_SECS)
+        split = (distances > BLOCK_STEP + BLOCK_SPEED * secs) | (
+            (secs > BLOCK_SECS) & (distances > 0)
+        )
         split |= zero[1:] != zero[:-1]
         self._last = held_ns[-1:], values[-1:]
         # with `started`, fix 0 is the last one of the chunk before
@@ -269,6 +272,11 @@ class FixScreen:
         between = _Reach(self._fields, blocks, reach)
         used = _longest_chain(blocks, between)
         rejected = np.flatnonzero(~used)
+        distances = between.distances_to_used(rejected, np.flatnonzero(used))
+        zero = blocks.zero[rejected]
+        new = (np.diff(rejected, prepend=-2) > 1) | np.append(False, zero[1:] != zero[:-1])
+        first = np.flatnonzero(new)  # of each stretch of rejected blocks
+        last = np.append(first[1:], len(rejected))[: len(first)] - 1
         kept = blocks.times[used]
         return FixScreening(
             usable=int(blocks.counts[used].sum()),
@@ -276,10 +284,12 @@ class FixScreen:
             start_ns=start_ns,
             impossible=dict(self._impossible),
             first_impossible_secs=first_impossible,
-            rejected_ns=blocks.times[rejected],
-            zero=blocks.zero[rejected],
-            counts=blocks.counts[rejected],
-            distances=between.distances_to_used(rejected, np.flatnonzero(used)),
+            rejected_ns=np.column_stack(
+                (blocks.times[rejected[first], 0], blocks.times[rejected[last], 1])
+            ),
+            zero=zero[first],
+            counts=_reduced(np.add, blocks.counts[rejected], first),
+            distances=_reduced(np.maximum, distances, first),
             max_speed=reach,
         )
 
@@ -304,7 +314,7 @@ class _Reach:
         return np.asarray(distances <= self._max_speed * secs + MARGIN)
 
     def distances_to_used(self, rejected: NDArray[np.intp], used: NDArray[np.intp]) -> FloatArray:
-        """Return the distance of each rejected block to the used block before or after it, m."""
+        """Return the distance of each rejected block to the used one before it, or the first, m."""
         if not len(used):
             return np.full(len(rejected), np.nan)
         nearest = np.clip(np.searchsorted(used, rejected) - 1, 0, None)
@@ -339,6 +349,11 @@ def _longest_chain(blocks: _Blocks, reach: _Reach) -> NDArray[np.bool_]:
     while j >= 0:
         used[j], j = True, int(previous[j])
     return used if not blocks.zero[used].all() else np.zeros(count, bool)
+
+
+def _reduced(function: np.ufunc, values: NDArray[Any], first: NDArray[np.intp]) -> NDArray[Any]:
+    """Return `function` over each stretch of values, whose first rows are given, (m,)."""
+    return np.asarray(function.reduceat(values, first)) if len(first) else values[:0]
 
 
 def _fixes(count: int) -> str:

@@ -101,8 +101,7 @@ def test_fixes_after_a_long_gap_are_used() -> None:
     track, times = straight(), np.arange(300.0)
     times[150:] += 3600
     track[150:] += SPEED / np.sqrt(2) * 3600
-    for channel in (fixes(track, times),):
-        assert screened(channel)[1] == []
+    assert screened(fixes(track, times))[1] == []
 
 
 @pytest.mark.parametrize("rows", [slice(30), slice(100, 130), slice(270, 300), slice(200)])
@@ -167,6 +166,17 @@ def test_a_frozen_receiver_does_not_cost_the_fixes_around(cuts: tuple[int, ...])
     track = straight()
     track[100:180] = track[100]
     assert screened(fixes(track), cuts)[1] == []
+
+
+def test_a_receiver_that_repeats_a_wild_fix_is_rejected_as_one_stretch() -> None:
+    result, unused = screened(with_rows(geographic(straight()), slice(100, 200), (60.0, 21.0)))
+    assert unused == list(range(100, 200))
+    assert result.counts.tolist() == [100]
+
+
+def test_fixes_once_a_minute_of_a_fast_ship_are_used() -> None:
+    track = 25.0 * 60 * np.column_stack((np.arange(200.0), np.zeros(200)))
+    assert screened(fixes(track, 60.0 * np.arange(200)))[1] == []
 
 
 def test_a_channel_without_samples_has_no_usable_fix() -> None:
