@@ -206,6 +206,9 @@ class Process:
 def run(command: list[str], environment: Mapping[str, str] | None = None) -> Process:
     """Run a command to its end, with additional environment variables.
 
+    It may keep its byte code, as an installed package does, so that no run compiles the sources of
+    this project while the peer's are compiled already.
+
     A small process of its own starts it and waits for it: a child's peak of memory is counted from
     that of the process it was forked from, and this one is large.
 
@@ -214,9 +217,10 @@ def run(command: list[str], environment: Mapping[str, str] | None = None) -> Pro
     SkippedError
         The command failed; with the last line of its stderr.
     """
+    inherited = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     done = subprocess.run(
         [sys.executable, str(CHILD), *command],
-        env={**os.environ, **(environment or {})},
+        env={**inherited, **(environment or {})},
         capture_output=True,
         text=True,
         check=False,

@@ -12,7 +12,6 @@ from shiplog.vessel.settings import FilterSettings
 from .base import Estimates, FilterKind
 from .factory import filter_kind
 from .noise_model import NoiseModel, Wave
-from .three_state import EXTENDED
 
 PAPER_RATIO = 0.01 / 400  # Burylin's Q over his R, 1/s²; no filter trusts its model more by default
 MAX_RATIO = 1e8  # 1/s²; above it the estimate is the measurement itself
@@ -197,7 +196,7 @@ def _filter_head(
     kind: FilterKind,
 ) -> Estimates:
     """Filter the first part of the trial with the filter that the noise is estimated by."""
-    judge = kind if kind.process_noise == "states" else EXTENDED
+    judge = kind if kind.process_noise == "states" else filter_kind("extended")
     judge_settings = replace(settings, kind=judge.name, smooth=False)
     filter_ = judge.make(model, noise, stats, judge_settings)
     return filter_.step(stats.head, last_inputs(stats.head))

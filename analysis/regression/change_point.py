@@ -20,12 +20,13 @@ Statistics 10, 1981.
 """
 
 from math import exp, log, pi, sqrt
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtr
 
+from analysis.signals.distributions import student_tails
 from shiplog.types import FloatArray
 
 from .sliding import CORRELATION_SHARE, MAX_CONDITION
@@ -239,9 +240,8 @@ def _fit_columns(blocks: Blocks, columns: tuple[int, ...]) -> ChangePointFit | N
     )
     variance_factor = independent / freedom
     stds = np.sqrt(variance_factor * bartlett_variances(influences[:, p:], blocks.overlap_blocks))
-    p_values = 2 * stdtr(
-        degrees_of_freedom, -np.abs(values[p:]) / np.maximum(stds, MIN_STD)
-    )  # Student's t
+    statistics = values[p:] / np.maximum(stds, MIN_STD)
+    p_values = np.array(list(map(student_tails, statistics.tolist(), degrees_of_freedom.tolist())))
     return ChangePointFit(
         block, columns, values, influences, variance_factor, degrees_of_freedom, p_values,
         log_odds_range,
@@ -339,7 +339,7 @@ def sup_wald_p_value(p_value: float, log_odds_range: float) -> float:
     >>> round(sup_wald_p_value(0.0032, 2 * log(0.85 / 0.15)), 2)  # 5 % in Andrews' table
     0.05
     """
-    z = float(-ndtri(max(p_value, 1e-300) / 2))
+    z = -NormalDist().inv_cdf(max(p_value, 1e-300) / 2)
     if z <= 1:
         return 1.0
     density = exp(-(z**2) / 2) / sqrt(2 * pi)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from math import inf, nan, sqrt
 
 import numpy as np
-from scipy.special import stdtrit
 
 from shiplog.compiled import compiled
 from shiplog.ships.paper import COEFFICIENT_UNITS
@@ -264,6 +263,8 @@ def _significant_changes(blocks: Blocks, fit: ChangePointFit) -> list[Change]:
 
 
 def _change(blocks: Blocks, fit: ChangePointFit, c: int, alternatives: tuple[str, ...]) -> Change:
+    from scipy.special import stdtrit  # noqa: PLC0415 - it takes long to import
+
     i, edges = fit.columns[c], blocks.edges_secs
     j = len(blocks.names) + c
     before, difference = fit.values[i], fit.values[j]

@@ -6,6 +6,7 @@ from math import isnan, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.signals.distributions import chi_squared_tail
 from analysis.signals.moments import Moments
 from shiplog.compiled import compiled
 from shiplog.types import FloatArray
@@ -214,8 +215,6 @@ class _Products:
 
     def whiteness(self, m: float, count: int) -> float:
         """Return the p-value for `count` innovations of mean `m`; NaN if they are too few."""
-        from scipy.special import chdtrc  # noqa: PLC0415 - it takes long to import
-
         if count < MIN_MEASUREMENTS:
             return float("nan")
         m -= self._origin or 0.0
@@ -227,7 +226,9 @@ class _Products:
         )  # fmt: skip
         used = (pairs >= MIN_MEASUREMENTS) & (sampling_variance > 0)
         statistic = float(np.sum(covariance[used] ** 2 / sampling_variance[used]))
-        return float(chdtrc(np.count_nonzero(used), statistic)) if used.any() else float("nan")
+        return (
+            chi_squared_tail(statistic, int(np.count_nonzero(used))) if used.any() else float("nan")
+        )
 
 
 @compiled
