@@ -44,11 +44,17 @@ class SampleBlock:
         (n,) times, ns.
     values
         (n, k), or n messages that are still to be decoded since their layout is not fixed.
+    number
+        The number of the MCAP chunk, or run of messages outside of MCAP chunks, in the file.
+    offsets
+        (n,) offsets of the messages in its data.
     """
 
     received: TimeArray
     measured: TimeArray
     values: FloatArray | list[bytes]
+    number: int
+    offsets: Offsets
 
 
 @dataclass
@@ -91,7 +97,8 @@ class McapContents:
     total_samples
         The number of samples read so far.
     undescribed
-        Messages whose channel is not described yet: the data, the channel id, the offsets.
+        Messages whose channel is not described yet: the data, the channel id, the offsets, and the
+        number of their MCAP chunk.
     undescribed_counts
         The number of such messages, by channel id.
     keep_undescribed
@@ -112,6 +119,12 @@ class McapContents:
         Whether an unfinished file ends within a record.
     damage
         One warning for each damaged part.
+    data_blocks
+        The number of MCAP chunks, and runs of messages outside of them, read so far.
+    clock_change_ns
+        The sum of the steps of the recorder's clock in the samples drained so far, ns.
+    clock_warnings
+        Warnings about times of messages in the samples drained so far.
     """
 
     schemas: dict[int, records.Schema] = field(default_factory=dict)
@@ -120,7 +133,7 @@ class McapContents:
     blocks: dict[int, list[SampleBlock]] = field(default_factory=dict)
     pending_samples: int = 0
     total_samples: int = 0
-    undescribed: list[tuple[bytes, int, Offsets]] = field(default_factory=list)
+    undescribed: list[tuple[bytes, int, Offsets, int]] = field(default_factory=list)
     undescribed_counts: dict[int, int] = field(default_factory=dict)
     keep_undescribed: bool = True
     foreign: dict[int, ForeignMessages] = field(default_factory=dict)
@@ -131,6 +144,9 @@ class McapContents:
     finished: bool = False
     truncated: bool = False
     damage: list[str] = field(default_factory=list)
+    data_blocks: int = 0
+    clock_change_ns: int = 0
+    clock_warnings: list[str] = field(default_factory=list)
 
     def drain(self) -> dict[int, list[SampleBlock]]:
         """Return the blocks collected so far, by channel id, and release them."""
@@ -162,7 +178,8 @@ def collect_messages(data: bytes, indexes: list[bytes], contents: McapContents) 
         or _locate_by_walk(data, start, contents)
     )
     for channel_id, offsets in located.items():
-        _collect_channel(data, channel_id, offsets, contents)
+        _collect_channel(data, channel_id, offsets, contents.data_blocks, contents)
+    contents.data_blocks += 1
     return bool(located)
 
 
@@ -251,13 +268,13 @@ def _is_described(channel_id: int, contents: McapContents) -> bool:
 
 
 def _collect_channel(
-    data: bytes, channel_id: int, offsets: Offsets, contents: McapContents
+    data: bytes, channel_id: int, offsets: Offsets, number: int, contents: McapContents
 ) -> None:
     if not _is_described(channel_id, contents):
         counts = contents.undescribed_counts
         counts[channel_id] = counts.get(channel_id, 0) + len(offsets)
         if contents.keep_undescribed:
-            contents.undescribed.append((data, channel_id, offsets))
+            contents.undescribed.append((data, channel_id, offsets, number))
         return
     schema = schema_of(contents.channels[channel_id], contents.schemas)
     if schema is None:
@@ -267,13 +284,16 @@ def _collect_channel(
         return
     if contents.selected is not None and channel_id not in contents.selected:
         return
-    block = _fixed_width_block(data, offsets, schema) or _undecoded_block(data, offsets)
+    block = _fixed_width_block(data, offsets, schema, number)
+    block = block or _undecoded_block(data, offsets, number)
     contents.blocks.setdefault(channel_id, []).append(block)
     contents.pending_samples += len(offsets)
     contents.total_samples += len(offsets)
 
 
-def _fixed_width_block(data: bytes, offsets: Offsets, schema: Schema) -> SampleBlock | None:
+def _fixed_width_block(
+    data: bytes, offsets: Offsets, schema: Schema, number: int
+) -> SampleBlock | None:
     """Decode messages of the schema's fixed layout at once; None if one of them has another."""
     if schema.dtype is None:
         return None
@@ -285,13 +305,14 @@ def _fixed_width_block(data: bytes, offsets: Offsets, schema: Schema) -> SampleB
     if any(np.any(rows[name] != value) for name, value in expected.items()):
         return None
     values = np.stack([rows[name] for name in schema.fields], axis=1)
-    return SampleBlock(rows["received"].astype(np.int64), rows["measured"].astype(np.int64), values)
+    received, measured = rows["received"].astype(np.int64), rows["measured"].astype(np.int64)
+    return SampleBlock(received, measured, values, number, offsets)
 
 
-def _undecoded_block(data: bytes, offsets: Offsets) -> SampleBlock:
+def _undecoded_block(data: bytes, offsets: Offsets, number: int) -> SampleBlock:
     heads = gather(data, offsets, MESSAGE_HEAD)
     starts = (offsets + MESSAGE_HEAD.itemsize).tolist()
     ends = (offsets + record_sizes(heads)).tolist()
     messages = [data[start:end] for start, end in zip(starts, ends, strict=True)]
     received, measured = heads["received"].astype(np.int64), heads["measured"].astype(np.int64)
-    return SampleBlock(received, measured, messages)
+    return SampleBlock(received, measured, messages, number, offsets)

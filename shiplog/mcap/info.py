@@ -11,6 +11,7 @@ import numpy as np
 from shiplog.types import Channel, TrialLog
 from shiplog.units import CATALOGUE, conversion_factor
 
+from .clock_repair import MAX_DISTANCE_NS
 from .decode import McapContents, schema_of
 from .reader import open_mcap
 from .scan import scan
@@ -129,7 +130,8 @@ def read_log_info(path: str | os.PathLike[str]) -> LogInfo:
     """Return the content of a log.
 
     Of a finished file with more than `MAX_MESSAGES_TO_READ` messages only the summary is read;
-    then rates and ranges are unknown, and a warning reports this.
+    then rates and ranges are unknown, and a warning reports this. Such a file is read too if the
+    first and last time in its summary are impossible or more than a year apart.
 
     Raises
     ------
@@ -146,11 +148,18 @@ def read_log_info(path: str | os.PathLike[str]) -> LogInfo:
     contents = McapContents()
     with open_mcap(path) as stream:
         summary = read_summary(stream)
-        if summary and summary.statistics.message_count > MAX_MESSAGES_TO_READ:
+        if summary and _is_described_by(summary):
             return _info_of_summary(path.name, summary)
         for _ in scan(stream, contents):
             pass
     return _info_of_log(build_trial_log(path, contents), contents)
+
+
+def _is_described_by(summary: McapSummary) -> bool:
+    """Whether a file is too long to be read, and the times in its summary are possible."""
+    start, end = summary.statistics.message_start_time, summary.statistics.message_end_time
+    is_possible = start <= end < 2**63 and end - start < MAX_DISTANCE_NS
+    return is_possible and summary.statistics.message_count > MAX_MESSAGES_TO_READ
 
 
 def _info_of_summary(name: str, summary: McapSummary) -> LogInfo:

@@ -15,7 +15,7 @@ from shiplog.types import TimeArray, TrialLog
 from .decode import McapContents
 from .records import MAGIC
 from .scan import scan
-from .summary import McapSummary, read_summary
+from .summary import McapSummary, are_in_order, read_summary
 from .trial_log import build_trial_log, channels_by_id, merge_by_topic
 
 
@@ -175,10 +175,16 @@ def _selected_ids(
 def _mcap_chunks_to_skip(
     summary: McapSummary, ids: frozenset[int], span: ReceptionSpan
 ) -> frozenset[int]:
-    """Return the offsets of the MCAP chunks that have nothing of these channels and this span."""
+    """Return the offsets of the MCAP chunks that have nothing of these channels and this span.
+
+    None is skipped where they are not in the order of reception: a clock may have been set back.
+    """
+    mcap_chunks = summary.mcap_chunk_locations() or ()
+    if not are_in_order(mcap_chunks):
+        return frozenset()
     return frozenset(
         mcap_chunk.offset
-        for mcap_chunk in summary.mcap_chunk_locations() or ()
+        for mcap_chunk in mcap_chunks
         if ids.isdisjoint(mcap_chunk.channel_ids)
         or span.excludes(mcap_chunk.first_ns, mcap_chunk.last_ns)
     )

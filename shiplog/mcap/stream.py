@@ -1,7 +1,7 @@
 """Logs longer than memory: a file whose samples come chunk by chunk."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO
@@ -13,7 +13,7 @@ from shiplog.types import Channel, TrialLog
 from .decode import McapContents
 from .reader import contents_described_by, open_mcap, read
 from .scan import scan
-from .summary import McapChunkLocation, read_summary
+from .summary import are_in_order, read_summary
 from .trial_log import build_trial_log
 
 MAX_SAMPLES_IN_MEMORY = 16_000_000  # 400 MB of samples; a filter of them needs more
@@ -153,7 +153,7 @@ def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:
         mcap_chunks = summary.mcap_chunk_locations()
         if mcap_chunks is None:
             return _open_by_scan(path, stream)
-    if not _are_in_order(mcap_chunks):
+    if not are_in_order(mcap_chunks):
         return read(path)
     contents = contents_described_by(summary)
     contents.finished = True
@@ -163,16 +163,6 @@ def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:
 
 def _log_file(path: Path, contents: McapContents) -> LogFile:
     return LogFile(path, build_trial_log(path, contents), contents.schemas, contents.channels)
-
-
-def _are_in_order(mcap_chunks: Iterable[McapChunkLocation]) -> bool:
-    """Whether each MCAP chunk with messages was received after the ones before it."""
-    latest = 0
-    for mcap_chunk in mcap_chunks:
-        if mcap_chunk.channel_ids and not latest <= mcap_chunk.first_ns <= mcap_chunk.last_ns:
-            return False
-        latest = max(latest, mcap_chunk.last_ns)
-    return True
 
 
 def _open_by_scan(path: Path, stream: IO[bytes]) -> TrialLog | LogFile:

@@ -2,7 +2,7 @@
 
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from typing import IO
@@ -79,6 +79,16 @@ class McapSummary:
         if messages != self.statistics.message_count:
             return None
         return tuple(sorted(locations, key=lambda location: location.offset))
+
+
+def are_in_order(mcap_chunks: Iterable[McapChunkLocation]) -> bool:
+    """Whether each MCAP chunk with messages was received after the ones before it."""
+    latest = 0
+    for mcap_chunk in mcap_chunks:
+        if mcap_chunk.channel_ids and not latest <= mcap_chunk.first_ns <= mcap_chunk.last_ns:
+            return False
+        latest = max(latest, mcap_chunk.last_ns)
+    return True
 
 
 def read_summary(stream: IO[bytes]) -> McapSummary | None:

@@ -1,6 +1,7 @@
 """Conversion of a file's scanned contents to a `TrialLog`."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,13 @@ from mcap import records
 from shiplog.errors import LogError, UsageError
 from shiplog.types import (
     Channel,
-    FloatArray,
-    TimeArray,
     TrialLog,
     concatenate_channels,
     is_sorted,
 )
 from shiplog.units import CATALOGUE, conversion_factor
 
+from .clock_repair import MessageColumns, drop_impossible_times, repair_clock_steps
 from .decode import McapContents, SampleBlock, schema_of
 from .schema import FORMAT_VERSION, Schema, decode_messages
 
@@ -45,9 +45,10 @@ def build_trial_log(path: Path, contents: McapContents) -> TrialLog:
             f"written in format {version}, this shiplog reads format {FORMAT_VERSION}; "
             f"install a newer shiplog: {path}"
         )
+    channels = merge_by_topic(channels_by_id(path, contents).values())
     return TrialLog(
         path.name,
-        merge_by_topic(channels_by_id(path, contents).values()),
+        channels,
         contents.metadata,
         contents.vessel_toml,
         tuple(_warnings(contents)),
@@ -75,16 +76,38 @@ def channels_by_id(path: Path, contents: McapContents) -> dict[int, Channel]:
     A channel that has no samples in the contents is empty. Topics of other programs are omitted.
     """
     blocks = contents.drain()
-    channels = {}
+    described, columns = {}, {}
     for channel_id, record in sorted(contents.channels.items()):
         schema = schema_of(record, contents.schemas)
         if schema is not None:
-            channels[channel_id] = _channel(path, record, schema, blocks.pop(channel_id, []))
-    return channels
+            described[channel_id] = record, schema
+            columns[channel_id] = _columns(path, record, schema, blocks.pop(channel_id, []))
+    columns = _with_repaired_times(path, columns, contents)
+    return {
+        channel_id: _channel(path, *description, columns.pop(channel_id))
+        for channel_id, description in described.items()
+    }
+
+
+def _with_repaired_times(
+    path: Path, columns: dict[int, MessageColumns], contents: McapContents
+) -> dict[int, MessageColumns]:
+    """Drop impossible times and remove steps of the clocks; the contents receive the warnings."""
+    columns, dropped = drop_impossible_times(columns)
+    columns, change_ns, steps = repair_clock_steps(path.name, columns)
+    contents.clock_warnings += dropped + steps
+    before = contents.clock_change_ns  # steps in samples drained before
+    contents.clock_change_ns += change_ns
+    return {
+        id_: replace(c, received_ns=c.received_ns - before, measured_ns=c.measured_ns - before)
+        if before
+        else c
+        for id_, c in columns.items()
+    }
 
 
 def _warnings(contents: McapContents) -> list[str]:
-    warnings = list(contents.damage)
+    warnings = [*contents.damage, *contents.clock_warnings]
     if not contents.finished:
         warnings.append(
             "the file was not finished (the recorder was stopped or killed); "
@@ -101,17 +124,10 @@ def _warnings(contents: McapContents) -> list[str]:
 
 
 def _channel(
-    path: Path, record: records.Channel, schema: Schema, blocks: list[SampleBlock]
+    path: Path, record: records.Channel, schema: Schema, columns: MessageColumns
 ) -> Channel:
-    topic_name, _, topic_source = record.topic.strip("/").partition("/")
-    name = record.metadata.get("channel", topic_name)
-    try:
-        received, measured, values = _columns(schema, blocks)
-    except DecodeError as error:
-        raise LogError(
-            f"channel {name!r} has messages that are not {schema.name}; "
-            f"correct the program that wrote them: {path}"
-        ) from error
+    name, source = _name_and_source(record)
+    received, measured, values = columns.received_ns, columns.measured_ns, columns.values
     if not is_sorted(received):
         order = np.argsort(received, kind="stable")
         received, measured, values = received[order], measured[order], values[order]
@@ -122,7 +138,7 @@ def _channel(
     is_scalar = schema.fields == ("value",)
     return Channel(
         name,
-        record.metadata.get("source", topic_source),
+        source,
         unit,
         measured,
         received,
@@ -132,17 +148,36 @@ def _channel(
     )
 
 
-def _columns(schema: Schema, blocks: list[SampleBlock]) -> tuple[TimeArray, TimeArray, FloatArray]:
-    """Return the received times, measured times and values (n, k), in the order of the file."""
+def _name_and_source(record: records.Channel) -> tuple[str, str]:
+    topic_name, _, topic_source = record.topic.strip("/").partition("/")
+    name = record.metadata.get("channel", topic_name)
+    return name, record.metadata.get("source", topic_source)
+
+
+def _columns(
+    path: Path, record: records.Channel, schema: Schema, blocks: list[SampleBlock]
+) -> MessageColumns:
+    """Return the messages of a channel in the order of the file."""
+    name, source = _name_and_source(record)
+    topic = f"/{name}/{source}"
     if not blocks:
-        return np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, len(schema.fields)))
-    values = [
-        block.values
-        if isinstance(block.values, np.ndarray)
-        else decode_messages(schema, block.values)
-        for block in blocks
-    ]
-    return (
+        times = np.empty(0, np.int64)
+        return MessageColumns(topic, times, times, times, np.empty((0, len(schema.fields))))
+    try:
+        values = [
+            block.values
+            if isinstance(block.values, np.ndarray)
+            else decode_messages(schema, block.values)
+            for block in blocks
+        ]
+    except DecodeError as error:
+        raise LogError(
+            f"channel {name!r} has messages that are not {schema.name}; "
+            f"correct the program that wrote them: {path}"
+        ) from error
+    return MessageColumns(
+        topic,
+        np.concatenate([(block.number << 32) + block.offsets for block in blocks]),
         np.concatenate([block.received for block in blocks]),
         np.concatenate([block.measured for block in blocks]),
         np.concatenate(values),

@@ -388,7 +388,7 @@ def test_a_file_of_a_later_format_asks_for_a_newer_shiplog(path: Path) -> None:
         read(path)
 
 
-def test_times_beyond_the_signed_range_do_not_crash(path: Path) -> None:
+def test_messages_beyond_the_signed_range_of_times_are_dropped_and_counted(path: Path) -> None:
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start()
@@ -398,7 +398,9 @@ def test_times_beyond_the_signed_range_do_not_crash(path: Path) -> None:
             channel_id = writer.register_channel(topic, "protobuf", schema_id)
             writer.add_message(channel_id, 2**64 - 1, data, 2**63)
         writer.finish()
-    assert [len(c) for c in read(path)] == [1, 1]
+    log = read(path)
+    assert [len(c) for c in log] == [0, 0]
+    assert [w.split(" samples")[0] for w in log.warnings] == ["/a/b: 1 of 1", "/c/d: 1 of 1"]
 
 
 # -- files that are not logs

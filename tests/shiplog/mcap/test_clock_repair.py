@@ -1,0 +1,132 @@
+"""Tests of the repair of messages' times, on files written message by message."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.writer import Writer
+from mcap_files import scalar
+
+from shiplog import LogError
+from shiplog.mcap.info import read_log_info
+from shiplog.mcap.reader import read
+from shiplog.mcap.schema import schema_for
+from shiplog.mcap.writer import write
+
+SECOND = 1_000_000_000
+START = 1_700_000_000 * SECOND
+NAMES = ("yaw_rate", "rudder")
+Clock = Callable[[str, int], int]
+
+
+def unchanged(_name: str, time_ns: int) -> int:
+    return time_ns
+
+
+def record(path: Path, received: Clock = unchanged, measured: Clock = unchanged) -> Path:
+    """Write 100 s of two channels at 2 Hz whose values are the true times, in s."""
+    schema = schema_for(())
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=2000)
+        writer.start()
+        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        unit = {"yaw_rate": "rad/s", "rudder": "rad"}
+        ids = {
+            name: writer.register_channel(
+                f"/{name}/test", "protobuf", schema_id, {"unit": unit[name]}
+            )
+            for name in NAMES
+        }
+        for row in range(200):
+            time = row * SECOND // 2
+            for name in NAMES:
+                data = scalar(time / SECOND)
+                times = START + received(name, time), START + measured(name, time)
+                writer.add_message(ids[name], times[0] % 2**64, data, times[1] % 2**64)
+        writer.finish()
+    return path
+
+
+def set_back(_name: str, time_ns: int) -> int:
+    return time_ns - (time_ns >= 50 * SECOND) * 5_250_000_000
+
+
+def test_an_undisturbed_file_gives_no_warning(tmp_path: Path) -> None:
+    assert read(record(tmp_path / "log.mcap")).warnings == ()
+
+
+def test_a_clock_set_back_is_repaired_and_reported(tmp_path: Path) -> None:
+    log = read(record(tmp_path / "log.mcap", set_back, set_back))
+    (warning,) = log.warnings
+    assert "set back by 5.250 s" in warning
+    assert "49.5 s after the start" in warning
+    for channel in log:
+        np.testing.assert_allclose((channel.measured_ns - START) / SECOND, channel.values)
+        np.testing.assert_array_equal(channel.measured_ns, channel.received_ns)
+
+
+def test_a_clock_of_reception_set_back_keeps_the_measured_times(tmp_path: Path) -> None:
+    log = read(record(tmp_path / "log.mcap", received=set_back))
+    assert len(log.warnings) == 1
+    for channel in log:
+        np.testing.assert_allclose((channel.measured_ns - START) / SECOND, channel.values)
+        np.testing.assert_array_equal(channel.measured_ns, channel.received_ns)
+
+
+def test_the_clock_of_one_sensor_set_back_is_repaired_from_reception(tmp_path: Path) -> None:
+    def one_sensor(name: str, time_ns: int) -> int:
+        return set_back(name, time_ns) if name == "rudder" else time_ns
+
+    log = read(record(tmp_path / "log.mcap", measured=one_sensor))
+    (warning,) = log.warnings
+    assert warning.startswith("/rudder/test: the clock of the sensor was set back by 5.250 s")
+    np.testing.assert_array_equal(log["rudder"].measured_ns, log["rudder"].received_ns)
+
+
+def test_a_step_of_one_channel_in_both_clocks_is_refused(tmp_path: Path) -> None:
+    def one_channel(name: str, time_ns: int) -> int:
+        return set_back(name, time_ns) if name == "rudder" else time_ns
+
+    path = record(tmp_path / "log.mcap", one_channel, one_channel)
+    with pytest.raises(LogError, match=r"/rudder/test run back by 5.25 s .* /yaw_rate/test do not"):
+        read(path)
+
+
+def test_a_gap_in_all_channels_is_reported_with_both_causes(tmp_path: Path) -> None:
+    def set_forward(_name: str, time_ns: int) -> int:
+        return time_ns + (time_ns >= 50 * SECOND) * 30 * SECOND
+
+    log = read(record(tmp_path / "log.mcap", set_forward, set_forward))
+    (warning,) = log.warnings
+    assert "no samples for 30.0 s" in warning
+    assert "paused, or its clock was set forward" in warning
+
+
+@pytest.mark.parametrize("time", [2**64 - 5 * 10**9, -5 * SECOND, 0, 7_258_118_400 * SECOND])
+@pytest.mark.parametrize("clocks", ["both", "measured"])
+def test_single_impossible_times_are_dropped_everywhere(
+    tmp_path: Path, time: int, clocks: str
+) -> None:
+    def disturbed(_name: str, time_ns: int) -> int:
+        return time - START if time_ns == 50 * SECOND else time_ns
+
+    received = disturbed if clocks == "both" else unchanged
+    path = record(tmp_path / "log.mcap", received, disturbed)
+    log = read(path)
+    assert [len(channel) for channel in log] == [199, 199]
+    assert all("1 of 200 samples" in warning for warning in log.warnings)
+    info = read_log_info(path)
+    assert (info.end_ns - info.start_ns) / SECOND == 99.5
+    write(log, tmp_path / "copy.mcap")
+    assert read(tmp_path / "copy.mcap").warnings == ()
+
+
+def test_a_channel_of_another_epoch_is_kept_and_reported(tmp_path: Path) -> None:
+    def rolled_over(name: str, time_ns: int) -> int:
+        return time_ns - (name == "rudder") * 1024 * 7 * 86_400 * SECOND
+
+    log = read(record(tmp_path / "log.mcap", measured=rolled_over))
+    (warning,) = log.warnings
+    assert warning.startswith("/rudder/test: 200 of 200 samples have times from 2004-")
+    assert "1024 weeks" in warning
