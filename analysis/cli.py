@@ -7,7 +7,13 @@ import tomllib
 from pathlib import Path
 
 from shiplog.cli.console import print_tables, print_warnings, progress, write_json
-from shiplog.cli.options import add_source_option, assigned_numbers, assigned_sources
+from shiplog.cli.options import (
+    add_cut_options,
+    add_source_option,
+    assigned_numbers,
+    assigned_sources,
+    open_cut,
+)
 from shiplog.cli.paths import (
     require_distinct,
     require_inputs,
@@ -68,6 +74,7 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
         "--full", action="store_true", help="every sample in the review, not what a screen can show"
     )
     parser.add_argument("--json", metavar="FILE", help="write the summary as JSON; - is stdout")
+    add_cut_options(parser)
     parser.add_argument("--view", action="store_true", help="open the review in the Rerun viewer")
 
 
@@ -86,7 +93,6 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
     from analysis.replay.replay import Replay
     from analysis.report.replay_json import replay_json
     from analysis.report.replay_tables import replay_markdown, replay_tables
-    from shiplog.mcap.stream import open_log
     from shiplog.vessel.vessel_parser import load_vessel
 
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
@@ -95,7 +101,7 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
         compiling_beside(arguments.filter, smooth=arguments.smooth) as compilation,
     ):
         on_progress("read")
-        log = open_log(arguments.log)
+        log = open_cut(arguments.log, arguments)
         try:
             plan = plan_replay(
                 log, vessel, settings=settings, sources=sources, on_progress=on_progress
@@ -191,6 +197,7 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--view", action="store_true", help=f"open the review, else {DEFAULT_REVIEW}, in Rerun"
     )
+    add_cut_options(parser)
     parser.add_argument("--json", metavar="FILE", help="write the result as JSON; - is stdout")
 
 
@@ -213,7 +220,6 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
     from analysis.identification.vessel_file import vessel_toml
     from analysis.report.identification_json import identification_json
     from analysis.report.identification_tables import identification_tables
-    from shiplog.mcap.stream import open_log
     from shiplog.vessel.vessel_parser import load_vessel
 
     require_distinct_logs(fitted, held_out)
@@ -221,9 +227,9 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
     with progress("analysis", lines=arguments.model == "auto") as on_progress:
         on_progress("read")
         ship = identify(
-            [open_log(path) for path in arguments.log],
+            [open_cut(path, arguments) for path in arguments.log],
             arguments.model,
-            validation_logs=[open_log(path) for path in arguments.validate],
+            validation_logs=[open_cut(path, arguments) for path in arguments.validate],
             fixed=fixed,
             vessel=vessel,
             sources=sources,

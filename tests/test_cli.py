@@ -632,3 +632,24 @@ def test_a_replay_imports_no_unneeded_library(recorded: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.strip().split("\n")[-1] == "[]"
+
+
+def test_from_and_to_cut_the_log_in_every_verb(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bounds = ["--from", "100", "--to", "-100"]
+    assert main(["convert", str(recorded), "part.mcap", *bounds]) == OK
+    assert read("part.mcap").duration_secs == pytest.approx(300, abs=0.2)
+    assert "zigzag.mcap" in read("part.mcap").metadata["cut"]
+    assert main(["replay", str(recorded), "-o", "r.rrd", "--json", "r.json", *bounds]) == OK
+    result = json.loads(Path("r.json").read_text())["log"]
+    assert result["duration_secs"] == pytest.approx(300, abs=0.2)
+    assert result["name"] == "zigzag.mcap (100 to 400 s)"
+    assert "cut" in result["metadata"]
+    assert main(["identify", str(recorded), "--json", "i.json", *bounds]) == OK
+    (run,) = json.loads(Path("i.json").read_text())["fit"]
+    assert run["log"] == "zigzag.mcap (100 to 400 s)"
+    assert run["duration_secs"] == pytest.approx(300, abs=1)
+    capsys.readouterr()
+    assert "has 500.0 s" in refusal(capsys, USAGE, "replay", recorded, "--from", "600")
+    assert "no time: 'noon'" in refusal(capsys, USAGE, "identify", recorded, "--to", "noon")

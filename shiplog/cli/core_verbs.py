@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from shiplog.text_table import TextTable
 
 from .console import print_tables, print_warnings, progress, write_json
+from .options import add_cut_options
 from .paths import require_distinct, require_inputs, require_outputs
 from .verb import ExitCode, Verb
 
@@ -51,14 +52,15 @@ def _info_tables(info: "LogInfo") -> list[TextTable]:
             "" if channel.lowest is None else f"{channel.lowest:.4g}",
             "" if channel.highest is None else f"{channel.highest:.4g}",
             channel.display_unit or channel.unit,
-            channel.positive,
         )
         for channel in info.channels
     )
+    signs = tuple((one.topic, one.positive) for one in info.channels if one.positive)
     foreign = tuple((one.topic, str(one.messages), one.schema) for one in info.foreign)
-    headings = ("topic", "samples", "rate [Hz]", "lowest", "highest", "unit", "positive")
+    headings = ("topic", "samples", "rate [Hz]", "lowest", "highest", "unit")
     tables = (
         TextTable("channels", headings, channels),
+        TextTable("signs", ("topic", "positive"), signs),
         TextTable("topics of other programs", ("topic", "messages", "schema"), foreign),
     )
     return [table for table in tables if table.rows]
@@ -72,6 +74,7 @@ def _configure_convert(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--layout", type=Path, help="the columns of a foreign table: a TOML file (docs/tables.md)"
     )
+    add_cut_options(parser)
 
 
 def _convert(arguments: argparse.Namespace) -> ExitCode:
@@ -80,7 +83,13 @@ def _convert(arguments: argparse.Namespace) -> ExitCode:
 
     with progress() as on_progress:
         on_progress(f"{arguments.source.name} to {arguments.target.name}")
-        log, warnings = convert(arguments.source, arguments.target, arguments.layout)
+        log, warnings = convert(
+            arguments.source,
+            arguments.target,
+            arguments.layout,
+            start=arguments.start,
+            end=arguments.end,
+        )
     print_warnings(warnings)
     samples = sum(len(channel) for channel in log.channels)
     print(f"{arguments.target}: {samples} samples of {len(log.channels)} channels")
@@ -100,6 +109,7 @@ CONVERT = Verb(
     (
         "shiplog convert run.dat run.mcap --layout my_tank.toml",
         "shiplog convert trial.mcap trial.csv",
+        "shiplog convert day.mcap zigzag.mcap --from 12:04:30 --to 12:21   (a part of it)",
         "shiplog convert trial.mcap.part trial.mcap   (a recording that was cut short)",
     ),
 )

@@ -1,10 +1,16 @@
-"""Option texts such as `NAME=VALUE` as values."""
+"""Options that several verbs have, and option texts such as `NAME=VALUE` as values."""
 
 import argparse
 import re
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from shiplog.errors import UsageError
+
+from .paths import StrPath
+
+if TYPE_CHECKING:
+    from shiplog import LogFile, TrialLog
 
 NUMBER = r"([-+]?\d*\.?\d+(?:e[-+]?\d+)?)"  # one group of a regular expression
 
@@ -55,3 +61,31 @@ def assigned_numbers(texts: Sequence[str], option: str, example: str) -> dict[st
                 f"{option} takes NAME=NUMBER, such as {example}, not {name}={value}"
             ) from None
     return found
+
+
+def add_cut_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--from`` and ``--to``, which cut the logs of a verb; `open_cut` applies them."""
+    parser.add_argument(
+        "--from",
+        dest="start",
+        metavar="TIME",
+        type=_time_bound,
+        help="use each log from this time on: s since its start (120), s before its end (-30), "
+        "a time of day in UTC (12:04:30) or a time in ISO 8601 (2026-05-01T12:04:30Z)",
+    )
+    parser.add_argument(
+        "--to", dest="end", metavar="TIME", type=_time_bound, help="use each log up to this time"
+    )
+
+
+def open_cut(path: StrPath, arguments: argparse.Namespace) -> "TrialLog | LogFile":
+    """Open the part of a log between the bounds of the options ``--from`` and ``--to``."""
+    from shiplog.mcap.stream import open_log
+
+    return open_log(path).between(arguments.start, arguments.end)
+
+
+def _time_bound(text: str) -> float | str:
+    from shiplog.types.time_cut import parse_time_bound
+
+    return parse_time_bound(text)

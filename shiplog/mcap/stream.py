@@ -9,6 +9,7 @@ from typing import IO
 from mcap import records
 
 from shiplog.types import Channel, TrialLog
+from shiplog.types.time_cut import TimeCut, empty_cut_error, resolve_cut
 
 from .decode import McapContents
 from .reader import contents_described_by, open_mcap, read
@@ -35,25 +36,35 @@ class LogFile:
         The log without its samples: its channels in their order, and what is known of the file.
     schemas, channel_records
         The schema and channel records, by id.
+    cuts
+        The cuts of `between`, one after the other.
     """
 
     path: Path
     outline: TrialLog
     schemas: Mapping[int, records.Schema]
     channel_records: Mapping[int, records.Channel]
+    cuts: tuple[TimeCut, ...] = ()
 
     def __repr__(self) -> str:
         return f"LogFile({self.path}), read by its chunks"
 
     @property
     def name(self) -> str:
-        """The name of the file."""
-        return self.outline.name
+        """The name of the file, with the bounds where a part was cut from it."""
+        name = self.outline.name
+        for cut in self.cuts:
+            name = cut.name_of_part(name)
+        return name
 
     @property
     def metadata(self) -> Mapping[str, str]:
         """Text about the trial, by key."""
-        return self.outline.metadata
+        name, metadata = self.outline.name, dict(self.outline.metadata)
+        for cut in self.cuts:
+            metadata["cut"] = cut.text(name)
+            name = cut.name_of_part(name)
+        return metadata
 
     @property
     def vessel_toml(self) -> str | None:
@@ -85,6 +96,46 @@ class LogFile:
         """
         return replace(self, outline=self.outline.select_sources(sources))
 
+    def between(
+        self, start: float | str | None = None, end: float | str | None = None
+    ) -> "LogFile":
+        """Return the part of the log that was measured between two times.
+
+        One pass over the file computes its span.
+
+        Parameters
+        ----------
+        start, end
+            The bounds: the part has the samples from `start` on and before `end`. A number is in
+            s: since the log's start, or, if negative, before its end. A text is a time in ISO
+            8601, such as ``2026-05-01T12:04:30Z``, or a time of day, such as ``12:04:30``; in UTC
+            where it states no time zone. None is no bound.
+
+        Returns
+        -------
+        log
+            The part. Its name and its metadata ``cut`` state the bounds.
+
+        Raises
+        ------
+        UsageError
+            A bound cannot be read, or no sample is between them.
+        """
+        if start is None and end is None:
+            return self
+        spans = [
+            (int(channel.measured_ns.min()), int(channel.measured_ns.max()))
+            for chunk in self.chunks()
+            for channel in chunk
+            if len(channel)
+        ] or [(0, 0)]
+        span_ns = min(first for first, _ in spans), max(last for _, last in spans)
+        cut = resolve_cut(start, end, span_ns, self.name)
+        part = replace(self, cuts=(*self.cuts, cut))
+        if not any(len(channel) for chunk in part.chunks() for channel in chunk):
+            raise empty_cut_error(start, end, span_ns, self.name)
+        return part
+
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """Iterate over the samples in the order of the file, about a million at a time.
 
@@ -111,9 +162,12 @@ class LogFile:
         self.outline = replace(rest, channels=self.outline.channels)
 
     def _selected(self, chunk: TrialLog) -> tuple[Channel, ...]:
-        """Return the channels of a chunk in the order of the log."""
+        """Return the channels of a chunk in the order of the log, within its cuts."""
         by_key = {channel.key: channel for channel in chunk}
-        return tuple(by_key.get(channel.key, channel) for channel in self.outline)
+        channels = tuple(by_key.get(channel.key, channel) for channel in self.outline)
+        for cut in self.cuts:
+            channels = tuple(map(cut.apply, channels))
+        return channels
 
 
 def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:

@@ -20,7 +20,14 @@ from .parquet_form import read_parquet, write_parquet
 SUFFIXES = (".mcap", ".csv", ".parquet")
 
 
-def convert(source: Path, target: Path, layout: Path | None = None) -> tuple[TrialLog, list[str]]:
+def convert(
+    source: Path,
+    target: Path,
+    layout: Path | None = None,
+    *,
+    start: float | str | None = None,
+    end: float | str | None = None,
+) -> tuple[TrialLog, list[str]]:
     """Convert a file to another format.
 
     Parameters
@@ -32,6 +39,8 @@ def convert(source: Path, target: Path, layout: Path | None = None) -> tuple[Tri
         channel is sorted by measured time.
     layout
         Layout file of a foreign table.
+    start, end
+        The part to convert, as `TrialLog.between` takes them; by default all.
 
     Returns
     -------
@@ -56,6 +65,7 @@ def convert(source: Path, target: Path, layout: Path | None = None) -> tuple[Tri
         raise UsageError(f"source and target are the same file; name another target: {target}")
     log = _read_any(source, layout)
     _require_samples(log, source)
+    log = log.between(start, end)
     warnings = list(log.warnings)
     if source.suffix.lower() == target.suffix.lower() == ".mcap":
         log, sort_warnings = sorted_by_time(log)

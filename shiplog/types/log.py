@@ -12,6 +12,7 @@ from shiplog.units import did_you_mean
 
 from .arrays import ReadOnlyMapping, is_sorted
 from .channel import Channel
+from .time_cut import empty_cut_error, resolve_cut
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -208,6 +209,46 @@ class TrialLog(ChannelsByName[Channel]):
         selected = [self[f"{name}/{source}"] for name, source in sources.items()]
         others = [channel for channel in self.channels if channel.name not in sources]
         return replace(self, channels=(*selected, *others))
+
+    def between(
+        self, start: float | str | None = None, end: float | str | None = None
+    ) -> "TrialLog":
+        """Return the part of the log that was measured between two times.
+
+        Parameters
+        ----------
+        start, end
+            The bounds: the part has the samples from `start` on and before `end`. A number is in
+            s: since the log's start, or, if negative, before its end. A text is a time in ISO
+            8601, such as ``2026-05-01T12:04:30Z``, or a time of day, such as ``12:04:30``; in UTC
+            where it states no time zone. None is no bound.
+
+        Returns
+        -------
+        log
+            The part. Its name and its metadata ``cut`` state the bounds.
+
+        Raises
+        ------
+        UsageError
+            A bound cannot be read, or no sample is between them.
+
+        Examples
+        --------
+        >>> import shiplog
+        >>> log = shiplog.read("sample_data/zigzag_20_20.mcap")
+        >>> log.between(120, -30).name
+        'zigzag_20_20.mcap (120 to 570 s)'
+        """
+        if start is None and end is None:
+            return self
+        cut = resolve_cut(start, end, self.span_ns, self.name)
+        channels = tuple(map(cut.apply, self.channels))
+        if not any(map(len, channels)):
+            raise empty_cut_error(start, end, self.span_ns, self.name)
+        metadata = {**self.metadata, "cut": cut.text(self.name)}
+        name = cut.name_of_part(self.name)
+        return replace(self, name=name, channels=channels, metadata=metadata)
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """Iterate over the samples in chunks, all channels cut at the same times of reception.
