@@ -3,6 +3,7 @@
 `shiplog.checks.log_stats` computes them.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,6 +76,13 @@ class ChannelStats:
         Samples with an infinite value.
     impossible
         Samples beyond what is possible on a ship; `extent` is the worst value.
+    impossible_value
+        The impossible value that occurs most often, and how often.
+    sentinels
+        Values that stand for "not available", each with its number of samples; with `strict`, these
+        are not valid.
+    limits
+        The physically possible range of the channel; values outside it are impossible.
     stuck
         Runs of one repeated value; None where there is none, and for commanded channels.
     valid
@@ -112,6 +120,9 @@ class ChannelStats:
     missing: int
     infinite: Occurrences
     impossible: Occurrences
+    impossible_value: tuple[float, int]
+    sentinels: tuple[tuple[float, int], ...]
+    limits: tuple[float, float]
     stuck: StuckStats | None
     valid: int
     valid_span_ns: tuple[int, int]
@@ -135,7 +146,7 @@ class ChannelStats:
     def select(self, chunk: tuple[Channel, ...]) -> Channel | None:
         """Return this channel's samples in a chunk of the log; None where it has none.
 
-        With `strict`, impossible values are NaN; position fixes that are not used always are.
+        With `strict`, unusable values are NaN; position fixes that are not used always are.
         """
         for channel in chunk:
             if channel.topic == self.topic and channel.fields == self.fields:
@@ -146,7 +157,9 @@ class ChannelStats:
         """Return a part of this channel with NaN in place of values that are not used."""
         if self.fixes:
             return self.fixes.apply(channel)
-        return without_impossible(channel) if self.strict else channel
+        if not self.strict:
+            return channel
+        return without_unusable(channel, self.limits, tuple(value for value, _ in self.sentinels))
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,17 +208,32 @@ def gap_threshold_secs(interval_secs: float) -> float:
     return max(GAP_PERIODS * interval_secs, GAP_SECS)
 
 
-def without_impossible(channel: Channel) -> Channel:
-    """Return the channel with NaN in place of impossible values.
+def possible_range(name: str) -> tuple[float, float]:
+    """Return the physically possible range of a quantity; unlimited if it is not catalogued."""
+    kind = CATALOGUE.get(name)
+    return (kind.lowest, kind.highest) if kind else (-np.inf, np.inf)
 
-    The limits of each quantity are in `shiplog.units.CATALOGUE`. A channel with `fields`, or of a
-    quantity that is not in the catalogue, is returned unchanged.
+
+def without_unusable(
+    channel: Channel, limits: tuple[float, float], sentinels: Collection[float] = ()
+) -> Channel:
+    """Return the channel with NaN in place of impossible values and of sentinels.
+
+    A channel with `fields` is returned unchanged.
+
+    Parameters
+    ----------
+    channel
+        A channel, or a part of one.
+    limits
+        The lowest and the highest possible value.
+    sentinels
+        Values that stand for "not available", from `shiplog.checks.sentinels`.
     """
-    kind = CATALOGUE.get(channel.name)
-    if kind is None or channel.fields:
+    if channel.fields or (limits == (-np.inf, np.inf) and not sentinels):
         return channel
     values = channel.values
-    possible = (values >= kind.lowest) & (values <= kind.highest)
-    return (
-        channel if possible.all() else replace(channel, values=np.where(possible, values, np.nan))
-    )
+    usable = (values >= limits[0]) & (values <= limits[1])
+    if sentinels:
+        usable &= ~np.isin(values, list(sentinels))
+    return channel if usable.all() else replace(channel, values=np.where(usable, values, np.nan))

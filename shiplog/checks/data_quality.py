@@ -126,6 +126,12 @@ def _value_warnings(channel: ChannelStats) -> Iterator[str]:
             "froze: check it, and set these values to nan in a CSV of the log"
         )
     yield from _impossible_warnings(channel)
+    for value, number in channel.sentinels:
+        yield (
+            f"{_count(number, 'sample')} of exactly {_displayed(channel, value)}, to which the "
+            'channel jumps and from which it returns: it stands for "not available" and is not '
+            "used; check the sensor, and write nan instead where the log is made"
+        )
     if channel.fixes:
         yield from channel.fixes.warnings()
 
@@ -134,13 +140,22 @@ def _impossible_warnings(channel: ChannelStats) -> Iterator[str]:
     count = channel.impossible.count
     if not count:
         return
-    kind = CATALOGUE[channel.name]
+    lowest, highest = channel.limits
     yield (
-        f"{_count(count, 'impossible value')}, the worst "
-        f"{_displayed(channel, channel.impossible.extent)}; possible are "
-        f"{_displayed(channel, kind.lowest)} to {_displayed(channel, kind.highest)}: "
-        "check the unit in the layout and the sensor"
+        f"{_count(count, 'impossible value')}, {_worst(channel)}; possible are "
+        f"{_displayed(channel, lowest)} to {_displayed(channel, highest)}: "
+        "not used; check the unit in the layout and the sensor"
     )
+
+
+def _worst(channel: ChannelStats) -> str:
+    """Describe the impossible values: the one repeated most, or the worst."""
+    value, number = channel.impossible_value
+    if 1 < number == channel.impossible.count:
+        return f"all {_displayed(channel, value)}"
+    if number > max(2, channel.impossible.count // 2):
+        return f"{number} of them {_displayed(channel, value)}"
+    return f"the worst {_displayed(channel, channel.impossible.extent)}"
 
 
 def _displayed(channel: ChannelStats, value: float) -> str:

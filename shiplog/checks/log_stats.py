@@ -1,7 +1,10 @@
 """One pass over a log that computes the statistics of all its channels."""
 
+from collections import Counter
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,15 +13,26 @@ from shiplog.geodesy import positions_of
 from shiplog.types import Channel, FloatArray, Log, TimeArray
 from shiplog.units import CATALOGUE
 
-from .channel_stats import GAP_SECS, ChannelStats, LogStats, Occurrences, gap_threshold_secs
+from .channel_stats import (
+    GAP_SECS,
+    ChannelStats,
+    LogStats,
+    Occurrences,
+    gap_threshold_secs,
+    possible_range,
+    without_unusable,
+)
 from .fixes import FixScreen
 from .quantiles import Quantiles
+from .sentinels import MAX_WRAPPED, sentinel_values, unwrapped_limit
 from .stuck import StuckCheck
 
 Mask = NDArray[np.bool_]
+ChannelKey = tuple[str, tuple[str, ...]]  # topic and fields
 
 MIN_INTERVALS = 10  # fewer do not show whether a channel is irregular
 LAST_INSTANT_NS = np.iinfo(np.int64).max
+MAX_IMPOSSIBLE_VALUES = 1000  # different ones that are counted
 
 
 def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
@@ -31,7 +45,8 @@ def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
     log
         The log; its chunks are read once.
     strict
-        Treat impossible values as not measured: they are then not valid.
+        Treat impossible values and sentinels as not measured: they are then not valid. Where there
+        are sentinels, the log is read a second time.
 
     Examples
     --------
@@ -40,21 +55,43 @@ def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
     >>> stats["yaw_rate"].samples, round(stats["yaw_rate"].interval_secs, 3)
     (6001, 0.1)
     """
-    collectors: dict[tuple[str, tuple[str, ...]], _ChannelStatsCollector] = {}
-    for chunk in log.chunks():
-        for channel in chunk:
-            if channel.key not in collectors:
-                collectors[channel.key] = _ChannelStatsCollector(channel, strict=strict)
-            collectors[channel.key].add(channel)
+    collectors = _collect(log, {}, strict=strict)
+    if strict:
+        cleanings = {key: found for key, each in collectors.items() if (found := each.cleaning())}
+        collectors = _collect(log, cleanings, strict=True) if cleanings else collectors
     max_speed = max((c.max_value for c in collectors.values() if c.name == "speed"), default=0.0)
     return LogStats(log.name, tuple(c.result(max_speed) for c in collectors.values()))
+
+
+class _Cleaning(NamedTuple):
+    """Which values of a channel cannot be used: those outside the limits, and its sentinels."""
+
+    limits: tuple[float, float]
+    sentinels: tuple[float, ...] = ()
+
+
+def _collect(
+    log: Log, cleanings: Mapping[ChannelKey, _Cleaning], *, strict: bool
+) -> "dict[ChannelKey, _ChannelStatsCollector]":
+    """Collect the statistics of all channels in one pass."""
+    collectors: dict[ChannelKey, _ChannelStatsCollector] = {}
+    for chunk in log.chunks():
+        for channel in chunk:
+            key = channel.key
+            if key not in collectors:
+                cleaning = cleanings.get(key) or _Cleaning(possible_range(channel.name))
+                collectors[key] = _ChannelStatsCollector(channel, cleaning, strict=strict)
+            collectors[key].add(channel)
+    return collectors
 
 
 class _ChannelStatsCollector:
     """Accumulates the statistics of one channel chunk by chunk."""
 
-    def __init__(self, channel: Channel, *, strict: bool) -> None:
+    def __init__(self, channel: Channel, cleaning: _Cleaning, *, strict: bool) -> None:
         self._channel, self._strict = channel, strict  # the channel for its name, unit and fields
+        self._limits = cleaning.limits
+        self._sentinels = dict.fromkeys(cleaning.sentinels, 0)  # with the number of samples of each
         kind = CATALOGUE.get(channel.name)
         self._stuck = None if kind is not None and kind.commanded else StuckCheck()
         self._fixes = (
@@ -67,6 +104,7 @@ class _ChannelStatsCollector:
         self._backward_steps, self._received_early = Occurrences(), Occurrences()
         self._infinite, self._impossible = Occurrences(), Occurrences()
         self._max_delay_ns = 0
+        self._impossible_values: Counter[float] = Counter()
         self._worst_excess = 0.0  # of an impossible value over its limit
         self._long_intervals = [np.zeros((0, 2), np.int64)]  # rows of start and length, ns
         self._intervals, self._values = Quantiles(), Quantiles()
@@ -88,11 +126,15 @@ class _ChannelStatsCollector:
             return
         if not self._samples:
             self._start = self._last = self._last_valid = int(channel.measured_ns[0])
+        if self._sentinels:
+            for value in self._sentinels:
+                self._sentinels[value] += int(np.count_nonzero(channel.values == value))
+            channel = without_unusable(channel, (-np.inf, np.inf), self._sentinels)
         rows = channel.values.reshape(len(channel), -1)
         if self._fixes:
             self._fixes.add(channel)
             rows = _without_altitude(channel)
-        valid = _valid(channel, rows, strict=self._strict)
+        valid = self._usable(channel, rows)
         if not valid.all() and self._valid_intervals is self._intervals:
             self._valid_intervals = deepcopy(self._intervals)
         self._add_times(channel, valid)
@@ -100,6 +142,12 @@ class _ChannelStatsCollector:
         if self._stuck:
             self._stuck.add((channel.measured_ns - self._start) * 1e-9, rows)
         self._samples += len(channel)
+
+    def _usable(self, channel: Channel, rows: FloatArray) -> Mask:
+        """Which samples are finite and, with `strict`, possible, (n,)."""
+        if channel.fields or not self._strict or self._limits == (-np.inf, np.inf):
+            return np.asarray(np.isfinite(rows).all(axis=1))
+        return np.asarray((rows[:, 0] >= self._limits[0]) & (rows[:, 0] <= self._limits[1]))
 
     def _add_times(self, channel: Channel, valid: Mask) -> None:
         times = channel.measured_ns
@@ -160,7 +208,7 @@ class _ChannelStatsCollector:
             self._values.add(values[:, 0])
 
     def _add_impossible(self, channel: Channel, rows: FloatArray) -> None:
-        excess = _excess(channel, rows)
+        excess = _excess(channel, rows, self._limits)
         impossible = np.flatnonzero(excess > 0)
         if len(impossible):
             worst = int(np.nanargmax(excess))
@@ -170,6 +218,12 @@ class _ChannelStatsCollector:
             first_ns = channel.measured_ns[impossible[0]]
             more = self._with_more(self._impossible, len(impossible), first_ns, 0.0)
             self._impossible = replace(more, extent=extent)
+            self._count_impossible(rows[impossible, 0])
+
+    def _count_impossible(self, values: FloatArray) -> None:
+        """Count impossible values by value, as long as these are few."""
+        if len(self._impossible_values) < MAX_IMPOSSIBLE_VALUES:
+            self._impossible_values.update(values.tolist())
 
     def _with_more(
         self, occurrences: Occurrences, count: int, at_ns: int, extent: float
@@ -178,6 +232,20 @@ class _ChannelStatsCollector:
         if occurrences.count:
             return replace(occurrences, count=occurrences.count + count)
         return Occurrences(count, float(at_ns - self._start) * 1e-9, extent)
+
+    def cleaning(self) -> _Cleaning | None:
+        """Return what the samples show to be unusable; None where a second pass is needless."""
+        if self._channel.fields or not self._valid:
+            return None
+        (low, high), values = self._limits, self._values.values
+        kind = CATALOGUE.get(self._channel.name)
+        if kind is not None and kind.circular and max(map(abs, self._value_range)) > MAX_WRAPPED:
+            limit = unwrapped_limit(values)
+            low, high = max(low, -limit), min(high, limit)
+            values = values[(values >= low) & (values <= high)]
+        sentinels = sentinel_values(values, self._channel.unit)
+        needless = (low, high) == self._limits and not sentinels
+        return None if needless else _Cleaning((low, high), sentinels)
 
     def result(self, max_speed: float) -> ChannelStats:
         """Return the statistics of all samples added; `max_speed` of the log, m/s."""
@@ -200,9 +268,12 @@ class _ChannelStatsCollector:
             backward_steps=self._backward_steps,
             received_early=self._received_early,
             max_delay_ns=self._max_delay_ns,
-            missing=self._missing,
+            missing=self._missing - sum(self._sentinels.values()),
             infinite=self._infinite,
             impossible=self._impossible,
+            impossible_value=next(iter(self._impossible_values.most_common(1)), (np.nan, 0)),
+            sentinels=tuple(self._sentinels.items()),
+            limits=self._limits,
             stuck=self._stuck.result(interval) if self._stuck else None,
             valid=fixes.usable if fixes else self._valid,
             valid_span_ns=(
@@ -224,14 +295,6 @@ class _ChannelStatsCollector:
         return tuple((float(start), float(length)) for start, length in gaps)
 
 
-def _valid(channel: Channel, rows: FloatArray, *, strict: bool) -> Mask:
-    """Which samples are finite and, with `strict`, possible, (n,)."""
-    kind = CATALOGUE.get(channel.name)
-    if channel.fields or kind is None or not strict:
-        return np.asarray(np.isfinite(rows).all(axis=1))
-    return np.asarray((rows[:, 0] >= kind.lowest) & (rows[:, 0] <= kind.highest))
-
-
 def _missing(channel: Channel) -> int:
     """Count the samples that were not measured: all components NaN, or one of a position."""
     missing = np.isnan(channel.values.reshape(len(channel), -1))
@@ -250,12 +313,11 @@ def _without_altitude(channel: Channel) -> FloatArray:
     return np.where(measured[:, None], channel.values[:, :2], np.nan)
 
 
-def _excess(channel: Channel, rows: FloatArray) -> FloatArray:
+def _excess(channel: Channel, rows: FloatArray, limits: tuple[float, float]) -> FloatArray:
     """By how much each sample exceeds the limits of what is possible, (n,); <= 0 within them."""
-    kind = CATALOGUE.get(channel.name)
-    if channel.fields or kind is None:
+    if channel.fields:
         return np.full(len(rows), -np.inf)
-    return np.asarray(np.maximum(kind.lowest - rows[:, 0], rows[:, 0] - kind.highest))
+    return np.asarray(np.maximum(limits[0] - rows[:, 0], rows[:, 0] - limits[1]))
 
 
 def _extended_span(span: tuple[int, int], times: TimeArray) -> tuple[int, int]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from shiplog.checks.channel_stats import LogStats, without_impossible
+from shiplog.checks.channel_stats import LogStats
 from shiplog.types import Channel, Log
 
 
@@ -29,7 +29,7 @@ class Screening:
 class ScreenedLog:
     """A log as its users take it; a `shiplog.types.Log`.
 
-    Values that are not possible are NaN, and each quantity has one source.
+    Impossible values and sentinels are NaN, and each quantity has one source.
 
     Parameters
     ----------
@@ -42,6 +42,7 @@ class ScreenedLog:
     def __init__(self, log: Log, screening: Screening) -> None:
         self._log = log.select_sources(screening.sources) if screening.sources else log
         self.screening = screening
+        self._stats = {(stats.topic, stats.fields): stats for stats in screening.stats}
 
     @property
     def name(self) -> str:
@@ -71,13 +72,7 @@ class ScreenedLog:
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """Iterate over the screened samples in chunks, each topic in the order of reception."""
         for chunk in self._log.chunks():
-            yield tuple(self._screened(channel) for channel in chunk)
-
-    def _screened(self, channel: Channel) -> Channel:
-        for stats in self.screening.stats:
-            if (stats.topic, stats.fields) == channel.key:
-                return stats.screened(channel)
-        return without_impossible(channel)
+            yield tuple(self._stats[channel.key].screened(channel) for channel in chunk)
 
     def select_sources(self, sources: Mapping[str, str]) -> "ScreenedLog":
         """Return the log with other sources; as those were not screened, screen the log anew."""

@@ -8,7 +8,7 @@ from faults import dropout, freeze, spike
 from trial_logs import InChunks
 
 from shiplog import Channel, TrialLog
-from shiplog.checks.channel_stats import ChannelStats, without_impossible
+from shiplog.checks.channel_stats import ChannelStats, possible_range, without_unusable
 from shiplog.checks.log_stats import compute_log_stats
 
 START = 1_700_000_000 * 10**9
@@ -47,7 +47,9 @@ def test_only_possible_values_are_valid_if_strict() -> None:
     assert stats_of(wild, strict=True).valid == 2
     assert stats_of(wild, strict=True).value_range == (5.0, 6.0)
     assert stats_of(wild).impossible.count == 1
-    np.testing.assert_array_equal(without_impossible(wild).values, [5, np.nan, 6, np.nan])
+    np.testing.assert_array_equal(
+        without_unusable(wild, possible_range(wild.name)).values, [5, np.nan, 6, np.nan]
+    )
 
 
 def test_the_interval_between_valid_samples_leaves_out_the_others() -> None:

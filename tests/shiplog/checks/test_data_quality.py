@@ -142,7 +142,7 @@ def test_impossible_values_are_reported_in_display_units() -> None:
     assert warnings_of(channel(values)) == [
         (
             "/yaw_rate/a: 2 impossible values, the worst -171.9 deg/s; possible are -57.3 deg/s to "
-            "57.3 deg/s: check the unit in the layout and the sensor"
+            "57.3 deg/s: not used; check the unit in the layout and the sensor"
         )
     ]
 
