@@ -27,6 +27,7 @@ from shiplog.files import atomic_write
 from shiplog.vessel.settings import DISTURBANCES
 
 DEFAULT_REVIEW = "identified.rrd"
+LENGTH_HELP = "length between perpendiculars, such as 320; precedes that of the vessel file"
 
 
 # ---- replay
@@ -37,6 +38,7 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--vessel", help="a preset or a vessel.toml, instead of the one the log carries"
     )
+    parser.add_argument("--length", type=float, metavar="METRES", help=LENGTH_HELP)
     add_source_option(parser)
     parser.add_argument(
         "--filter",
@@ -104,7 +106,12 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
         log = open_cut(arguments.log, arguments)
         try:
             plan = plan_replay(
-                log, vessel, settings=settings, sources=sources, on_progress=on_progress
+                log,
+                vessel,
+                settings=settings,
+                sources=sources,
+                length=arguments.length,
+                on_progress=on_progress,
             )
         except ShiplogError:
             print_warnings(log.warnings)  # they may explain the error
@@ -186,6 +193,7 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
         "--vessel",
         help="a preset or a vessel.toml: length, α's and steering gear, instead of the logs' own",
     )
+    parser.add_argument("--length", type=float, metavar="METRES", help=LENGTH_HELP)
     parser.add_argument(
         "-o", "--output", metavar="FILE", help="the vessel.toml, for simulation and replay"
     )
@@ -233,6 +241,7 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
             fixed=fixed,
             vessel=vessel,
             sources=sources,
+            length=arguments.length,
             on_progress=on_progress,
         )
         text = vessel_toml(ship, on_progress) if arguments.output else ""

@@ -18,7 +18,7 @@ from shiplog.mcap.stream import open_log
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model, loadable_models, ship_model
 from shiplog.types import Log
-from shiplog.vessel.vessel import Vessel
+from shiplog.vessel.vessel import Vessel, with_length
 
 from .advice import check_ties, manoeuvres_to_identify
 from .fit_warnings import fit_warnings
@@ -43,6 +43,7 @@ def identify(
     fixed: Mapping[str, float] | None = None,
     vessel: Vessel | None = None,
     sources: Mapping[str, str] | None = None,
+    length: float | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> IdentifiedShip:
     """Fit a ship model to one or more logs of the same ship by output error.
@@ -61,9 +62,11 @@ def identify(
         Parameters that are not estimated, by name, in their own units.
     vessel
         Gives the ship's length, the parameters alpha1, alpha2 and alpha3 of the rudder, and the
-        steering gear; if None, the vessel file that the logs carry.
+        steering gear; if None, the vessel file that the logs carry. It may have any of these.
     sources
         The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
+    length
+        The ship's length, m, in place of the vessel's.
     on_progress
         Given each step and the share of the whole work that is done.
 
@@ -97,7 +100,7 @@ def identify(
     steps = _Steps(on_progress, auto=model == AUTO)
     steps.begin("read")
     runs, held_out = distinct_runs(to_fit, to_predict, sources)
-    ship = common_vessel([*runs, *held_out], vessel)
+    ship = with_length(common_vessel([*runs, *held_out], vessel), length)
     steps.begin("fit")
     candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)
     steps.begin("uncertainty")
@@ -214,6 +217,6 @@ def _assumed_length(fit: OutputError, ship: Vessel | None) -> Iterator[str]:
     if scale.secs != 1.0 and (ship is None or ship.length is None):
         yield (
             f"the ship's length is not given; {scale.secs * scale.speed:.0f} m is assumed as the "
-            "scale of the dimensionless model, on which its priors depend a little; give a vessel "
-            "file with the length"
+            "scale of the dimensionless model, on which its priors depend a little; give it with "
+            "--length, or in a vessel file"
         )

@@ -11,6 +11,8 @@ from shiplog.types import FloatArray
 
 REST_TOLERANCE = radians(0.5)  # a rudder within it is at rest, or held at one angle
 REST_SECS = 3.0  # at the start of a run, whose median rudder is the rest position
+HELM_SECS = 3.0  # before an order, whose median rudder is the helm that the order ends
+ORDER_SHARE = 0.6  # of the largest rudder angle: beyond it the rudder follows the manoeuvre's order
 MIN_RUDDER_ORDER = 4 * REST_TOLERANCE  # a smaller deflection is no order
 MAX_SPIKE_SECS = 3.0  # a shorter deflection of the rudder is a measurement error
 ANGLE_TOLERANCE, ANGLE_TOLERANCE_SHARE = radians(1.5), 0.1  # the larger one decides
@@ -19,10 +21,11 @@ SMOOTHING_SHARE = 1 / 6  # of the time from side to side: the half width of a he
 
 
 def first_execute(rudder: FloatArray, dt: float) -> int | None:
-    """Find the last sample before the rudder first leaves its rest position.
+    """Find the last sample before the rudder order that leads to the manoeuvre's angle.
 
     All indices count from this instant, in the measured and in the simulated run alike: another
-    definition changes an advance by some per cent.
+    definition changes an advance by some per cent. Smaller helm before it, as it keeps a ship on
+    its course, is not part of the manoeuvre.
 
     Parameters
     ----------
@@ -43,11 +46,15 @@ def first_execute(rudder: FloatArray, dt: float) -> int | None:
     3
     """
     rest = float(np.median(rudder[: max(1, round(REST_SECS / dt))]))
-    deflected = np.flatnonzero(np.abs(rudder - rest) > MIN_RUDDER_ORDER)
-    if not len(deflected):
+    if np.max(np.abs(rudder - rest)) <= MIN_RUDDER_ORDER:
         return None
-    resting = np.flatnonzero(np.abs(rudder[: deflected[0] + 1] - rest) <= REST_TOLERANCE)
-    return int(resting[-1]) if len(resting) else 0
+    ordered = int(np.argmax(np.abs(rudder) > ORDER_SHARE * np.max(np.abs(rudder))))
+    towards, window = rudder * np.sign(rudder[ordered]), max(1, round(HELM_SECS / dt))
+    for k in range(ordered, 0, -1):
+        helm = towards[max(0, k - window) : k + 1]
+        if towards[k] - np.median(helm) <= REST_TOLERANCE:
+            return k
+    return 0
 
 
 def remove_spikes(rudder: FloatArray, dt: float) -> FloatArray:

@@ -36,6 +36,7 @@ MAX_FALSE_ALARM_RATE = 0.02  # of the test of one equation without a change
 SIGNIFICANCE_LEVEL = 0.05  # of a coefficient among several that change together
 MIN_INFORMATION_SHARE = 0.15  # of the information on a coefficient, on either side of a change
 GUARD_SHARE = 0.75  # of a bump's length: rows so near to a change are ignored
+MIN_SIDE_BUMPS = 2  # of rows on either side of a change, beside those ignored around it
 MAX_MIXING_STEPS = 8  # iterations for the slipstream's share of the rudder; four are enough
 MIN_STD = 1e-150  # a smaller standard error is zero
 
@@ -263,6 +264,7 @@ def _estimate_instant(blocks: Blocks, columns: tuple[int, ...]) -> tuple[int, fl
     allowed = ((shares >= MIN_INFORMATION_SHARE) & (shares <= 1 - MIN_INFORMATION_SHARE)).all(
         axis=1
     ) & _is_excited(blocks)
+    allowed &= _is_long_enough(blocks)
     if not allowed.any():
         return None
     residual_moments = blocks.moments - blocks.grams @ (inverse @ blocks.moments.sum(0))
@@ -273,6 +275,17 @@ def _estimate_instant(blocks: Blocks, columns: tuple[int, ...]) -> tuple[int, fl
     gains = np.einsum("ki,ki->k", S, np.linalg.solve(Q, S[:, :, None])[:, :, 0])
     odds = shares[allowed, -1] / (1 - shares[allowed, -1])
     return int(np.flatnonzero(allowed)[np.argmax(gains)]) + 1, log(odds[-1] / odds[0])
+
+
+def _is_long_enough(blocks: Blocks) -> NDArray[np.bool_]:
+    """Return whether both sides of each edge between blocks are long enough, (k - 1,).
+
+    Beside the rows that are ignored around a change, each side needs `MIN_SIDE_BUMPS` bumps.
+    """
+    known = (blocks.tallies[:, 0] > 0).astype(int)
+    before = np.cumsum(known)[:-1]
+    least = blocks.guard_blocks + MIN_SIDE_BUMPS * blocks.overlap_blocks
+    return np.asarray(np.minimum(before, known.sum() - before) >= least)
 
 
 def _is_excited(blocks: Blocks) -> NDArray[np.bool_]:

@@ -4,7 +4,7 @@
 disturbances to estimate.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
 
@@ -24,8 +24,8 @@ from shiplog.resampling import Clock
 from shiplog.screening import Screening
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Log
-from shiplog.vessel.settings import DisturbanceSettings, FilterSettings
-from shiplog.vessel.vessel import with_settings
+from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, settings_dict
+from shiplog.vessel.vessel import with_length, with_settings
 from shiplog.vessel.vessel_parser import parse_vessel
 
 from .passes import FirstPass, SecondPass, first_pass, second_pass
@@ -101,6 +101,7 @@ def plan_replay(
     filter: FilterKind | str | None = None,  # noqa: A002 - as on the command line
     settings: Mapping[str, object] | None = None,
     sources: Mapping[str, str] | None = None,
+    length: float | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> Plan:
     """Make the plan of a replay, from two passes over the log.
@@ -118,6 +119,8 @@ def plan_replay(
         Settings that take precedence over the vessel's, such as ``{"filter.gate": 4.0}``.
     sources
         The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
+    length
+        The ship's length, m, in place of the vessel's.
     on_progress
         Called with each step and its share done.
 
@@ -134,6 +137,7 @@ def plan_replay(
         Where a setting is invalid.
     """
     vessel, origin = _stated_vessel(log, vessel, settings or {})
+    vessel = with_length(vessel, length) or vessel
     vessel, kind = _with_filter(vessel, filter)
     first = first_pass(log, sources, on_progress)
     second = second_pass(first, vessel, on_progress)
@@ -159,6 +163,46 @@ def plan_replay(
         yaw_solution=second.yaw.solution(),
         surge_solution=second.surge.solution(),
         warnings=(*warnings, *noise_warnings, *wave_warnings),
+    )
+
+
+def changed_settings(vessel: Vessel) -> dict[str, object]:
+    """Return the settings of filter and disturbance observer that differ from their defaults.
+
+    Examples
+    --------
+    >>> import shiplog
+    >>> from shiplog.vessel.vessel import with_settings
+    >>> vessel, _ = shiplog.load_vessel("table1")
+    >>> changed_settings(with_settings(vessel, {"filter.shift": 0.2}))["filter.shift"]
+    0.2
+    """
+    defaults = {"filter": FilterSettings(), "disturbance": DisturbanceSettings()}
+    return {
+        f"{section}.{key}": value
+        for section, default in defaults.items()
+        for key, value in settings_dict(getattr(vessel, section)).items()
+        if value != getattr(default, key)
+    }
+
+
+def with_default_settings(plan: Plan, names: Iterable[str]) -> Plan:
+    """Return a plan with some settings at their defaults, and noise and wave that follow from them.
+
+    Parameters
+    ----------
+    plan
+        The plan.
+    names
+        Such as ``filter.shift``.
+    """
+    vessel = with_settings(plan.vessel, dict.fromkeys(names, "auto"))
+    vessel, kind = _with_filter(vessel, None)
+    averaged = _averaged(vessel.filter, plan.log_stats, plan.clock.dt_secs)
+    noise = noise_of(plan.stats, vessel.paper_coefficients, averaged, kind)
+    disturbance, _ = _disturbance_settings(vessel, kind, plan.stats, noise)
+    return replace(
+        plan, vessel=vessel, filter_kind=kind, noise=noise, disturbance_settings=disturbance
     )
 
 
@@ -195,7 +239,7 @@ def _with_first_model(
     first = fit_first_model(second.yaw, second.surge, second.stats, log_name)
     fitted, model = replace(vessel, coefficients=first.coefficients), first.paper_coefficients
     if vessel.model is None:
-        fitted = replace(fitted, name=first.name, approach_rpm=first.approach_rpm)
+        fitted = replace(fitted, name=vessel.name or first.name, approach_rpm=first.approach_rpm)
     else:
         warnings.append(
             f"the vessel file has only a model {vessel.model.name!r}, but the filters use the "

@@ -33,10 +33,11 @@ from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Log
 
 from .passes import resampled_chunks, weak_form_on_clock
-from .plan import Plan, plan_replay
+from .plan import Plan, changed_settings, plan_replay, with_default_settings
 from .residuals import ResidualSummary, ResidualTest
 from .track import Track, Tracker
 
+DESIGN_ERRORS = (UsageError, np.linalg.LinAlgError, ArithmeticError)
 # the steps reported as progress; the fourth only where states are smoothed
 PROGRESS_STEPS = ("check the log", "resample", "choose the model", "smooth", "replay")
 
@@ -362,24 +363,47 @@ class _Stages:
 
 def _estimators(plan: Plan, log_name: str) -> tuple[Filter, ForceObserver]:
     """Design the filter and the observer; for a model that diverges neither may exist."""
-    model, noise, stats = plan.vessel.paper_coefficients, plan.noise, plan.stats
     settings = plan.disturbance_settings
     # an invalid setting stays a UsageError that names it; only the model can diverge
-    force_models(settings, settings.wave_frequency, stats)
+    force_models(settings, settings.wave_frequency, plan.stats)
     try:
-        with np.errstate(over="ignore", invalid="ignore"):
-            filter_ = plan.filter_kind.make(model, noise, stats, plan.vessel.filter)
-            observer = ForceObserver(model, noise, stats, settings, settings.wave_frequency)
-            return filter_, observer
-    except (UsageError, np.linalg.LinAlgError) as error:
+        return _design(plan)
+    except DESIGN_ERRORS as error:
+        names = _unsuitable_settings(plan)
+        if names:
+            raise UsageError(
+                f"{names} does not suit this log: {error}; choose another value: {log_name}"
+            ) from error
         raise _diverged(plan, log_name, f" ({error})") from error
 
 
+def _design(plan: Plan) -> tuple[Filter, ForceObserver]:
+    model, noise, stats = plan.vessel.paper_coefficients, plan.noise, plan.stats
+    settings = plan.disturbance_settings
+    with np.errstate(over="ignore", invalid="ignore"):
+        filter_ = plan.filter_kind.make(model, noise, stats, plan.vessel.filter)
+        return filter_, ForceObserver(model, noise, stats, settings, settings.wave_frequency)
+
+
+def _unsuitable_settings(plan: Plan) -> str:
+    """Name the settings without which the design succeeds; "" where it fails without any."""
+    changed = changed_settings(plan.vessel)
+    for names in (*((name,) for name in changed), tuple(changed)):
+        try:
+            _design(with_default_settings(plan, names))
+        except (*DESIGN_ERRORS, LogError):
+            continue
+        return ", ".join(f"{name} = {changed[name]}" for name in names)
+    return ""
+
+
 def _diverged(plan: Plan, log_name: str, reason: str = "") -> LogError:
+    changed = [f"{name} = {value}" for name, value in changed_settings(plan.vessel).items()]
+    settings = f", or remove the settings {', '.join(changed)}" if changed else ""
     return LogError(
         f"the filter or the disturbance observer diverges{reason}: the model "
         f"({plan.model_origin}) or the settings do not fit this log; give another model with "
-        f"--vessel: {log_name}"
+        f"--vessel{settings}: {log_name}"
     )
 
 

@@ -15,12 +15,14 @@ from .settings import (
     disturbance_settings,
     filter_settings,
     identifier_settings,
+    number_error,
     settings_dict,
 )
 
 if TYPE_CHECKING:  # it brings numba; only verbs that compute need it
     from shiplog.ships.paper import Coefficients
 
+MAX_LENGTH = 1000.0  # m
 SECTIONS = ("filter", "disturbance", "identifier")  # of settings, in a vessel file
 
 
@@ -34,7 +36,7 @@ class Vessel:
         Name of the ship.
     coefficients
         Coefficients of the identification paper's model, in SI units and radians, on which the
-        filters are built; None where the file has only a `[model]`.
+        filters are built; None where the file does not give them.
     length
         Length between perpendiculars, m.
     approach_rpm
@@ -70,14 +72,42 @@ class Vessel:
         Raises
         ------
         VesselError
-            The file has only a `[model]`.
+            The vessel file does not give them.
         """
         if self.coefficients is None:
             raise VesselError(
-                "the vessel file has only a [model], but filters need the coefficients of the "
-                f"paper's model; add [yaw], [surge] and [rudder]: {self.name}"
+                "the vessel file lacks the coefficients of the paper's model; add [yaw], [surge] "
+                f"and alpha1, alpha2, alpha3 of [rudder]: {self.name or 'unnamed ship'}"
             )
         return self.coefficients
+
+
+def with_length(vessel: Vessel | None, length: float | None) -> Vessel | None:
+    """Return the vessel with the length given, which takes precedence over its own.
+
+    Parameters
+    ----------
+    vessel
+        The vessel; None where nothing but the length is known.
+    length
+        Length between perpendiculars, m; None leaves the vessel as it is.
+
+    Raises
+    ------
+    UsageError
+        The length is not a number above 0 and up to `MAX_LENGTH`.
+
+    Examples
+    --------
+    >>> with_length(None, 320.0).length
+    320.0
+    """
+    if length is None:
+        return vessel
+    error = number_error("length", length, 0.0, MAX_LENGTH, positive=True)
+    if error:
+        raise UsageError(f"{error}; give the length between perpendiculars in metres")
+    return replace(vessel or Vessel("", None), length=float(length))
 
 
 def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:

@@ -114,6 +114,10 @@ def parse_vessel(text: str, where: str) -> Vessel:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise VesselError(f"not a TOML file ({error}); correct that line: {where}") from error
+    if not table:
+        raise VesselError(
+            f"the vessel file is empty; give what is known, such as length = 320: {where}"
+        )
     errors: list[str] = []
     model_table = table.pop("model", None)
     sections = {key: _section(key, table.pop(key, {}), errors) for key in SECTIONS}
@@ -124,7 +128,7 @@ def parse_vessel(text: str, where: str) -> Vessel:
     # a length with an error is nan: it must not be reported as missing, too
     length = numbers[""].get("length", nan if "length" in table else None)
     model = None if model_table is None else parse_model_section(model_table, length, errors)
-    has_paper_model = model_table is None or _has_paper_model(table)
+    has_paper_model = _has_paper_model(table)
     if has_paper_model:
         _require(numbers, _yaw_keys(numbers["yaw"], errors), errors)
     angle_unit = _angle_unit(table, numbers, errors)

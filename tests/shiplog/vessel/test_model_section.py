@@ -29,7 +29,7 @@ def test_a_model_without_the_papers_is_simulated(name: str) -> None:
     assert ship.coefficients._asdict().items() >= SHIPS[name].items()
     assert (ship.scale.secs, ship.scale.speed, ship.scale.rpm) == (LENGTH / SPEED, SPEED, RPM)
     assert vessel.coefficients is None
-    with pytest.raises(VesselError, match=f"has only a .model..*: a {name}"):
+    with pytest.raises(VesselError, match=f"lacks the coefficients.*: a {name}"):
         _ = vessel.paper_coefficients
 
 

@@ -1,13 +1,15 @@
 """Vessel files: coefficients and their units, presets, and the errors of a file."""
 
+from dataclasses import replace
 from math import pi, radians
 from pathlib import Path
 
 import pytest
 
-from shiplog import VesselError, load_vessel
+from shiplog import UsageError, Vessel, VesselError, load_vessel
 from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import FilterSettings
+from shiplog.vessel.vessel import with_length
 from shiplog.vessel.vessel_parser import parse_vessel
 
 DEG = 180 / pi  # degrees in a radian
@@ -162,10 +164,34 @@ def test_an_error_names_the_key_and_the_value(old: str, new: str, message: str) 
     assert message in error_of((TIMES + REST).replace(old, new))
 
 
-def test_an_empty_file_lacks_every_section() -> None:
-    message = error_of("")
-    assert "3 errors" in message
-    assert all(f"[{section}] lacks" in message for section in ("yaw", "rudder", "surge"))
+def test_an_empty_file_is_an_error() -> None:
+    assert "the vessel file is empty" in error_of("")
+
+
+@pytest.mark.parametrize("length", ["", "length = 320.0\n"])
+@pytest.mark.parametrize("gear", ["", "[rudder]\nmax = 0.6\nrate = 0.04\n"])
+def test_any_part_of_a_ship_may_be_given_alone(length: str, gear: str) -> None:
+    vessel = parse_vessel(f"name = 'a ship'\n{length}{gear}", "ship.toml")
+    assert (vessel.name, vessel.coefficients, vessel.model) == ("a ship", None, None)
+    assert vessel.length == (320.0 if length else None)
+    assert vessel.rudder_max == (0.6 if gear else Vessel("", None).rudder_max)
+    assert vessel.rudder_rate == (0.04 if gear else Vessel("", None).rudder_rate)
+
+
+def test_a_misspelt_length_alone_is_an_error() -> None:
+    assert "did you mean 'length'" in error_of("lenght = 320.0")
+
+
+def test_a_length_given_precedes_that_of_the_vessel() -> None:
+    vessel = parse_vessel("length = 320.0", "ship.toml")
+    assert with_length(vessel, 7.0) == replace(vessel, length=7.0)
+    assert with_length(vessel, None) is vessel
+
+
+@pytest.mark.parametrize("length", [0.0, -320.0, 1e9, float("nan"), float("inf")])
+def test_an_impossible_length_is_a_usage_error(length: float) -> None:
+    with pytest.raises(UsageError, match="length must"):
+        with_length(None, length)
 
 
 def test_a_text_that_is_not_toml_is_an_error_with_its_line() -> None:
