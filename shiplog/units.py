@@ -35,6 +35,29 @@ UNITS: dict[str, tuple[str, float]] = {
     "deg/min": ("rad/s", pi / 180 / 60),
     "rpm": ("rpm", 1.0),
     "rev/s": ("rpm", 60.0),
+    "Hz": ("rpm", 60.0),
+    "%": ("1", 0.01),
+    "N": ("N", 1.0),
+    "kN": ("N", 1e3),
+    "MN": ("N", 1e6),
+    "Nm": ("Nm", 1.0),
+    "kNm": ("Nm", 1e3),
+    "MNm": ("Nm", 1e6),
+    "W": ("W", 1.0),
+    "kW": ("W", 1e3),
+    "MW": ("W", 1e6),
+    "hp": ("W", 735.49875),  # metric
+    "Pa": ("Pa", 1.0),
+    "kPa": ("Pa", 1e3),
+    "hPa": ("Pa", 100.0),
+    "bar": ("Pa", 1e5),
+    "mbar": ("Pa", 100.0),
+    "degC": ("degC", 1.0),
+    "d": ("s", 86400.0),
+    "cm": ("m", 0.01),
+    "mm": ("m", 0.001),
+    "m/s2": ("m/s2", 1.0),
+    "g": ("m/s2", 9.80665),
 }
 
 GEOGRAPHIC = ("latitude", "longitude", "altitude")  # deg, deg, m: components of a `position`
@@ -94,6 +117,23 @@ CATALOGUE: dict[str, ChannelKind] = {
             7.0,
             circular=True,
         ),
+        ChannelKind(
+            "course_over_ground", "rad", "clockwise from north", "deg", -7.0, 7.0, circular=True
+        ),
+        ChannelKind("speed_over_ground", "m/s", "along the course", "kn", 0.0, 50.0),
+        ChannelKind("rudder_order", "rad", "turns the bow to starboard", "deg", -1.6, 1.6),
+        ChannelKind("heel", "rad", "starboard side down, steady", "deg", -1.6, 1.6),
+        ChannelKind("roll", "rad", "starboard side down", "deg", -3.2, 3.2),
+        ChannelKind("pitch", "rad", "bow up", "deg", -1.6, 1.6),
+        ChannelKind("roll_rate", "rad/s", "starboard side downwards", "deg/s", -3.0, 3.0),
+        ChannelKind("pitch_rate", "rad/s", "bow upwards", "deg/s", -3.0, 3.0),
+        ChannelKind("power", "W", "delivered to the shaft", "kW", -2e8, 2e8),
+        ChannelKind("torque", "Nm", "drives ahead", "kNm", -5e7, 5e7),
+        ChannelKind("thrust", "N", "ahead", "kN", -5e7, 5e7),
+        ChannelKind("propeller_pitch", "1", "drives ahead, as a share of full pitch", "%", -2, 2),
+        ChannelKind("draught", "m", "downwards from the waterline to the keel", "m", 0.0, 40.0),
+        ChannelKind("depth", "m", "downwards to the sea bed", "m", 0.0, 12000.0),
+        ChannelKind("wave_height", "m", "from trough to crest", "m", 0.0, 40.0),
     )
 }
 

@@ -226,7 +226,7 @@ def _info_of_channel(channel: Channel) -> ChannelInfo:
     return ChannelInfo(
         channel.topic,
         channel.unit,
-        kind.positive if kind else "",
+        kind.positive if kind else channel.metadata.get("positive", ""),
         len(channel),
         1e9 / float(step_ns) if step_ns > 0 else None,
         unit,

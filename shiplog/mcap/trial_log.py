@@ -144,7 +144,11 @@ def _channel(
         received,
         values[:, 0] if is_scalar else values,
         () if is_scalar else schema.fields,
-        {key: text for key, text in record.metadata.items() if key not in _CHANNEL_KEYS},
+        {
+            key: text
+            for key, text in record.metadata.items()
+            if key not in _CHANNEL_KEYS or (key == "positive" and name not in CATALOGUE)
+        },
     )
 
 

@@ -113,5 +113,5 @@ def _csv_rows(path: Path, stream: IO[str], before: int) -> tuple[Any, ...]:
 
 
 def _quoted(text: str) -> str:
-    """Quote a text for CSV if it needs it."""
-    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\r\n') else text
+    """Quote a text for CSV if it needs it; a quoted `#` begins no comment in pandas."""
+    return '"' + text.replace('"', '""') + '"' if set(text) & set('#,"\r\n') else text

@@ -1,6 +1,7 @@
 """Foreign tables: delimited text of other programs, read by a layout."""
 
 import os
+import re
 from math import sqrt
 from pathlib import Path
 
@@ -8,20 +9,26 @@ import numpy as np
 
 from shiplog.errors import LayoutError
 from shiplog.types import Channel, FloatArray, TimeArray, TrialLog
-from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor, did_you_mean
+from shiplog.units import CATALOGUE, GEOGRAPHIC, UNITS, conversion_factor, did_you_mean
 
 from .delimited import CellTable, read_cells
-from .layout import ROLES, VELOCITIES, Layout
+from .layout import DEGREES_MINUTES, HEMISPHERES, ROLES, VELOCITIES, Layout
+from .printed_positions import PositionTextError, looks_packed, parse_degrees
+from .printed_times import TimeTextError, excel_ns, is_time_text, parse_times
 from .rebuild import rebuilt_heading, uniform_times
 
 LAST_NS = 2**63 - 1  # 2262
+NOT_MEASURED = frozenset(  # cells in lower case
+    ("", "nan", "na", "n/a", "#n/a", "-", "--", "---", "null", "none", "nil", "-nan", "#nv")
+)
+NOT_CHANNELS = {"time", "date", "north", "east", *GEOGRAPHIC, *HEMISPHERES, *VELOCITIES}
 
 
 def read_table(path: str | os.PathLike[str], layout: Layout) -> TrialLog:
     """Read a foreign table as a trial, in SI units, radians and full scale.
 
-    A cell that is empty or contains `nan` was not measured. Each channel has the times of the
-    table, both as measured and as received.
+    A cell that is empty or one of `NOT_MEASURED` was not measured. Each channel has the times of
+    the table, both as measured and as received.
 
     Parameters
     ----------
@@ -37,10 +44,17 @@ def read_table(path: str | os.PathLike[str], layout: Layout) -> TrialLog:
         another length, times that run backwards. The message names the line.
     """
     table = read_cells(Path(path), layout)
-    values = {role: _column_values(table, layout, role) for role in layout.columns}
-    measured_ns = _times_ns(table, layout, values.pop("time"))
+    texts = {role: _column_texts(table, layout, role) for role in layout.columns}
+    measured_ns, warnings = _times_ns(table, layout, texts)
+    values = {
+        role: _column_values(table, layout, role, texts[role])
+        for role in layout.columns
+        if role not in ("time", "date", *GEOGRAPHIC[:2], *HEMISPHERES)
+    }
+    if "latitude" in texts:
+        values |= _geographic(table, layout, texts)
     notes: dict[str, dict[str, str]] = {}
-    if "heading" in layout.rebuild:
+    if layout.rebuild_heading:
         time_secs = (measured_ns - measured_ns[0]) * 1e-9
         values["heading"] = rebuilt_heading(time_secs, values["heading"], values["yaw_rate"])
         notes["heading"] = {
@@ -48,50 +62,108 @@ def read_table(path: str | os.PathLike[str], layout: Layout) -> TrialLog:
         }
     if "velocity_north" in values:
         _rotate_velocities(values, notes)
-    channels = []
-    for name, kind in CATALOGUE.items():
-        fields: tuple[str, ...] = ()
-        unit = kind.unit
-        if name == "position":
-            fields, unit = _position_fields(values)
-            values |= {name: np.column_stack([values[f] for f in fields])} if fields else {}
-        if name in values:
-            channels.append(
-                Channel(
-                    name, layout.source, unit, measured_ns, measured_ns, values[name], fields,
-                    notes.get(name, {}),
-                )
-            )  # fmt: skip
+    channels = _channels(layout, measured_ns, values, notes)
     metadata = {"converted_from": table.path.name, "layout": layout.name}
     if layout.froude_scale != 1:
         metadata["froude_scale"] = repr(float(layout.froude_scale))
-    return TrialLog(table.path.name, tuple(channels), metadata)
+    warnings = [f"{table.path.name}: {text} in {layout.where}" for text in warnings]
+    return TrialLog(table.path.name, tuple(channels), metadata, warnings=tuple(warnings))
 
 
-def _column_values(table: CellTable, layout: Layout, role: str) -> FloatArray:
+def _channels(
+    layout: Layout,
+    measured_ns: TimeArray,
+    values: dict[str, FloatArray],
+    notes: dict[str, dict[str, str]],
+) -> list[Channel]:
+    """Make the channels, in the order of the catalogue; further ones follow."""
+    fields, unit = _position_fields(values)
+    if fields:
+        values["position"] = np.column_stack([values[name] for name in fields])
+    order = {name: number for number, name in enumerate(CATALOGUE)}
+    roles = [role for role in values if role not in NOT_CHANNELS]
+    channels = []
+    for role in sorted(roles, key=lambda role: order.get(role.partition(".")[0], len(order))):
+        name, _, source = role.partition(".")
+        column = layout.columns.get(role)
+        metadata = dict(column.metadata) if column else {}
+        channels.append(
+            Channel(
+                name,
+                source or layout.source,
+                unit if name == "position" else _si_unit(layout, role),
+                measured_ns,
+                measured_ns,
+                values[role],
+                fields if name == "position" else (),
+                metadata | notes.get(role, {}),
+            )
+        )
+    return channels
+
+
+def _column_texts(table: CellTable, layout: Layout, role: str) -> list[str]:
+    """Return the cells of a role; those of `NOT_MEASURED` as empty texts."""
+    at = _column_index(table, layout, role)
+    cells = [row[at] for row in table.rows]
+    return ["" if cell.lower() in NOT_MEASURED else cell for cell in cells]
+
+
+def _column_values(table: CellTable, layout: Layout, role: str, texts: list[str]) -> FloatArray:
     """Parse the column of a role: (n,) in SI units, signed, at full scale; NaN of an empty cell."""
     column = layout.columns[role]
-    at = _column_index(table, layout, role)
-    texts = [row[at] for row in table.rows]
-    try:
-        values = np.array([_number(text, layout.decimal_comma) for text in texts])
-    except ValueError as error:
-        row = next(i for i, text in enumerate(texts) if text == str(error))
-        raise LayoutError(
-            f"line {table.lines[row]}, column {at + 1}: {texts[row]!r} is not a number; "
-            f"correct the cell (empty or nan: not measured) or {layout.where}: {table.path}"
-        ) from None
-    si = _si_unit(role)
-    scale = conversion_factor(column.unit, si) if role not in GEOGRAPHIC else 1.0
+    values = _numbers(table, layout, role, texts)
+    si = _si_unit(layout, role)
+    scale = conversion_factor(column.unit, si) if column.unit in UNITS else 1.0
     bad = ~np.isfinite(values) if role == "time" else np.isinf(values)
     if np.any(bad):
         row = int(np.argmax(bad))
         what = "has no time" if np.isnan(values[row]) else f"has an infinite {role}"
         raise LayoutError(
-            f"line {table.lines[row]} {what} (column {column.place}: {table.rows[row][at]!r}); "
+            f"line {table.lines[row]} {what} (column {column.place}: {texts[row]!r}); "
             f"correct it or remove the line: {table.path}"
         )
     return values * (column.sign * scale * _froude_factor(si, layout.froude_scale))
+
+
+def _numbers(table: CellTable, layout: Layout, role: str, texts: list[str]) -> FloatArray:
+    """Parse the numbers of a column, (n,), as they are printed."""
+    try:
+        return np.array([_number(text, layout.decimal_comma) for text in texts])
+    except ValueError as error:
+        row = next(i for i, text in enumerate(texts) if text == str(error))
+        remedy = f"correct the cell (empty or nan: not measured) or {layout.where}"
+        if not layout.decimal_comma and re.fullmatch(r"[+-]?\d+,\d+", texts[row]):
+            remedy = f"state decimal_comma = true in {layout.where}"
+        elif is_time_text(texts[row]) and role != "time":
+            remedy = f"it is a time, so correct the column of {role} in {layout.where}"
+        at = _column_index(table, layout, role) + 1
+        raise LayoutError(
+            f"line {table.lines[row]}, column {at}: {texts[row]!r} is not a number; "
+            f"{remedy}: {table.path}"
+        ) from None
+
+
+def _geographic(
+    table: CellTable, layout: Layout, texts: dict[str, list[str]]
+) -> dict[str, FloatArray]:
+    """Latitude and longitude, (n,) deg each, from numbers or from texts with hemispheres."""
+    names = GEOGRAPHIC[:2]
+    unit = layout.columns["latitude"].unit
+    if layout.decimal_comma:
+        texts = {name: [t.replace(",", ".") for t in cells] for name, cells in texts.items()}
+    packed = unit == DEGREES_MINUTES or any(looks_packed(texts[name], name) for name in names)
+    values = {}
+    for name, letters in zip(names, HEMISPHERES, strict=True):
+        if unit == "rad":
+            values[name] = np.degrees(_numbers(table, layout, name, texts[name]))
+            continue
+        try:
+            values[name] = parse_degrees(texts[name], name, texts.get(letters), packed=packed)
+        except PositionTextError as error:
+            line, at = table.lines[error.row], _column_index(table, layout, name) + 1
+            raise LayoutError(f"line {line}, column {at}: {error.reason}: {table.path}") from None
+    return values
 
 
 def _number(text: str, decimal_comma: bool) -> float:
@@ -129,40 +201,101 @@ def _column_index(table: CellTable, layout: Layout, role: str) -> int:
     return place - 1
 
 
-def _si_unit(role: str) -> str:
-    """SI unit of a role; of a position that is not geographic, metres."""
-    return ROLES.get(role, "rad" if role in GEOGRAPHIC[:2] else "m")
+def _si_unit(layout: Layout, role: str) -> str:
+    """SI unit of a role; of a quantity that is not in the catalogue, that of its own unit."""
+    name = role.partition(".")[0]
+    if name in ROLES:
+        return ROLES[name]
+    unit = layout.columns[role].unit
+    return UNITS[unit][0] if unit in UNITS else unit
 
 
 def _froude_factor(si: str, scale: float) -> float:
-    """Factor from model to ship at equal Froude number; `scale` is that of the lengths."""
-    root = sqrt(scale)
-    return {"m": scale, "s": root, "m/s": root, "rad/s": 1 / root, "rpm": 1 / root}.get(si, 1.0)
+    """Factor from model to ship at equal Froude number; `scale` is that of the lengths.
+
+    That of fresh to salt water, 1.026, is not included in forces, torques and powers.
+    """
+    exponents = {
+        "m": 1, "s": 0.5, "m/s": 0.5, "rad/s": -0.5, "rpm": -0.5, "N": 3, "Nm": 4, "W": 3.5, "Pa": 1
+    }  # fmt: skip
+    power = exponents.get(si, 0.0)
+    factor = sqrt(scale) if abs(power) == 0.5 else float(scale ** abs(power))
+    return 1 / factor if power < 0 else factor
 
 
-def _times_ns(table: CellTable, layout: Layout, printed: FloatArray) -> TimeArray:
-    """Nanoseconds since 1970, (n,), of printed times in seconds."""
-    back = np.flatnonzero(np.diff(printed) < 0)
+def _times_ns(
+    table: CellTable, layout: Layout, texts: dict[str, list[str]]
+) -> tuple[TimeArray, list[str]]:
+    """Nanoseconds since 1970 of the printed times, (n,), and warnings about what was assumed."""
+    column, form = layout.columns["time"], layout.time
+    printed_texts = texts["time"]
+    is_text = column.unit == "hhmmss" or any(map(is_time_text, printed_texts[:10]))
+    warnings: list[str] = []
+    try:
+        if is_text or "date" in texts:
+            times_ns, warnings = parse_times(printed_texts, texts.get("date"), form)
+        elif column.unit == "excel":
+            days = _column_values(table, layout, "time", printed_texts)
+            _require_range(table, layout, days * 86_400e9 - 25569 * 86_400e9)
+            times_ns = excel_ns(days, form.zone)
+            if form.zone is None:
+                warnings.append("the times have no time zone, read as UTC; state time.zone")
+        elif not column.unit:
+            raise TimeTextError(0, f"has the number {printed_texts[0]!r}; state time.unit")
+        else:
+            return _numeric_times_ns(table, layout, printed_texts), []
+    except TimeTextError as error:
+        raise LayoutError(
+            f"line {table.lines[error.row]} {error.reason} ({layout.where}): {table.path}"
+        ) from None
+    _require_ascending(table, times_ns)
+    if form.uniform:
+        secs, wrong = uniform_times((times_ns - times_ns[0]) * 1e-9)
+        _require_uniform(table, layout, wrong)
+        times_ns = times_ns[0] + np.round(secs * 1e9).astype(np.int64)
+    _require_range(table, layout, times_ns)
+    return times_ns, warnings
+
+
+def _numeric_times_ns(table: CellTable, layout: Layout, texts: list[str]) -> TimeArray:
+    """Nanoseconds since 1970 of times that are numbers, (n,)."""
+    printed = _column_values(table, layout, "time", texts)
+    start_ns = layout.time.start_ns or 0
+    _require_ascending(table, printed)
+    if layout.time.uniform:
+        printed, wrong = uniform_times(printed)
+        _require_uniform(table, layout, wrong)
+        if start_ns == 0 and printed[0] < 0:  # the fitted first time, by less than its rounding
+            printed = printed - printed[0]
+    _require_range(table, layout, np.round(printed * 1e9) + float(start_ns))
+    times_ns: TimeArray = np.round(printed * 1e9).astype(np.int64) + start_ns
+    return times_ns
+
+
+def _require_ascending(table: CellTable, times: FloatArray | TimeArray) -> None:
+    back = np.flatnonzero(np.diff(times) < 0)
     if len(back):
         raise LayoutError(
             f"the time runs backwards at line {table.lines[back[0] + 1]}; "
             f"put the lines in the order of time, or cut the table there: {table.path}"
         )
-    if "time" in layout.rebuild:
-        printed, wrong = uniform_times(printed)
-        if wrong is not None:
-            raise LayoutError(
-                f"the times are not uniform, first at line {table.lines[wrong]}; "
-                f"remove time.rebuild from {layout.where}: {table.path}"
-            )
-    wanted_ns = np.round(printed * 1e9) + float(layout.start_ns)
-    outside = (wanted_ns < 0) | (wanted_ns >= LAST_NS)
+
+
+def _require_uniform(table: CellTable, layout: Layout, wrong: int | None) -> None:
+    if wrong is not None:
+        raise LayoutError(
+            f"the times are not uniform, first at line {table.lines[wrong]}; "
+            f"remove time.rebuild from {layout.where}: {table.path}"
+        )
+
+
+def _require_range(table: CellTable, layout: Layout, times_ns: FloatArray | TimeArray) -> None:
+    outside = ~((times_ns >= 0) & (times_ns < LAST_NS))
     if np.any(outside):
         raise LayoutError(
             f"line {table.lines[int(np.argmax(outside))]} is before 1970 or after 2262; "
             f"correct the unit of the time or `start` in {layout.where}: {table.path}"
         )
-    return np.round(printed * 1e9).astype(np.int64) + layout.start_ns
 
 
 def _rotate_velocities(values: dict[str, FloatArray], notes: dict[str, dict[str, str]]) -> None:

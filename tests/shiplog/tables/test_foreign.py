@@ -1,5 +1,6 @@
 """Foreign tables: what is read, and the errors of a text that does not fit its layout."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,14 @@ from places import KVLCC2, LAYOUTS
 from scipy.signal import savgol_filter
 
 from shiplog.errors import LayoutError
+from shiplog.mcap.info import read_log_info
+from shiplog.mcap.reader import read
+from shiplog.mcap.writer import write
+from shiplog.tables.convert import convert
+from shiplog.tables.csv_form import write_csv
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import Layout, load_layout
+from shiplog.tables.parquet_form import write_parquet
 from shiplog.tables.rebuild import rebuilt_heading, uniform_times
 from shiplog.types import TrialLog
 
@@ -91,7 +98,7 @@ def test_empty_and_nan_cells_are_not_measured(tmp_path: Path) -> None:
     assert np.isnan(log["yaw_rate"].values).tolist() == [True, True, True, True, False]
 
 
-@pytest.mark.parametrize("cell", ["n/a", "1_000", "1,5", "--", "0x10"])
+@pytest.mark.parametrize("cell", ["x", "1_000", "1,5", "1-2", "0x10"])
 def test_a_cell_that_is_not_a_number_is_an_error_with_line_column_and_text(
     tmp_path: Path, cell: str
 ) -> None:
@@ -182,7 +189,101 @@ def test_earth_fixed_velocities_are_converted_to_speed_and_sway(tmp_path: Path) 
     assert "over the ground" in log["speed"].metadata["computed_from"]
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,r\n0,1,\n1,2,\n",
+        "t,r,\n0,1\n1,2\n",
+        "t,r,,\r\n0,1,,\r\n\r\n1,2,,\r\n",
+        "# gyro\nt,r\n0,1\n# a note, or two\n1,2\n",
+        "# gyro\n# t,r\n0,1\n1,2\n",
+        '\ufeff"t","r"\n"0","1"\n"1","2"\n',
+    ],
+)
+def test_trailing_delimiters_comments_and_quotes_under_a_header(tmp_path: Path, text: str) -> None:
+    named = MINIMAL.replace("column = 1", 'column = "t"').replace("column = 2", 'column = "r"')
+    log = read_table(table(tmp_path, text), layout(named, "header = true"))
+    np.testing.assert_allclose(log["yaw_rate"].values, np.radians([1, 2]))
+
+
+def test_words_for_a_missing_value_are_not_measured(tmp_path: Path) -> None:
+    words = ["NA", "-", "null", "N/A", "n/a", "NULL", "None", "--"]
+    log = read_table(table(tmp_path, "".join(f"{i},{w}\n" for i, w in enumerate(words))), layout())
+    assert np.isnan(log["yaw_rate"].values).all()
+
+
+def test_an_iso_time_is_read_whatever_unit_the_layout_states(tmp_path: Path) -> None:
+    text = "2026-03-29T00:55:00Z,1\n2026-03-29T00:55:01.5Z,2\n"
+    log = read_table(table(tmp_path, text), layout())
+    assert np.diff(log["yaw_rate"].measured_ns).tolist() == [1_500_000_000]
+    assert log.warnings == ()
+
+
+def test_days_of_a_spreadsheet(tmp_path: Path) -> None:
+    excel = MINIMAL.replace('"s"', '"excel"\nzone = "UTC"')
+    log = read_table(table(tmp_path, "46110.5,1\n"), layout(excel))
+    assert (
+        str(log["yaw_rate"].measured_ns.astype("datetime64[ns]")[0])[:19] == "2026-03-29T12:00:00"
+    )
+
+
+def test_positions_with_hemispheres_in_columns_of_their_own(tmp_path: Path) -> None:
+    text = (
+        "[time]\ncolumn = 1\nunit = 's'\n[position]\nlatitude = 2\nnorth_south = 3\n"
+        "longitude = 4\neast_west = 5\nunit = 'ddmm.mmmm'\n"
+    )
+    log = read_table(table(tmp_path, "0,5412.0,S,00030.0,W\n1,,,,\n"), layout(text))
+    np.testing.assert_array_equal(log["position"].values[:, :2], [[-54.2, -0.5], [np.nan, np.nan]])
+
+
+def test_a_position_in_radians_is_converted(tmp_path: Path) -> None:
+    text = "[time]\ncolumn = 1\nunit = 's'\n[position]\nlatitude = 2\nlongitude = 3\nunit = 'rad'\n"
+    position = read_table(table(tmp_path, "0,1,0.5\n"), layout(text))["position"]
+    np.testing.assert_allclose(position.values[0, :2], np.degrees([1, 0.5]))
+
+
+def test_further_quantities_are_kept_with_unit_and_sense(tmp_path: Path) -> None:
+    text = (
+        f"{MINIMAL}[power]\ncolumn = 3\nunit = 'kW'\n[rpm.port]\ncolumn = 4\nunit = 'Hz'\n"
+        "[fuel_flow]\ncolumn = 5\nunit = 'kg/h'\npositive = 'to the engine'\n"
+    )
+    log = read_table(table(tmp_path, "0,1,2,3,4\n1,1,2,3,4\n"), layout(text))
+    for suffix in (".csv", ".parquet"):  # and back
+        for ending in (suffix, ".mcap"):
+            target = tmp_path / f"x{ending}"
+            source = tmp_path / f"x{suffix}"
+            log = convert(source, target)[0] if ending == ".mcap" else log
+            {".csv": write_csv, ".parquet": write_parquet, ".mcap": write}[ending](log, target)
+        log = read(tmp_path / "x.mcap")
+        assert [c.topic for c in log] == [
+            "/yaw_rate/table", "/rpm/port", "/power/table", "/fuel_flow/table"
+        ]  # fmt: skip
+        assert log["power"].values[0] == 2000
+        assert log["rpm"].values[0] == 180
+        assert (log["fuel_flow"].unit, log["fuel_flow"].values[0]) == ("kg/h", 4)
+        assert log["fuel_flow"].metadata["positive"] == "to the engine"
+        assert read_log_info(tmp_path / "x.mcap").channels[-1].positive == "to the engine"
+
+
+def test_no_bytes_of_a_table_end_in_another_exception(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    letters = b"0123456789.,;:-+eENT \t\n\r\"'#\xff\x00Z/"
+    for _ in range(300):
+        path = tmp_path / "x.txt"
+        path.write_bytes(bytes(rng.choice(list(letters), 60)))
+        with suppress(LayoutError):
+            read_table(path, layout(top="encoding = 'cp1252'"))
+
+
 # ---- values of few digits
+
+
+def test_a_uniform_step_is_rebuilt_from_time_zero(tmp_path: Path) -> None:
+    given_layout = layout(MINIMAL.replace('unit = "s"', 'unit = "s"\nrebuild = "uniform"'))
+    text = "".join(f"{round(0.4 * i + 1e-6)},0\n" for i in range(100))
+    times_ns = read_table(table(tmp_path, text), given_layout)["yaw_rate"].measured_ns
+    assert times_ns[0] >= 0
+    assert np.diff(times_ns) * 1e-9 == pytest.approx(0.4, rel=0.01)
 
 
 def three_digits(values: np.ndarray) -> np.ndarray:

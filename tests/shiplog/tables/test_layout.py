@@ -1,12 +1,15 @@
 """Layout files: their values, and their errors."""
 
+from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 from layout_texts import MINIMAL, layout
 
 from shiplog.errors import LayoutError
-from shiplog.tables.layout import load_layout, parse_layout
+from shiplog.tables.layout import load_layout
+from shiplog.tables.layout_parser import parse_layout
 
 
 def errors_of(text: str) -> str:
@@ -23,11 +26,11 @@ def test_a_minimal_layout_has_the_documented_defaults() -> None:
     assert (minimal.name, minimal.source, minimal.encoding) == ("gyro", "table", "utf-8")
     assert minimal.delimiter == ","
     assert (minimal.skip_rows, minimal.header, minimal.decimal_comma) == (0, False, False)
-    assert (minimal.start_ns, minimal.froude_scale, minimal.rebuild) == (0, 1.0, frozenset())
+    assert (minimal.time.start_ns, minimal.froude_scale, minimal.time.uniform) == (None, 1.0, False)
 
 
 def test_the_start_is_an_instant_whatever_its_zone() -> None:
-    assert layout(top="start = 1970-01-01T02:00:00.25+02:00").start_ns == 250_000_000
+    assert layout(top="start = 1970-01-01T02:00:00.25+02:00").time.start_ns == 250_000_000
 
 
 def test_all_errors_of_a_layout_are_reported_at_once_in_one_line() -> None:
@@ -103,3 +106,43 @@ def test_a_text_that_is_not_toml_is_an_error_with_its_line() -> None:
 def test_a_missing_layout_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(LayoutError, match=r"no such layout file: .*gone\.toml$"):
         load_layout(tmp_path / "gone.toml")
+
+
+def test_further_quantities_and_sources_have_their_own_columns() -> None:
+    further = layout(
+        f"{MINIMAL}[rpm.port]\ncolumn = 3\nunit = 'rpm'\n[rpm.starboard]\ncolumn = 4\nunit = 'Hz'\n"
+        "interpolation = 'hold'\n[fuel_flow]\ncolumn = 5\nunit = 'kg/h'\npositive = 'to the engine'"
+    )
+    assert set(further.columns) == {"time", "yaw_rate", "rpm.port", "rpm.starboard", "fuel_flow"}
+    assert further.columns["rpm.starboard"].metadata == {"interpolation": "hold"}
+    assert further.columns["fuel_flow"].metadata == {"positive": "to the engine"}
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        (f"encoding = 'hex'\n{MINIMAL}", "encoding must be"),
+        (f"delimiter = [',']\n{MINIMAL}", "delimiter must be one of"),
+        (f"{MINIMAL}[fuel]\ncolumn = 3\nunit = 'kg/h'", "needs `positive`"),
+        (f"{MINIMAL}[rudder]\ncolumn = 3\nunit = ['deg']", "rudder.unit must be a unit"),
+        (f"{MINIMAL}[rudder]\ncolumn = 3\nunit = 'deg'\nsign = [1]", "rudder.sign must be"),
+        (f"{MINIMAL}[rpm]\ncolumn = 3\nunit = 'rpm'\ninterpolation = 'x'", "'hold' or 'linear'"),
+        (MINIMAL.replace('unit = "s"', "zone = 'Mars'"), "time.zone must be"),
+        (MINIMAL.replace('unit = "s"', "date_order = 'dym'"), "time.date_order must be"),
+        (f"{MINIMAL}[position]\nlatitude = 3\nnorth_south = 4\nunit = 'deg'", "needs both"),
+    ],
+)
+def test_an_error_of_a_further_key_is_named(text: str, part: str) -> None:
+    assert part in errors_of(text)
+
+
+def test_no_text_of_a_layout_ends_in_another_exception() -> None:
+    rng = np.random.default_rng(5)
+    words = ["time", "column", "unit", "[", "]", "=", ".", "'", "1", "true", "rpm", "port", "'s'"]
+    words += ["\n", "position", "{", "}", ",", "nan", "-1"]
+    for _ in range(300):
+        with suppress(LayoutError):
+            parse_layout(" ".join(rng.choice(words, 12)), "x.toml")
+    for text in ("a" + ".a" * 5000 + " = 1", "a = " + "[" * 500, "a = " + "9" * 5000, "\0"):
+        with pytest.raises(LayoutError):
+            parse_layout(text, "x.toml")

@@ -261,3 +261,14 @@ def test_heavy_packages_are_imported_only_where_they_are_needed() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
+
+
+def test_pandas_reads_a_csv_whose_source_has_a_number_sign(tmp_path: Path) -> None:
+    times = np.arange(3) * 10**9
+    channel = Channel("yaw_rate", "gyro#2", "rad/s", times, times, np.arange(3.0))
+    write_csv(TrialLog("x", (channel,)), tmp_path / "x.csv")
+    frame = pd.read_csv(tmp_path / "x.csv", comment="#")
+    assert list(frame.columns) == ["topic", "field", "measured_ns", "received_ns", "value"]
+    assert frame["topic"].unique().tolist() == ["/yaw_rate/gyro#2"]
+    assert frame["value"].tolist() == [0, 1, 2]
+    assert read_csv(tmp_path / "x.csv").channels[0].topic == channel.topic
