@@ -166,6 +166,9 @@ def _possible_rows(
 
 
 def _distance(times: TimeArray, median: int) -> int:
+    """Return the greatest distance from the median, ns; a time before 1970 is beyond any limit."""
+    if times.min() < 0:
+        return MAX_DISTANCE_NS
     return max(abs(int(times.min()) - median), abs(int(times.max()) - median))
 
 
