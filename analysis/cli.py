@@ -70,6 +70,9 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
         "(docs/vessel.md)",
     )
     parser.add_argument(
+        "--strict", action="store_true", help="refuse a log with a contradiction in unit or sign"
+    )
+    parser.add_argument(
         "-o", "--output", metavar="FILE", help="the review (default: LOG's name with .rrd, here)"
     )
     parser.add_argument(
@@ -111,6 +114,7 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
                 settings=settings,
                 sources=sources,
                 length=arguments.length,
+                strict=arguments.strict,
                 on_progress=on_progress,
             )
         except ShiplogError:
@@ -195,6 +199,9 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--length", type=float, metavar="METRES", help=LENGTH_HELP)
     parser.add_argument(
+        "--strict", action="store_true", help="refuse a log with a contradiction in unit or sign"
+    )
+    parser.add_argument(
         "-o", "--output", metavar="FILE", help="the vessel.toml, for simulation and replay"
     )
     parser.add_argument(
@@ -242,6 +249,7 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
             vessel=vessel,
             sources=sources,
             length=arguments.length,
+            strict=arguments.strict,
             on_progress=on_progress,
         )
         text = vessel_toml(ship, on_progress) if arguments.output else ""

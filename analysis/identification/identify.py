@@ -44,6 +44,7 @@ def identify(
     vessel: Vessel | None = None,
     sources: Mapping[str, str] | None = None,
     length: float | None = None,
+    strict: bool = False,
     on_progress: ProgressCallback = no_progress,
 ) -> IdentifiedShip:
     """Fit a ship model to one or more logs of the same ship by output error.
@@ -67,6 +68,8 @@ def identify(
         The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
     length
         The ship's length, m, in place of the vessel's.
+    strict
+        Refuse a log whose channels contradict each other in unit or sign.
     on_progress
         Given each step and the share of the whole work that is done.
 
@@ -99,7 +102,7 @@ def identify(
         require_two_runs(len(to_fit))
     steps = _Steps(on_progress, auto=model == AUTO)
     steps.begin("read")
-    runs, held_out = distinct_runs(to_fit, to_predict, sources)
+    runs, held_out = distinct_runs(to_fit, to_predict, sources, strict=strict)
     ship = with_length(common_vessel([*runs, *held_out], vessel), length)
     steps.begin("fit")
     candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)

@@ -8,11 +8,12 @@ import numpy as np
 
 from analysis.identification.fit.segment import Segment, initial_level, split_into_segments
 from shiplog.checks.channel_stats import ChannelStats
-from shiplog.checks.rudder_sign import rudder_sign_warning
+from shiplog.checks.consistency.consistency_check import ConsistencyCheck
+from shiplog.checks.consistency.findings import Finding, refuse_contradictions
 from shiplog.errors import LogError, UsageError
 from shiplog.geodesy import LocalFrame, positions_of
 from shiplog.resampling import choose_clock, resample_chunks
-from shiplog.screening import screen_log
+from shiplog.screening import ScreenedLog, screen_log
 from shiplog.types import (
     FloatArray,
     Log,
@@ -57,7 +58,9 @@ class Run:
     data_lost: bool
 
 
-def run_from_log(log: Log, sources: Mapping[str, str] | None = None) -> Run:
+def run_from_log(
+    log: Log, sources: Mapping[str, str] | None = None, *, strict: bool = False
+) -> Run:
     """Resample a log, split it into segments and check its data.
 
     Parameters
@@ -66,6 +69,8 @@ def run_from_log(log: Log, sources: Mapping[str, str] | None = None) -> Run:
         A log with `REQUIRED_CHANNELS`; `OPTIONAL_CHANNELS` and positions are used if present.
     sources
         The source to use, by the name of a channel that has several.
+    strict
+        Refuse a log whose channels contradict each other in unit or sign.
 
     Returns
     -------
@@ -92,8 +97,10 @@ def run_from_log(log: Log, sources: Mapping[str, str] | None = None) -> Run:
     vessel = parse_vessel(toml, f"vessel.toml in {log.name}") if toml is not None else None
     position = stats.get("position")
     fixes = _north_east(screened, position) if position is not None else None
-    rudder_sign = rudder_sign_warning(screened)
-    warnings = [*screened.warnings, *([rudder_sign] if rudder_sign else [])]
+    findings = _consistency(screened)
+    if strict:
+        refuse_contradictions(findings)
+    warnings = [*screened.warnings, *(finding.text for finding in findings)]
     return Run(
         name=log.name,
         segments=segments,
@@ -105,7 +112,11 @@ def run_from_log(log: Log, sources: Mapping[str, str] | None = None) -> Run:
 
 
 def distinct_runs(
-    logs: Sequence[Log], held_out: Sequence[Log], sources: Mapping[str, str] | None = None
+    logs: Sequence[Log],
+    held_out: Sequence[Log],
+    sources: Mapping[str, str] | None = None,
+    *,
+    strict: bool = False,
 ) -> tuple[list[Run], list[Run]]:
     """Prepare logs for fitting and for validation, each with a unique name.
 
@@ -117,6 +128,8 @@ def distinct_runs(
         The logs to predict.
     sources
         The source to use, by the name of a channel that has several, in each log that has it.
+    strict
+        Refuse a log whose channels contradict each other in unit or sign.
 
     Returns
     -------
@@ -130,7 +143,7 @@ def distinct_runs(
     """
     runs: list[Run] = []
     for log in (*logs, *held_out):
-        run = run_from_log(log, sources)
+        run = run_from_log(log, sources, strict=strict)
         for other in runs:
             if _same_data(run, other):
                 raise UsageError(
@@ -155,6 +168,13 @@ def _numbered(name: str, number: int) -> str:
 
 def _renamed(run: Run, name: str) -> Run:
     return replace(run, name=name, segments=tuple(replace(t, name=name) for t in run.segments))
+
+
+def _consistency(log: ScreenedLog) -> list[Finding]:
+    check = ConsistencyCheck(log.screening.stats)
+    for chunk in log.chunks():
+        check.add(chunk)
+    return check.result()
 
 
 def _north_east(log: Log, stats: ChannelStats) -> tuple[TimeArray, FloatArray]:

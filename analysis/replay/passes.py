@@ -17,8 +17,8 @@ from analysis.signals.hold import InputHold
 from analysis.signals.signal_stats import SignalStats, SignalStatsCollector
 from shiplog import Channel, LogError, Signals, Vessel
 from shiplog.checks.channel_stats import LogStats
-from shiplog.checks.gyro_bias import GyroBiasCheck
-from shiplog.checks.rudder_sign import RudderSignCheck
+from shiplog.checks.consistency.consistency_check import ConsistencyCheck
+from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, choose_clock, resample_chunks
 from shiplog.screening import ScreenedLog, Screening, screen_log
@@ -107,7 +107,9 @@ def first_pass(
     return FirstPass(screened, clock)
 
 
-def second_pass(first: FirstPass, vessel: Vessel, on_progress: ProgressCallback) -> SecondPass:
+def second_pass(
+    first: FirstPass, vessel: Vessel, on_progress: ProgressCallback, *, strict: bool = False
+) -> SecondPass:
     """Collect the statistics of the signals and fit both equations to the whole trial.
 
     The equations need the sampling intervals on the clock, which are known only after the pass.
@@ -122,23 +124,25 @@ def second_pass(first: FirstPass, vessel: Vessel, on_progress: ProgressCallback)
         The vessel; without coefficients, the rudder is taken to act in proportion to the speed.
     on_progress
         Called with the step and its share done.
+    strict
+        Refuse a log whose channels contradict each other in unit or sign.
 
     Raises
     ------
     LogError
-        Where an output has too few samples.
+        Where an output has too few samples, or a unit or sign is wrong and `strict` is set.
     """
     log, log_stats, clock = first.log, first.log_stats, first.clock
     alphas, window_secs = (
         vessel.coefficients or SPEED_PROPORTIONAL_RUDDER,
         vessel.identifier.window_secs,
     )
-    checks = RudderSignCheck(log_stats), GyroBiasCheck(log_stats)
+    consistency = ConsistencyCheck(log_stats)
     hold, collector = InputHold(clock), SignalStatsCollector(alphas)
     expected = [clock.channels[name].valid_interval_secs / clock.dt_secs for name in PAPER_OUTPUTS]
     intervals = np.maximum(np.round(expected), 1.0)
     equations = _Equations(alphas, clock, intervals, window_secs)
-    listeners = hold.add_raw, *(check.add for check in checks)
+    listeners = hold.add_raw, consistency.add
     for signals in resampled_chunks(log, clock, on_progress, "resample", *listeners):
         collector.add(hold.step(signals))
         equations.add(signals, collector.max_speed)
@@ -148,9 +152,12 @@ def second_pass(first: FirstPass, vessel: Vessel, on_progress: ProgressCallback)
         for signals in resampled_chunks(log, clock, on_progress, "resample"):
             equations.add(signals, stats.max_speed)
     _require_outputs(log, stats)
+    findings = consistency.result()
+    if strict:
+        refuse_contradictions(findings)
     warnings = [
         *channel_warnings(log_stats, REQUIRED_CHANNELS),
-        *(text for check in checks if (text := check.result())),
+        *(finding.text for finding in findings),
         *end_warnings(log_stats, clock, REQUIRED_CHANNELS),
         *hold.warnings(),
         *equations.window_warnings(),

@@ -102,6 +102,7 @@ def plan_replay(
     settings: Mapping[str, object] | None = None,
     sources: Mapping[str, str] | None = None,
     length: float | None = None,
+    strict: bool = False,
     on_progress: ProgressCallback = no_progress,
 ) -> Plan:
     """Make the plan of a replay, from two passes over the log.
@@ -121,6 +122,8 @@ def plan_replay(
         The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
     length
         The ship's length, m, in place of the vessel's.
+    strict
+        Refuse a log whose channels contradict each other in unit or sign.
     on_progress
         Called with each step and its share done.
 
@@ -140,7 +143,7 @@ def plan_replay(
     vessel = with_length(vessel, length) or vessel
     vessel, kind = _with_filter(vessel, filter)
     first = first_pass(log, sources, on_progress)
-    second = second_pass(first, vessel, on_progress)
+    second = second_pass(first, vessel, on_progress, strict=strict)
     on_progress("choose the model", 0.0)
     warnings = [*first.log.warnings, *second.warnings]
     if vessel.coefficients is None:

@@ -68,18 +68,10 @@ class GyroBiasCheck:
         if not self._gyro:
             return None
         complete = self._gyro.complete & self._compass.complete
-        by_gyro, by_compass = self._gyro.result(), self._compass.result()
-        biases, reversed_biases = (
-            (np.diff(by_gyro + sign * by_compass) / np.diff(self._edges))[complete]
-            for sign in (-1, 1)
-        )
+        difference = self._gyro.result() - self._compass.result()
+        biases = (np.diff(difference) / np.diff(self._edges))[complete]
         if len(biases) < BLOCKS // 2:
             return None
-        if np.std(reversed_biases) < 0.1 * np.std(biases):
-            return (
-                f"{self._compass.channel.topic}: the heading increases to port, it must increase "
-                "to starboard; reverse its sign in the layout (sign = -1) or in the recorder"
-            )
         bias = float(np.mean(biases))
         error = float(np.std(biases, ddof=1)) / np.sqrt(len(biases))
         drift = abs(bias) * self._duration_secs

@@ -12,6 +12,7 @@ WINDOW_SECS = 10.0  # over which the rudder's effect on the yaw rate is measured
 MIN_WINDOWS = 12  # that a record must have room for
 MIN_RUDDER_STD = 0.015  # rad, of the mean rudder over a window: with less the sign is not decided
 SIGNIFICANT_ERRORS = 3.0  # standard errors by which the effect must be negative
+MIN_AHEAD_SHARE = 0.2  # of the median speed: below it the ship counts as stopped
 MAX_CONDITION = 1e6  # of the regression: beyond it rudder and yaw rate cannot be separated
 
 
@@ -75,9 +76,12 @@ class RudderSignCheck:
             channel: Interpolator(at, channel.gap_threshold_secs)
             for channel in (yaw_rate, self._rudder)
         }
-        speed = stats.get("speed")
-        if speed is not None and speed.valid:
-            self._interpolators[speed] = Interpolator(at)
+        self._names = ["yaw_rate", "rudder"]
+        for name in ("speed", "rpm"):
+            channel = stats.get(name)
+            if channel is not None and channel.valid:
+                self._interpolators[channel] = Interpolator(at)
+                self._names.append(name)
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
         """Add the next samples of the log."""
@@ -88,21 +92,37 @@ class RudderSignCheck:
 
     def result(self) -> str | None:
         """Return the warning, or None, once all samples were added."""
-        if not self._interpolators or self._rudder is None:
-            return None
-        r, delta, *speed = (each.result() for each in self._interpolators.values())
-        relative = _relative_speed(speed[0]) if speed else np.ones_like(r)
-        window = min(WINDOW_SECS, len(r) * self._dt / MIN_WINDOWS)
-        length = max(round(window / self._dt), 1)
-        effect = _rudder_effect(self._dt, r, delta, relative, length)
-        if effect is None or effect[0] > -SIGNIFICANT_ERRORS * effect[1]:
+        ratio = self.significance()
+        if self._rudder is None or ratio > -SIGNIFICANT_ERRORS:
             return None
         return (
             f"{self._rudder.topic}: its sign is reversed, a positive rudder turns the bow to port "
-            f"(by {-effect[0] / effect[1]:.0f} standard errors) and must turn it to starboard; "
+            f"(by {-ratio:.0f} standard errors) and must turn it to starboard; "
             "reverse the rudder's sign in the layout (sign = -1, or 1 where it is -1) "
             "or in the recorder"
         )
+
+    def significance(self) -> float:
+        """Return the rudder's effect over its standard error; 0 where it is not determined.
+
+        Stretches astern or stopped do not count: there the rudder acts weakly or the other way.
+        """
+        if not self._interpolators:
+            return 0.0
+        values = {
+            name: each.result()
+            for name, each in zip(self._names, self._interpolators.values(), strict=True)
+        }
+        r, delta, speed = values["yaw_rate"], values["rudder"], values.get("speed")
+        if speed is not None and np.any(speed):
+            r = np.where(speed > MIN_AHEAD_SHARE * np.median(np.abs(speed)), r, np.nan)
+        if "rpm" in values:
+            r = np.where(values["rpm"] >= 0, r, np.nan)
+        relative = np.ones_like(r) if speed is None else _relative_speed(speed)
+        window = min(WINDOW_SECS, len(r) * self._dt / MIN_WINDOWS)
+        length = max(round(window / self._dt), 1)
+        effect = _rudder_effect(self._dt, r, delta, relative, length)
+        return effect[0] / effect[1] if effect is not None and effect[1] > 0 else 0.0
 
 
 def _relative_speed(speed: FloatArray) -> FloatArray:

@@ -75,6 +75,9 @@ def _configure_convert(parser: argparse.ArgumentParser) -> None:
         "--layout", type=Path, help="the columns of a foreign table: a TOML file (docs/tables.md)"
     )
     add_cut_options(parser)
+    parser.add_argument(
+        "--strict", action="store_true", help="refuse a table with a contradiction in unit or sign"
+    )
 
 
 def _convert(arguments: argparse.Namespace) -> ExitCode:
@@ -89,6 +92,7 @@ def _convert(arguments: argparse.Namespace) -> ExitCode:
             arguments.layout,
             start=arguments.start,
             end=arguments.end,
+            strict=arguments.strict,
         )
     print_warnings(warnings)
     samples = sum(len(channel) for channel in log.channels)

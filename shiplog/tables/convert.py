@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from shiplog.checks.consistency.consistency_check import consistency_findings
+from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.checks.data_quality import times_in_words
-from shiplog.checks.rudder_sign import rudder_sign_warning
 from shiplog.errors import LogError, UsageError
 from shiplog.mcap.reader import read
 from shiplog.mcap.writer import write
@@ -27,6 +28,7 @@ def convert(
     *,
     start: float | str | None = None,
     end: float | str | None = None,
+    strict: bool = False,
 ) -> tuple[TrialLog, list[str]]:
     """Convert a file to another format.
 
@@ -41,6 +43,8 @@ def convert(
         Layout file of a foreign table.
     start, end
         The part to convert, as `TrialLog.between` takes them; by default all.
+    strict
+        Refuse a foreign table whose channels contradict each other in unit or sign.
 
     Returns
     -------
@@ -71,8 +75,10 @@ def convert(
         log, sort_warnings = sorted_by_time(log)
         warnings += sort_warnings
     if layout is not None:
-        sign_warning = rudder_sign_warning(log)
-        warnings += [sign_warning] if sign_warning else []
+        findings = consistency_findings(log)
+        if strict:
+            refuse_contradictions(findings)
+        warnings += [finding.text for finding in findings]
     writers = {".mcap": write, ".csv": write_csv, ".parquet": write_parquet}
     writers[target.suffix.lower()](log, target)
     return log, warnings

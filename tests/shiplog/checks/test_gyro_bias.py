@@ -41,16 +41,6 @@ def test_dropouts_are_not_mistaken_for_a_bias(vessel: Vessel) -> None:
         assert gyro_bias_warning(simulated_log(vessel, seed, **gaps)) is None
 
 
-def test_a_heading_that_increases_to_port_gives_a_warning(vessel: Vessel) -> None:
-    log = simulated_log(vessel)
-    reversed_heading = tuple(
-        replace(c, values=-c.values) if c.name == "heading" else c for c in log
-    )
-    warning = gyro_bias_warning(replace(log, channels=reversed_heading))
-    assert warning is not None
-    assert "increases to port" in warning
-
-
 def test_without_a_heading_there_is_no_warning(vessel: Vessel) -> None:
     log = simulated_log(vessel, yaw_rate__bias=1.0)
     assert gyro_bias_warning(replace(log, channels=log.channels[:4])) is None

@@ -1,0 +1,128 @@
+"""Conclusions about senses and units of yaw rate, heading, rudder and fixes, drawn together."""
+
+from collections.abc import Iterator, Mapping
+from itertools import product
+from math import log, prod
+
+from .findings import Finding
+from .turning_ratio import TurningRatio
+from .unit_factors import HEADING_UNITS, YAW_RATE_UNITS, in_words, misread_units
+
+MIN_FACTOR = 1.07  # between yaw rate and heading
+MIN_COURSE_FACTOR = 1.6  # of the course, which differs from the heading by the drift
+# the cost of each channel's having the wrong sense; fixes are rarely mirrored
+COSTS = {"yaw_rate": 1.0, "heading": 1.0, "rudder": 1.01, "position": 1.6}
+AMBIGUITY = 1.1  # difference of the costs below which two explanations are stated
+
+Pair = tuple[str, str]
+
+
+def sense_explanations(senses: Mapping[Pair, int]) -> list[tuple[str, ...]]:
+    """Return the sets of channels with reversed sense that explain all pairs, the likeliest first.
+
+    Parameters
+    ----------
+    senses
+        For each pair of channels +1 where they agree and -1 where they contradict each other.
+
+    Returns
+    -------
+    list of tuple of str
+        The explanations; more than one where the costs (`COSTS`) are similar. Empty where no set
+        explains all pairs.
+
+    Examples
+    --------
+    >>> sense_explanations({("yaw_rate", "heading"): -1, ("rudder", "yaw_rate"): -1})[0]
+    ('yaw_rate',)
+    """
+    names = sorted({name for pair in senses for name in pair})
+    fitting = []
+    for signs in product((1, -1), repeat=len(names)):
+        sense = dict(zip(names, signs, strict=True))
+        if all(prod(sense[name] for name in pair) == sign for pair, sign in senses.items()):
+            reversed_names = tuple(name for name in names if sense[name] < 0)
+            fitting.append((sum(COSTS[name] for name in reversed_names), reversed_names))
+    fitting.sort()
+    limit = AMBIGUITY if fitting and "position" not in names else 0.5
+    return [names for cost, names in fitting if cost < fitting[0][0] + limit and fitting[0][1]]
+
+
+def sense_findings(explanations: list[tuple[str, ...]], topics: Mapping[str, str]) -> list[Finding]:
+    """Report the channels whose sense is likely reversed, with the line of the layout to change."""
+    if not explanations:
+        return []
+    first, *others = explanations
+    remedies = {name: f"sign = -1 (or 1 where it is -1) of [{name}]" for name in topics}
+    remedies["position"] = "north and east (latitude and longitude) exchanged"
+    texts = {
+        "yaw_rate": "its sign is reversed, the yaw rate increases to port and must to starboard",
+        "heading": "its sense is reversed, the heading increases to port (counter-clockwise)",
+        "rudder": "its sign is reversed, a positive rudder turns the bow to port",
+        "position": "mirrored: the course over ground turns opposite to the ship; "
+        "likely north and east, or latitude and longitude, are swapped",
+    }
+    alternative = " or ".join(" and ".join(each) for each in others)
+    doubt = f"; or else the fault lies in {alternative}" if others else ""
+    return [
+        Finding("sign", f"{topics[name]}: {texts[name]} (of the channels compared, this is the "
+                f"simplest explanation{doubt}); change in the layout: {remedies[name]}")
+        for name in first
+    ]  # fmt: skip
+
+
+def unit_findings(
+    ratios: Mapping[Pair, TurningRatio], topics: Mapping[str, str]
+) -> Iterator[Finding]:
+    """Report a wrong unit of yaw rate or heading; the course of the fixes decides between them."""
+    pair = ratios.get(("yaw_rate", "heading"))
+    yaw_course, heading_course = (
+        ratios.get((name, "position")) for name in ("yaw_rate", "heading")
+    )
+    if pair is not None and _differs(pair, MIN_FACTOR):
+        factor = 1 / abs(pair.ratio)
+        yaw_units = misread_units(factor, YAW_RATE_UNITS, 0.15)
+        heading_units = misread_units(1 / factor, HEADING_UNITS, 0.05)
+        heading_wrong = (
+            heading_course is not None and _differs(heading_course, MIN_COURSE_FACTOR)
+        ) or not yaw_units
+        if yaw_course is not None and _differs(yaw_course, MIN_COURSE_FACTOR):
+            heading_wrong = False
+        likely, likely_units, other, other_units = (
+            ("heading", heading_units, "yaw_rate", yaw_units)
+            if heading_wrong and heading_units
+            else ("yaw_rate", yaw_units, "heading", heading_units)
+        )
+        error = pair.error * factor / abs(pair.ratio)
+        cause = in_words(likely_units) or "a wrong scale"
+        remedy = f'[{likely}] unit = "{likely_units[0][0]}"' if likely_units else "the scale"
+        decided = yaw_course is not None or heading_course is not None
+        alternative = (
+            f"; or else {other}: {in_words(other_units)}" if other_units and not decided else ""
+        )
+        yield Finding(
+            "unit",
+            f"{topics[likely]}: the integrated yaw rate is {factor:.3g} "
+            f"(± {2 * error:.2g}) times the change of the heading; likely {cause}{alternative}; "
+            f"change in the layout: {remedy}",
+        )
+    elif pair is None:
+        tables = (("yaw_rate", yaw_course, YAW_RATE_UNITS), ("heading", heading_course,
+                  HEADING_UNITS))  # fmt: skip
+        for name, ratio, units in tables:
+            if ratio is None or not _differs(ratio, MIN_COURSE_FACTOR):
+                continue
+            matches = misread_units(1 / ratio.ratio, units, 0.4)
+            remedy = f'[{name}] unit = "{matches[0][0]}"' if matches else "its unit"
+            yield Finding(
+                "unit",
+                f"{topics[name]}: turns {abs(1 / ratio.ratio):.3g} times as much as the course of "
+                f"the fixes; likely {in_words(matches) or 'a wrong unit'}; change in the layout: "
+                f"{remedy}",
+            )
+
+
+def _differs(ratio: TurningRatio, factor: float) -> bool:
+    """Whether a ratio differs from 1 by more than a factor, and significantly."""
+    difference = abs(log(abs(ratio.ratio)))
+    return difference > log(factor) and difference > 6 * ratio.error / abs(ratio.ratio)

@@ -1,0 +1,145 @@
+"""Wrong units and signs are found and assigned to one channel; right logs give no finding."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trial_logs import as_log
+
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import simulate
+from shiplog import TrialLog, Vessel
+from shiplog.checks.consistency.consistency_check import consistency_findings
+from shiplog.checks.consistency.findings import Finding, refuse_contradictions
+from shiplog.errors import LogError
+
+DEG = np.pi / 180
+Values = np.ndarray
+
+
+@pytest.fixture(scope="module")
+def trial(vessel: Vessel) -> TrialLog:
+    """A zigzag with heading and fixes."""
+    return simulated(vessel, "zigzag-20-20", 0)
+
+
+def simulated(vessel: Vessel, manoeuvre: str, seed: int) -> TrialLog:
+    sensors = suite("paper", {"heading.white": 0.2 * DEG, "position.white": 1.0})
+    return as_log(simulate(vessel, manoeuvre, duration_secs=500.0, seed=seed, sensors=sensors))
+
+
+def changed(log: TrialLog, **functions: Callable[[Values], Values]) -> TrialLog:
+    """Return the log with the values of some channels changed."""
+    channels = [
+        replace(c, values=functions[c.name](c.values)) if c.name in functions else c for c in log
+    ]
+    return replace(log, channels=tuple(channels))
+
+
+def scaled(factor: float) -> Callable[[Values], Values]:
+    return lambda values: factor * values
+
+
+def contradictions(log: TrialLog) -> list[Finding]:
+    return [f for f in consistency_findings(log) if f.kind != "bias"]
+
+
+def test_channels_that_agree_give_no_finding(trial: TrialLog) -> None:
+    assert contradictions(trial) == []
+
+
+@pytest.mark.parametrize("manoeuvre", ["zigzag-10-10", "zigzag-20-20", "turning-circle-35"])
+@pytest.mark.parametrize("seed", range(4))
+def test_simulated_trials_give_no_finding(vessel: Vessel, manoeuvre: str, seed: int) -> None:
+    assert contradictions(simulated(vessel, manoeuvre, seed)) == []
+
+
+WRONG_UNITS = [
+    ("yaw_rate", 1 / DEG, "deg/s read as rad/s"),
+    ("yaw_rate", 60.0, "deg/min read as deg/s"),
+    ("yaw_rate", DEG, "rad/s read as deg/s"),
+    ("yaw_rate", 1 / 60, "deg/s read as deg/min"),
+    ("speed", 3600 / 1852, "kn read as m/s"),
+    ("speed", 3.6, "km/h read as m/s"),
+    ("speed", 1852 / 3600, "m/s read as kn"),
+    ("rudder", DEG, "rad read as deg"),
+    ("rudder", 1 / DEG, "deg read as rad"),
+    ("rudder", 10.0, "deg"),
+    ("rpm", 1 / 60, "rev/s read as rpm"),
+    ("position", 1 / 0.3048, "ft read as m"),
+]
+
+
+@pytest.mark.parametrize(("name", "factor", "cause"), WRONG_UNITS)
+def test_a_wrong_unit_is_named(trial: TrialLog, name: str, factor: float, cause: str) -> None:
+    findings = contradictions(changed(trial, **{name: scaled(factor)}))
+    assert any(f.kind == "unit" and cause in f.text for f in findings), findings
+    assert all("\n" not in f.text for f in findings)
+
+
+@pytest.mark.parametrize(
+    "names", [("yaw_rate",), ("heading",), ("rudder",), ("yaw_rate", "rudder")]
+)
+def test_reversed_signs_are_assigned_to_their_channels(
+    trial: TrialLog, names: tuple[str, ...]
+) -> None:
+    findings = contradictions(changed(trial, **{name: scaled(-1.0) for name in names}))
+    signs = {f.text.split("/")[1] for f in findings if f.kind == "sign"}
+    assert signs == set(names), findings
+
+
+def test_swapped_north_and_east_are_found(trial: TrialLog) -> None:
+    findings = contradictions(changed(trial, position=lambda values: values[:, ::-1]))
+    assert any(f.text.startswith("/position") and "swapped" in f.text for f in findings), findings
+
+
+def test_a_heading_from_east_is_found(trial: TrialLog) -> None:
+    findings = contradictions(changed(trial, heading=lambda values: values - np.pi / 2))
+    assert [f.kind for f in findings] == ["zero"]
+    assert "from east" in findings[0].text
+
+
+def test_a_mathematical_heading_is_found(trial: TrialLog) -> None:
+    findings = contradictions(changed(trial, heading=lambda values: np.pi / 2 - values))
+    assert any(f.kind == "sign" and f.text.startswith("/heading") for f in findings), findings
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("rad", DEG), ("grad", 400 / 360)])
+def test_the_unit_of_a_heading_is_found(trial: TrialLog, unit: str, factor: float) -> None:
+    log = changed(trial, heading=lambda values: (values % (2 * np.pi)) * factor)
+    findings = contradictions(log)
+    assert any(f"{unit} read as deg" in f.text for f in findings), findings
+
+
+def test_two_faults_at_once_are_both_found(trial: TrialLog) -> None:
+    log = changed(trial, yaw_rate=scaled(-60.0), speed=scaled(3600 / 1852))
+    text = "\n".join(f.text for f in contradictions(log))
+    assert "deg/min read as deg/s" in text
+    assert "/yaw_rate" in text
+    assert "sign" in text
+    assert "kn read as m/s" in text
+
+
+def test_a_late_heading_is_reported(trial: TrialLog) -> None:
+    late = [
+        replace(c, measured_ns=c.measured_ns + 2 * 10**9) if c.name == "heading" else c
+        for c in trial
+    ]
+    findings = contradictions(replace(trial, channels=tuple(late)))
+    lag = [f for f in findings if f.kind == "lag"]
+    assert len(lag) == 1
+    assert "/heading" in lag[0].text
+    assert float(lag[0].text.split(" by ")[1].split()[0]) == pytest.approx(2.0, abs=0.3)
+
+
+def test_no_advice_about_the_rudder_from_going_astern(trial: TrialLog) -> None:
+    log = changed(trial, rudder=scaled(-1.0), speed=scaled(-1.0), rpm=scaled(-1.0))
+    without_fixes = replace(log, channels=tuple(c for c in log if c.name != "position"))
+    assert not any("/rudder" in f.text for f in contradictions(without_fixes))
+
+
+def test_strict_refuses_signs_and_units_only(trial: TrialLog) -> None:
+    refuse_contradictions([Finding("bias", "b"), Finding("lag", "l"), Finding("zero", "z")])
+    with pytest.raises(LogError, match="sign is reversed"):
+        refuse_contradictions(consistency_findings(changed(trial, rudder=scaled(-1.0))))
