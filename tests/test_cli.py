@@ -653,3 +653,30 @@ def test_from_and_to_cut_the_log_in_every_verb(
     capsys.readouterr()
     assert "has 500.0 s" in refusal(capsys, USAGE, "replay", recorded, "--from", "600")
     assert "no time: 'noon'" in refusal(capsys, USAGE, "identify", recorded, "--to", "noon")
+
+
+def test_info_of_several_logs_is_a_row_each_and_reports_those_that_cannot_be_read(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("bad.mcap").write_bytes(b"not a log")
+    assert main(["info", str(recorded), str(recorded)]) == OK
+    out = capsys.readouterr().out
+    assert out.count("2026-01-01 00:00:00") == 2
+    assert max(map(len, out.splitlines())) <= 80
+    assert main(["info", str(recorded), "bad.mcap", "none.mcap", "--json", "i.json"]) == FAILURE
+    errors = capsys.readouterr().err.splitlines()
+    assert len(errors) == 2
+    assert all(line.startswith("shiplog: ") for line in errors)
+    good, bad, missing = json.loads(Path("i.json").read_text())
+    assert good["duration_secs"] == pytest.approx(500, abs=0.1)
+    assert "not an MCAP file" in bad["error"]
+    assert "no such file" in missing["error"]
+
+
+def test_info_fits_eighty_columns_without_breaking_its_table(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["info", str(recorded)]) == OK
+    out = capsys.readouterr().out
+    assert "(continued)" not in out
+    assert max(map(len, out.splitlines())) <= 80

@@ -1,69 +1,78 @@
 """The verbs of the core: info, convert."""
 
 import argparse
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from shiplog.text_table import TextTable
+from shiplog.errors import ShiplogError
 
 from .console import print_tables, print_warnings, progress, write_json
 from .options import add_cut_options
 from .paths import require_distinct, require_inputs, require_outputs
 from .verb import ExitCode, Verb
 
-if TYPE_CHECKING:
-    from shiplog.mcap.info import LogInfo
-
 
 def _configure_info(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("log", metavar="LOG")
-    parser.add_argument("--json", metavar="FILE", help="write it as JSON; - is stdout")
+    parser.add_argument("log", metavar="LOG", nargs="+", help="one log, or several for an overview")
+    add_cut_options(parser)
+    parser.add_argument(
+        "--json", metavar="FILE", help="write it as JSON, of several logs a list; - is stdout"
+    )
 
 
 def _info(arguments: argparse.Namespace) -> ExitCode:
-    from shiplog.mcap.info import read_log_info
-
-    require_inputs(arguments.log)
     require_outputs(arguments.json)
-    require_distinct([arguments.json], [arguments.log])
-    found = read_log_info(arguments.log)
+    require_distinct([arguments.json], arguments.log)
+    if len(arguments.log) > 1:
+        return _info_of_several(arguments)
+    from shiplog.checks.info import read_log_info
+
+    from .info_tables import info_tables
+
+    require_inputs(*arguments.log)
+    info = read_log_info(arguments.log[0], arguments.start, arguments.end)
     if arguments.json:
-        write_json(found.to_dict(), arguments.json)
-        return ExitCode.DATA_LOST if found.data_lost else ExitCode.OK
-    state = "finished" if found.finished else "not finished"
-    state += ", damaged" if found.data_lost else ""
-    duration_secs = (found.end_ns - found.start_ns) * 1e-9
-    print(f"{found.name}: from {found.start_utc}, {duration_secs:.1f} s, {state}")
-    print_tables(_info_tables(found))
-    for key, value in found.metadata.items():
-        print(f"  {key}: {value}")
-    print(f"  vessel.toml: {'attached' if found.has_vessel else 'none'}")
-    print_warnings(found.warnings)
-    return ExitCode.DATA_LOST if found.data_lost else ExitCode.OK
+        write_json(info.to_dict(), arguments.json)
+    else:
+        start = f"from {info.start_utc}" if info.start_utc else "no samples"
+        print(f"{info.name}: {start}, {info.duration_secs:.1f} s, {info.state}")
+        print_tables(info_tables(info))
+        for key, value in info.metadata.items():
+            print(f"  {key}: {value}")
+        print(f"  vessel.toml: {'attached' if info.has_vessel else 'none'}")
+        print_warnings(info.warnings)
+    return ExitCode.DATA_LOST if info.data_lost else ExitCode.OK
 
 
-def _info_tables(info: "LogInfo") -> list[TextTable]:
-    """Tables of a log's channels and of its foreign topics; those without rows are omitted."""
-    channels = tuple(
-        (
-            channel.topic,
-            str(channel.samples),
-            "" if channel.rate_hz is None else f"{channel.rate_hz:.4g}",
-            "" if channel.lowest is None else f"{channel.lowest:.4g}",
-            "" if channel.highest is None else f"{channel.highest:.4g}",
-            channel.display_unit or channel.unit,
+def _info_of_several(arguments: argparse.Namespace) -> ExitCode:
+    """Show one row for each log; a log that cannot be read is reported and the others shown."""
+    from shiplog.checks.info import read_log_info
+
+    from .info_tables import info_overview
+
+    infos, entries, failed = [], [], False
+    with progress() as on_progress:
+        for number, path in enumerate(arguments.log):
+            on_progress(f"log {number + 1} of {len(arguments.log)}", number / len(arguments.log))
+            try:
+                require_inputs(path)
+                infos.append(read_log_info(path, arguments.start, arguments.end))
+                entries.append(infos[-1].to_dict())
+            except ShiplogError as error:
+                entries.append({"name": Path(path).name, "error": str(error)})
+                print(f"shiplog: {error}", file=sys.stderr)
+                failed = True
+    if arguments.json:
+        write_json(entries, arguments.json)
+    else:
+        print_tables([info_overview(infos)])
+    for info in infos:
+        print_warnings(
+            [text if info.name in text else f"{info.name}: {text}" for text in info.warnings]
         )
-        for channel in info.channels
-    )
-    signs = tuple((one.topic, one.positive) for one in info.channels if one.positive)
-    foreign = tuple((one.topic, str(one.messages), one.schema) for one in info.foreign)
-    headings = ("topic", "samples", "rate [Hz]", "lowest", "highest", "unit")
-    tables = (
-        TextTable("channels", headings, channels),
-        TextTable("signs", ("topic", "positive"), signs),
-        TextTable("topics of other programs", ("topic", "messages", "schema"), foreign),
-    )
-    return [table for table in tables if table.rows]
+    if failed:
+        return ExitCode.FAILURE
+    return ExitCode.DATA_LOST if any(info.data_lost for info in infos) else ExitCode.OK
 
 
 def _configure_convert(parser: argparse.ArgumentParser) -> None:
@@ -104,7 +113,11 @@ INFO = Verb(
     "list what is in a log: times, rates, ranges, foreign topics",
     _configure_info,
     _info,
-    ("shiplog info trial.mcap", "shiplog info trial.mcap --json -"),
+    (
+        "shiplog info trial.mcap",
+        "shiplog info *.mcap   (one row for each log)",
+        "shiplog info day.mcap --from 12:04:30 --to 12:21 --json -",
+    ),
 )
 CONVERT = Verb(
     "convert a table to a log, or a log to a table",

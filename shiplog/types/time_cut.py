@@ -196,6 +196,8 @@ def _bound_text(bound: float | str | None, default: str) -> str:
 
 
 def _span_text(span_ns: tuple[int, int]) -> str:
+    if span_ns == (0, 0):
+        return "no samples"
     secs = (span_ns[1] - span_ns[0]) * 1e-9
     return f"{secs:.1f} s, from {_utc(span_ns[0])} to {_utc(span_ns[1])}"
 

@@ -9,7 +9,7 @@ from mcap.writer import Writer
 from mcap_files import scalar
 
 from shiplog import LogError
-from shiplog.mcap.info import read_log_info
+from shiplog.checks.info import read_log_info
 from shiplog.mcap.reader import read
 from shiplog.mcap.schema import schema_for
 from shiplog.mcap.writer import write

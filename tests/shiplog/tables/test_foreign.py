@@ -9,8 +9,8 @@ from layout_texts import MINIMAL, layout
 from places import KVLCC2, LAYOUTS
 from scipy.signal import savgol_filter
 
+from shiplog.checks.info import read_log_info
 from shiplog.errors import LayoutError
-from shiplog.mcap.info import read_log_info
 from shiplog.mcap.reader import read
 from shiplog.mcap.writer import write
 from shiplog.tables.convert import convert

@@ -7,8 +7,8 @@ from mcap.writer import Writer as McapWriter
 
 from recorders.record import record
 from recorders.simulated.simulate import SimulatedTrial
-from shiplog import Channel, LogError, LogWriter
-from shiplog.mcap.info import read_log_info
+from shiplog import Channel, LogError, LogWriter, UsageError
+from shiplog.checks.info import read_log_info
 from shiplog.tables.convert import convert
 
 
@@ -21,11 +21,14 @@ def test_a_finished_log_is_described_with_rates_and_ranges(
     assert (yaw.topic, yaw.unit, yaw.samples) == ("/yaw_rate/simulated", "rad/s", 5001)
     assert yaw.positive == "bow to starboard"
     assert yaw.rate_hz == pytest.approx(10, rel=0.01)
-    assert yaw.display_unit == "deg/s"
-    assert yaw.lowest is not None
-    assert yaw.highest is not None
-    assert -5 < yaw.lowest < -0.1
-    assert 0.1 < yaw.highest < 5
+    (values,) = yaw.ranges
+    assert values.unit == "deg/s"
+    assert -5 < values.lowest < -0.1
+    assert 0.1 < values.highest < 5
+    assert (yaw.source, yaw.gaps, yaw.irregular) == ("simulated", 0, False)
+    north, east = info.channels[-1].ranges
+    assert (north.component, east.component, north.unit) == ("north", "east", "m")
+    assert info.start_utc == "2026-01-01T00:00:00Z"
     assert info.finished
     assert not info.foreign
     assert info.has_vessel
@@ -69,10 +72,10 @@ def test_only_the_summary_of_a_huge_log_is_read(
     with LogWriter(tmp_path / "a.mcap") as writer:
         writer.write(Channel("speed", "log", "m/s", at, at, np.ones(100)))
     monkeypatch.delattr("zstandard.ZstdDecompressor")
-    monkeypatch.setattr("shiplog.mcap.info.MAX_MESSAGES_TO_READ", 99)
+    monkeypatch.setattr("shiplog.checks.info.MAX_MESSAGES_TO_READ", 99)
     info = read_log_info(tmp_path / "a.mcap")
     assert info.channels[0].samples == 100
-    assert "only the summary of 100 messages" in info.warnings[0]
+    assert "only the summary of its 100 messages" in info.warnings[0]
 
 
 def _write_foreign(path: Path, *, finish: bool) -> None:
@@ -116,3 +119,42 @@ def test_a_file_that_is_not_mcap_is_rejected(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").write_bytes(b"not at all")
     with pytest.raises(LogError, match="not an MCAP file"):
         read_log_info(tmp_path / "a.mcap")
+
+
+def _write_speeds(path: Path, times_secs: np.ndarray) -> None:
+    at = (times_secs * 1e9).astype(np.int64)
+    with LogWriter(path) as writer:
+        writer.write(Channel("speed", "log", "m/s", at, at, times_secs))
+
+
+def test_gaps_and_irregular_sampling_are_shown(tmp_path: Path) -> None:
+    regular = np.arange(0.0, 100.0)
+    _write_speeds(tmp_path / "gap.mcap", np.concatenate((regular, regular + 130)))
+    (channel,) = read_log_info(tmp_path / "gap.mcap").channels
+    assert (channel.gaps, channel.irregular) == (1, False)
+    assert channel.longest_gap_secs == pytest.approx(31)
+    _write_speeds(tmp_path / "jitter.mcap", np.cumsum(np.tile([0.1, 0.1, 0.4], 40)))
+    (channel,) = read_log_info(tmp_path / "jitter.mcap").channels
+    assert channel.irregular
+
+
+@pytest.mark.parametrize("limit", [10, 1000])
+def test_a_part_is_described_by_its_own_samples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: int
+) -> None:
+    monkeypatch.setattr("shiplog.checks.info.MAX_MESSAGES_TO_READ", limit)
+    _write_speeds(tmp_path / "a.mcap", np.arange(0.0, 101.0))
+    info = read_log_info(tmp_path / "a.mcap", 20, -50)
+    (channel,) = info.channels
+    assert (info.name, channel.samples) == ("a.mcap (20 to 50 s)", 30)
+    assert channel.ranges[0].lowest == pytest.approx(20 * 3600 / 1852)
+    assert info.duration_secs == pytest.approx(29)
+
+
+def test_a_log_without_samples_has_no_start(tmp_path: Path) -> None:
+    with LogWriter(tmp_path / "empty.mcap"):
+        pass
+    info = read_log_info(tmp_path / "empty.mcap")
+    assert (info.start_utc, info.duration_secs, info.state) == (None, 0.0, "finished")
+    with pytest.raises(UsageError, match=r"empty.mcap has no samples"):
+        read_log_info(tmp_path / "empty.mcap", 10)

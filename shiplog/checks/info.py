@@ -1,0 +1,339 @@
+"""Content of a log as `shiplog info` shows it: times, rates, ranges, gaps and foreign topics."""
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shiplog.mcap.decode import McapContents, schema_of
+from shiplog.mcap.reader import open_mcap
+from shiplog.mcap.scan import scan
+from shiplog.mcap.stream import open_log
+from shiplog.mcap.summary import McapSummary, read_summary
+from shiplog.mcap.trial_log import build_trial_log
+from shiplog.types import Channel, Log, TrialLog
+from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
+
+from .channel_stats import ChannelStats
+from .data_quality import MAX_IRREGULAR_SHARE
+from .log_stats import compute_log_stats
+
+MAX_MESSAGES_TO_READ = 4_000_000  # of a finished file; of a longer one only the summary is read
+
+
+@dataclass(frozen=True)
+class ValueRange:
+    """The range of one component of a channel, in the unit in which people read it.
+
+    Attributes
+    ----------
+    component
+        The name of the component; empty for a scalar.
+    unit
+        The unit of `lowest` and `highest`.
+    lowest, highest
+        The smallest and the largest value in the file; NaN and infinite values are excluded.
+    """
+
+    component: str
+    unit: str
+    lowest: float
+    highest: float
+
+
+@dataclass(frozen=True)
+class ChannelInfo:
+    """One topic of shiplog in a file.
+
+    Attributes
+    ----------
+    topic
+        The topic, such as ``/yaw_rate/gyro``.
+    source
+        The sensor or program, such as ``gyro``.
+    unit
+        The unit of the values in shiplog.
+    positive
+        The sign convention in words.
+    samples
+        The number of samples.
+    rate_hz
+        The sampling rate, from the median interval; None if unknown.
+    irregular
+        Whether many intervals differ from their median by more than half.
+    gaps, longest_gap_secs
+        The number of gaps and the length of the longest, s; None if unknown.
+    ranges
+        The range of each component; empty if unknown.
+    """
+
+    topic: str
+    source: str
+    unit: str
+    positive: str
+    samples: int
+    rate_hz: float | None = None
+    irregular: bool = False
+    gaps: int | None = None
+    longest_gap_secs: float | None = None
+    ranges: tuple[ValueRange, ...] = ()
+
+
+@dataclass(frozen=True)
+class ForeignTopic:
+    """One topic of another program, whose messages shiplog does not read.
+
+    Attributes
+    ----------
+    topic
+        The topic.
+    schema
+        The name of its message schema; empty if it has none.
+    messages
+        The number of messages.
+    first_ns, last_ns
+        Its first and last time of reception, ns since 1970-01-01 UTC; None if unknown.
+    """
+
+    topic: str
+    schema: str
+    messages: int
+    first_ns: int | None = None
+    last_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class LogInfo:
+    """The content of a file, or of a part of it.
+
+    Attributes
+    ----------
+    name
+        The name of the file, with the bounds of the part.
+    start_ns, end_ns
+        Its first and last time, ns since 1970-01-01 UTC: of measurement if the file was read; of
+        reception if it has foreign topics only, or if taken from the summary. None if it is empty.
+    channels
+        Its topics of shiplog.
+    foreign
+        The topics of other programs in the whole file.
+    metadata
+        Text about the trial, by key.
+    has_vessel
+        Whether a vessel file is attached.
+    finished
+        Whether the recorder has closed the file.
+    warnings
+        Problems met in reading the file.
+    data_lost
+        Whether a part of the file could not be read.
+    """
+
+    name: str
+    start_ns: int | None
+    end_ns: int | None
+    channels: tuple[ChannelInfo, ...]
+    foreign: tuple[ForeignTopic, ...]
+    metadata: Mapping[str, str]
+    has_vessel: bool
+    finished: bool = True
+    warnings: tuple[str, ...] = ()
+    data_lost: bool = False
+
+    @property
+    def start_utc(self) -> str | None:
+        """The start in UTC to the second, in ISO 8601; None if the file is empty."""
+        if self.start_ns is None:
+            return None
+        return f"{np.datetime64(self.start_ns, 'ns').astype('M8[s]')}Z"
+
+    @property
+    def duration_secs(self) -> float:
+        """The time from the start to the end, s."""
+        if self.start_ns is None or self.end_ns is None:
+            return 0.0
+        return (self.end_ns - self.start_ns) * 1e-9
+
+    @property
+    def state(self) -> str:
+        """Whether the file is finished and whole, in words."""
+        state = "finished" if self.finished else "not finished"
+        return f"{state}, damaged" if self.data_lost else state
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content as plain values for JSON."""
+        names = ("start_utc", "duration_secs", "state")
+        return asdict(self) | {name: getattr(self, name) for name in names}
+
+
+def read_log_info(
+    path: str | os.PathLike[str],
+    start: float | str | None = None,
+    end: float | str | None = None,
+) -> LogInfo:
+    """Return the content of a log.
+
+    A file is read whole, except a finished one with more than `MAX_MESSAGES_TO_READ` messages: of
+    that only the summary is read, and a warning reports that rates and ranges are unknown. A part
+    of it is read chunk by chunk.
+
+    Parameters
+    ----------
+    path
+        The MCAP file.
+    start, end
+        The part to describe, as `TrialLog.between` takes them; by default all.
+
+    Raises
+    ------
+    LogError
+        The file is missing or is not MCAP.
+    UsageError
+        The part has no samples.
+
+    Examples
+    --------
+    >>> info = read_log_info("sample_data/zigzag_20_20.mcap")
+    >>> info.channels[0].topic, info.channels[0].samples, round(info.channels[0].rate_hz)
+    ('/yaw_rate/simulated', 6001, 10)
+    """
+    path = Path(path)
+    contents = McapContents()
+    with open_mcap(path) as stream:
+        summary = read_summary(stream)
+        if summary and summary.statistics.message_count > MAX_MESSAGES_TO_READ:
+            if start is None and end is None:
+                return _info_of_summary(path.name, summary)
+            log = open_log(path).between(start, end)
+            return _info_of_log(log, _foreign_in_summary(summary), finished=True)
+        for _ in scan(stream, contents):
+            pass
+    log = build_trial_log(path, contents).between(start, end)
+    return _info_of_log(log, _foreign_in_contents(contents), finished=contents.finished)
+
+
+def _info_of_summary(name: str, summary: McapSummary) -> LogInfo:
+    statistics = summary.statistics
+    channels = []
+    for channel_id, channel in sorted(summary.channels.items()):
+        if schema_of(channel, summary.schemas) is not None:
+            source = channel.metadata.get("source", channel.topic.strip("/").partition("/")[2])
+            unit, positive = (channel.metadata.get(key, "") for key in ("unit", "positive"))
+            samples = statistics.channel_message_counts.get(channel_id, 0)
+            channels.append(ChannelInfo(channel.topic, source, unit, positive, samples))
+    warning = (
+        f"{name}: only the summary of its {statistics.message_count:,} messages was read, so that "
+        "rates, ranges and gaps are unknown; to read a part, use --from and --to"
+    )
+    return LogInfo(
+        name,
+        statistics.message_start_time,
+        statistics.message_end_time,
+        tuple(channels),
+        _foreign_in_summary(summary),
+        summary.metadata,
+        summary.vessel_toml is not None,
+        warnings=(warning,),
+    )
+
+
+def _foreign_in_summary(summary: McapSummary) -> tuple[ForeignTopic, ...]:
+    counts, schemas = summary.statistics.channel_message_counts, summary.schemas
+    return tuple(
+        ForeignTopic(
+            channel.topic,
+            schemas[channel.schema_id].name if channel.schema_id in schemas else "",
+            counts.get(channel_id, 0),
+        )
+        for channel_id, channel in sorted(summary.channels.items())
+        if schema_of(channel, schemas) is None
+    )
+
+
+def _foreign_in_contents(contents: McapContents) -> tuple[ForeignTopic, ...]:
+    """Return the topics of other programs in a file, which may have no summary."""
+    topics = []
+    for channel_id, record in sorted(contents.channels.items()):
+        if schema_of(record, contents.schemas) is None:
+            schema = contents.schemas.get(record.schema_id)
+            messages = contents.foreign.get(channel_id)
+            topics.append(
+                ForeignTopic(
+                    record.topic,
+                    schema.name if schema else "",
+                    messages.count if messages else 0,
+                    messages.first_ns if messages else None,
+                    messages.last_ns if messages else None,
+                )
+            )
+    return tuple(topics)
+
+
+def _info_of_log(log: Log, foreign: tuple[ForeignTopic, ...], *, finished: bool) -> LogInfo:
+    stats = compute_log_stats(log)
+    starts = [channel.span_ns[0] for channel in stats if channel.samples]
+    ends = [channel.span_ns[1] for channel in stats if channel.samples]
+    if not starts:
+        starts = [topic.first_ns for topic in foreign if topic.first_ns is not None]
+        ends = [topic.last_ns for topic in foreign if topic.last_ns is not None]
+    in_memory = {channel.key: channel for channel in log} if isinstance(log, TrialLog) else {}
+    channels = tuple(
+        _info_of_channel(channel, in_memory.get((channel.topic, channel.fields)))
+        for channel in stats
+    )
+    return LogInfo(
+        log.name,
+        min(starts, default=None),
+        max(ends, default=None),
+        channels,
+        foreign,
+        dict(log.metadata),
+        log.vessel_toml is not None,
+        finished,
+        log.warnings,
+        log.data_lost,
+    )
+
+
+def _info_of_channel(stats: ChannelStats, channel: Channel | None) -> ChannelInfo:
+    """Return the content of a channel from its statistics, and from its samples if in memory."""
+    kind = CATALOGUE.get(stats.name)
+    metadata = channel.metadata if channel else {}
+    positive = kind.positive if kind else metadata.get("positive", "")
+    if set(stats.fields) & set(GEOGRAPHIC):
+        positive = "north and east"
+    return ChannelInfo(
+        stats.topic,
+        stats.source,
+        stats.unit,
+        positive,
+        stats.samples,
+        1 / stats.interval_secs if stats.interval_secs > 0 else None,
+        stats.irregular_share > MAX_IRREGULAR_SHARE,
+        len(stats.gaps),
+        max((length for _, length in stats.gaps), default=0.0),
+        tuple(_ranges(stats, channel)),
+    )
+
+
+def _ranges(stats: ChannelStats, channel: Channel | None) -> Iterator[ValueRange]:
+    """Yield the range of each component that has a finite value."""
+    kind, unit = CATALOGUE.get(stats.name), stats.unit
+    if kind and unit == kind.unit:
+        unit = kind.display_unit
+    if not stats.fields:
+        low, high = stats.value_range
+        if low <= high:
+            scale = conversion_factor(stats.unit, unit) if unit != stats.unit else 1.0
+            yield ValueRange("", unit, low * scale, high * scale)
+        return
+    if channel is None:
+        return
+    for field, values in zip(channel.fields, channel.values.T, strict=True):
+        finite = values[np.isfinite(values)]
+        if len(finite):
+            component_unit = "deg" if field in GEOGRAPHIC[:2] else unit
+            yield ValueRange(field, component_unit, float(finite.min()), float(finite.max()))

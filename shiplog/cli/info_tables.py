@@ -1,0 +1,92 @@
+"""Tables of what is in a log, or in many, as `shiplog info` prints them."""
+
+from collections.abc import Sequence
+
+from shiplog.checks.info import ChannelInfo, ForeignTopic, LogInfo, ValueRange
+from shiplog.text_table import TextTable
+
+
+def info_tables(info: LogInfo) -> list[TextTable]:
+    """Return the channels of a log, their signs, and its topics of other programs.
+
+    Tables without rows are omitted.
+    """
+    channels = TextTable(
+        "Channels",
+        ("topic", "samples", "rate\n[Hz]", "lowest", "highest", "unit", "gaps"),
+        tuple(row for channel in info.channels for row in _channel_rows(channel)),
+        tuple(_remarks(info.channels)),
+    )
+    signs = TextTable(
+        "Signs",
+        ("topic", "positive"),
+        tuple((channel.topic, channel.positive) for channel in info.channels if channel.positive),
+    )
+    foreign = TextTable(
+        "Topics of other programs",
+        ("topic", "messages", "schema", "first [s]", "last [s]"),
+        tuple(_foreign_row(topic, info) for topic in info.foreign),
+        ("shiplog does not read these; their times are of reception, in s since the start.",),
+    )
+    return [table for table in (channels, signs, foreign) if table.rows]
+
+
+def info_overview(infos: Sequence[LogInfo]) -> TextTable:
+    """Return a table of several logs, one row each."""
+    rows = []
+    for info in infos:
+        start = (info.start_utc or "no samples").replace("T", " ").rstrip("Z")
+        samples = sum(channel.samples for channel in info.channels)
+        foreign = str(len(info.foreign)) if info.foreign else ""
+        duration = f"{info.duration_secs:.1f}"
+        counts = (str(len(info.channels)), str(samples), foreign)
+        rows.append((info.name, start, duration, *counts, info.state))
+    columns = (
+        "log", "start (UTC)", "duration\n[s]", "channels", "samples", "foreign\ntopics", "state"
+    )  # fmt: skip
+    return TextTable(f"{len(infos)} logs", columns, tuple(rows))
+
+
+def _channel_rows(channel: ChannelInfo) -> list[tuple[str, ...]]:
+    """Return a row of a channel; of one with components a further row for each of them."""
+    rate = "" if channel.rate_hz is None else f"{channel.rate_hz:.3g}"
+    rate += " *" if channel.irregular else ""
+    gaps = "" if channel.gaps is None else str(channel.gaps)
+    scalar = [each for each in channel.ranges if not each.component]
+    values = _range_cells(scalar[0]) if scalar else ("", "", channel.unit)
+    if channel.ranges and not scalar:
+        values = ("", "", "")
+    rows: list[tuple[str, ...]] = [(channel.topic, str(channel.samples), rate, *values, gaps)]
+    rows += [
+        (f"  {each.component}", "", "", *_range_cells(each), "")
+        for each in channel.ranges
+        if each.component
+    ]
+    return rows
+
+
+def _range_cells(values: ValueRange) -> tuple[str, str, str]:
+    """Return the cells of a range; of degrees of position with enough digits to find the place."""
+    digits = 7 if values.component in {"latitude", "longitude"} else 4
+    return f"{values.lowest:.{digits}g}", f"{values.highest:.{digits}g}", values.unit
+
+
+def _remarks(channels: Sequence[ChannelInfo]) -> list[str]:
+    remarks = []
+    if any(channel.irregular for channel in channels):
+        remarks.append("* irregular: more than a tenth of the intervals differ by more than half.")
+    remarks += [
+        f"{channel.topic}: the longest gap is {channel.longest_gap_secs:.1f} s."
+        for channel in channels
+        if channel.gaps and channel.longest_gap_secs
+    ]
+    return remarks
+
+
+def _foreign_row(topic: ForeignTopic, info: LogInfo) -> tuple[str, ...]:
+    start_ns = info.start_ns or 0
+    times = (
+        "" if at_ns is None else f"{(at_ns - start_ns) * 1e-9:.1f}"
+        for at_ns in (topic.first_ns, topic.last_ns)
+    )
+    return (topic.topic, str(topic.messages), topic.schema, *times)
