@@ -11,7 +11,8 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from shiplog import LogWriter, TrialLog, read
-from shiplog.mcap.schema import encode_messages, schema_for
+from shiplog.mcap.messages import descriptor_set, encode_messages
+from shiplog.mcap.schema import schema_for
 from shiplog.mcap.writer import channel_metadata
 
 from .bench import Bench
@@ -107,7 +108,7 @@ def write_messages(log: TrialLog, path: Path) -> None:
         writer = Writer(stream)
         writer.start()
         scalar = schema_for(())
-        schema_id = writer.register_schema(scalar.name, "protobuf", scalar.descriptor_set)
+        schema_id = writer.register_schema(scalar.name, "protobuf", descriptor_set(scalar))
         messages = []
         for channel in log:
             metadata = channel_metadata(channel)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shiplog.types import Channel, TimeArray, is_sorted
 
 from .records import INDEX_ENTRY, MESSAGE_HEAD, RECORD_HEAD
-from .schema import encode_messages, fill_message_rows, schema_for
+from .schema import fill_message_rows, schema_for
 
 Bytes = NDArray[np.uint8]
 
@@ -153,6 +153,8 @@ def _message_records(batch: SampleBatch) -> _MessageRecords:
     rows["sequence"] = np.arange(batch.first_sequence, batch.first_sequence + n)
     rows["received"], rows["measured"] = samples.received_ns, samples.measured_ns
     if fixed is None:
+        from .messages import encode_messages  # noqa: PLC0415 - protobuf takes long to import
+
         return _variable_width_records(rows, encode_messages(samples))
     rows["length"] = rows.dtype.itemsize - RECORD_HEAD.size
     fill_message_rows(rows, samples)

@@ -5,12 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from google.protobuf.message import DecodeError
 from mcap import records
 
 from shiplog.errors import LogError, UsageError
 from shiplog.types import (
     Channel,
+    FloatArray,
     TrialLog,
     concatenate_channels,
     is_sorted,
@@ -19,7 +19,7 @@ from shiplog.units import CATALOGUE, conversion_factor
 
 from .clock_repair import MessageColumns, drop_impossible_times, repair_clock_steps
 from .decode import McapContents, SampleBlock, schema_of
-from .schema import FORMAT_VERSION, Schema, decode_messages
+from .schema import FORMAT_VERSION, Schema
 
 _CHANNEL_KEYS = {"channel", "source", "unit", "positive"}  # of the metadata: attributes of Channel
 
@@ -168,13 +168,8 @@ def _columns(
         times = np.empty(0, np.int64)
         return MessageColumns(topic, times, times, times, np.empty((0, len(schema.fields))))
     try:
-        values = [
-            block.values
-            if isinstance(block.values, np.ndarray)
-            else decode_messages(schema, block.values)
-            for block in blocks
-        ]
-    except DecodeError as error:
+        values = [_values(schema, block) for block in blocks]
+    except ValueError as error:
         raise LogError(
             f"channel {name!r} has messages that are not {schema.name}; "
             f"correct the program that wrote them: {path}"
@@ -186,6 +181,14 @@ def _columns(
         np.concatenate([block.measured for block in blocks]),
         np.concatenate(values),
     )
+
+
+def _values(schema: Schema, block: SampleBlock) -> FloatArray:
+    if isinstance(block.values, np.ndarray):
+        return block.values
+    from .messages import decode_messages  # noqa: PLC0415 - protobuf takes long to import
+
+    return decode_messages(schema, block.values)
 
 
 def _si_scale(path: Path, name: str, unit: str) -> tuple[float, str]:

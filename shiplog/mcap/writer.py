@@ -142,11 +142,13 @@ class LogWriter:
         return self._channel_ids[channel.topic]
 
     def _register_schema(self, fields: tuple[str, ...]) -> int:
+        from .messages import descriptor_set  # noqa: PLC0415 - protobuf takes long to import
+
         schema = schema_for(fields)
         if schema.name not in self._schema_ids:
             schema_id = len(self._schema_ids) + 1
             record = records.Schema(
-                id=schema_id, name=schema.name, encoding=ENCODING, data=schema.descriptor_set
+                id=schema_id, name=schema.name, encoding=ENCODING, data=descriptor_set(schema)
             )
             self._file.add_schema(record)
             self._schema_ids[schema.name] = schema_id

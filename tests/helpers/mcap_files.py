@@ -13,7 +13,8 @@ from mcap.reader import McapReader, make_reader
 from mcap.writer import Writer
 
 from shiplog import Channel, LogWriter, TrialLog
-from shiplog.mcap.schema import encode_messages, schema_for
+from shiplog.mcap.messages import descriptor_set, encode_messages
+from shiplog.mcap.schema import schema_for
 
 START = 1_700_000_000_000_000_000
 EXTREMES = [0.0, -0.0, 1.0, -1e308, 5e-324, float("inf"), float("-inf"), float("nan")]
@@ -86,7 +87,7 @@ def write_by_mcap(path: Path, *channels: Channel, **options: Any) -> Path:  # no
         messages = []
         for c in channels:
             schema = schema_for(c.fields)
-            schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+            schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
             channel_id = writer.register_channel(
                 c.topic, "protobuf", schema_id, {"unit": c.unit, **c.metadata}
             )
@@ -108,7 +109,7 @@ def write_messages(
         writer = Writer(stream)
         writer.start()
         schema = schema_for(())
-        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
         metadata = {} if unit is None else {"unit": unit}
         channel_id = writer.register_channel(topic, "protobuf", schema_id, metadata)
         for second, data in enumerate(messages):

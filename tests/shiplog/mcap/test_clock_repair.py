@@ -10,6 +10,7 @@ from mcap_files import scalar
 
 from shiplog import LogError
 from shiplog.checks.info import read_log_info
+from shiplog.mcap.messages import descriptor_set
 from shiplog.mcap.reader import read
 from shiplog.mcap.schema import schema_for
 from shiplog.mcap.writer import write
@@ -30,7 +31,7 @@ def record(path: Path, received: Clock = unchanged, measured: Clock = unchanged)
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=2000)
         writer.start()
-        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
         unit = {"yaw_rate": "rad/s", "rudder": "rad"}
         ids = {
             name: writer.register_channel(

@@ -19,6 +19,7 @@ from mcap_files import (
 
 import shiplog.mcap.decode
 from shiplog import LogError, read
+from shiplog.mcap.messages import descriptor_set
 from shiplog.mcap.schema import schema_for
 
 
@@ -59,7 +60,7 @@ def test_a_channel_described_among_the_messages_of_another_is_read(path: Path) -
         writer = Writer(stream)
         writer.start()
         schema = schema_for(())
-        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
         for topic in ("/a/x", "/b/x", "/c/x"):
             channel_id = writer.register_channel(topic, "protobuf", schema_id, {})
             for k in range(50):
@@ -73,7 +74,7 @@ def test_a_short_last_message_is_not_read_beyond_the_mcap_chunk(path: Path) -> N
         writer = Writer(stream)
         writer.start()
         schema = schema_for(())
-        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
         channel_id = writer.register_channel("/a/x", "protobuf", schema_id, {})
         for k, data in enumerate((scalar(1.0), scalar(2.0), b"")):
             writer.add_message(channel_id, k, data, k)

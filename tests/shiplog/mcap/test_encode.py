@@ -12,7 +12,8 @@ from mcap.writer import Writer
 import shiplog.mcap.encode
 from shiplog import Channel, LogWriter, TrialLog, write
 from shiplog.mcap.encode import SampleBatch, encode_mcap_chunks
-from shiplog.mcap.schema import encode_messages, schema_for
+from shiplog.mcap.messages import descriptor_set, encode_messages
+from shiplog.mcap.schema import schema_for
 from shiplog.mcap.writer import MAX_MCAP_CHUNK_BYTES
 from shiplog.units import GEOGRAPHIC
 
@@ -48,7 +49,7 @@ def test_messages_are_those_that_the_mcap_library_writes(seed: int) -> None:
     messages = []
     for number, c in enumerate(log, start=1):
         schema = schema_for(c.fields)
-        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
         assert writer.register_channel(c.topic, "protobuf", schema_id) == number
         rows = zip(c.received_ns.tolist(), c.measured_ns.tolist(), encode_messages(c), strict=True)
         messages += [(got, number, k, was, data) for k, (got, was, data) in enumerate(rows)]

@@ -35,6 +35,7 @@ from places import RECORDINGS
 import shiplog.mcap.decode
 import shiplog.mcap.decompress
 from shiplog import Channel, LogError, LogWriter, TrialLog, UsageError, read, write
+from shiplog.mcap.messages import descriptor_set
 from shiplog.mcap.schema import schema_for
 from shiplog.units import GEOGRAPHIC
 
@@ -110,7 +111,7 @@ def test_samples_are_in_the_order_of_reception(path: Path) -> None:
         writer = Writer(stream)
         writer.start()
         schema = schema_for(())
-        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
         channel_id = writer.register_channel("/speed/log", "protobuf", schema_id, {"unit": "m/s"})
         for k, at in enumerate(received.tolist()):
             writer.add_message(channel_id, at, scalar(k), k)
@@ -393,7 +394,7 @@ def test_messages_beyond_the_signed_range_of_times_are_dropped_and_counted(path:
         writer = Writer(stream)
         writer.start()
         schema = schema_for(())
-        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
         for topic, data in (("/a/b", scalar(1.0)), ("/c/d", b"")):
             channel_id = writer.register_channel(topic, "protobuf", schema_id)
             writer.add_message(channel_id, 2**64 - 1, data, 2**63)
@@ -634,7 +635,7 @@ def test_a_topic_described_twice_is_one_channel(tmp_path: Path) -> None:
         writer = Writer(stream)
         writer.start()
         scalar = schema_for(())
-        schema_id = writer.register_schema(scalar.name, "protobuf", scalar.descriptor_set)
+        schema_id = writer.register_schema(scalar.name, "protobuf", descriptor_set(scalar))
         for start in (0, 100):
             metadata = {"unit": "rad/s", "channel": "yaw_rate", "source": "gyro"}
             channel_id = writer.register_channel("/yaw_rate/gyro", "protobuf", schema_id, metadata)

@@ -6,7 +6,8 @@ import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 from shiplog import Channel
-from shiplog.mcap.schema import decode_messages, encode_messages, schema_for, schema_named
+from shiplog.mcap.messages import decode_messages, descriptor_set, encode_messages
+from shiplog.mcap.schema import schema_for, schema_named
 from shiplog.units import GEOGRAPHIC
 
 EXTREMES = [0.0, -0.0, 1.0, -1e308, 5e-324, float("inf"), float("-inf"), float("nan")]
@@ -34,7 +35,7 @@ def test_a_decoder_made_from_the_descriptors_reads_our_messages(fields: tuple[st
     rng = np.random.default_rng(0)
     values = rng.choice(EXTREMES, (50, len(fields)) if fields else 50)
     schema = schema_for(fields)
-    message_type = message_type_of(schema.descriptor_set, schema.name)
+    message_type = message_type_of(descriptor_set(schema), schema.name)
     messages = [message_type.FromString(data) for data in encode_messages(channel(values, fields))]
     read = [[getattr(m, f) for f in fields or ("value",)] for m in messages]
     assert bits(read) == bits(values)
@@ -43,7 +44,7 @@ def test_a_decoder_made_from_the_descriptors_reads_our_messages(fields: tuple[st
 @pytest.mark.parametrize("fields", [(), ("north", "east")])
 def test_we_read_messages_of_an_encoder_made_from_the_descriptors(fields: tuple[str, ...]) -> None:
     schema = schema_for(fields)
-    message_type = message_type_of(schema.descriptor_set, schema.name)
+    message_type = message_type_of(descriptor_set(schema), schema.name)
     rows = np.random.default_rng(1).choice(EXTREMES, (50, len(schema.fields)))
     data = [
         message_type(**dict(zip(schema.fields, row, strict=True))).SerializeToString()
@@ -86,7 +87,7 @@ def test_fields_are_read_in_any_order_and_unknown_ones_are_skipped() -> None:
 def test_a_location_fix_has_its_time_of_measurement() -> None:
     schema = schema_for(GEOGRAPHIC)
     fix = channel([[59.9, 30.2, 1.0]], GEOGRAPHIC)
-    message = message_type_of(schema.descriptor_set, schema.name).FromString(
+    message = message_type_of(descriptor_set(schema), schema.name).FromString(
         encode_messages(fix)[0]
     )
     assert message.timestamp.ToNanoseconds() == fix.measured_ns[0]

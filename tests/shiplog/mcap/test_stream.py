@@ -28,6 +28,7 @@ from mcap_files import (
 
 import shiplog.mcap.stream
 from shiplog import Channel, LogError, LogWriter, TrialLog, read, write
+from shiplog.mcap.messages import descriptor_set
 from shiplog.mcap.schema import schema_for
 from shiplog.mcap.stream import LogFile, open_log
 from shiplog.types import concatenate_channels
@@ -190,7 +191,7 @@ def test_a_topic_described_twice_is_one_channel_in_every_chunk(
         writer = Writer(stream, chunk_size=2000)
         writer.start()
         schema = schema_for(())
-        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
         metadata = {"unit": "rad/s"}
         first, second = (
             writer.register_channel(
@@ -216,7 +217,7 @@ def test_samples_are_sorted_within_a_chunk(path: Path) -> None:
         writer = Writer(stream)
         writer.start()
         schema = schema_for(())
-        schema_id = writer.register_schema(schema.name, "protobuf", schema.descriptor_set)
+        schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
         channel_id = writer.register_channel("/a/b", "protobuf", schema_id, {})
         for hundred in range(0, 1000, 100):
             for k in (hundred + rng.integers(0, 100, 100)).tolist():
