@@ -389,11 +389,12 @@ def test_another_source_can_be_chosen(recorded: Path, capsys: pytest.CaptureFixt
     write(TrialLog("x", (dead, *log), {}, log.vessel_toml), "x.mcap")
     assert main(["replay", "x.mcap"]) == OK
     warnings = capsys.readouterr().err
-    assert "speed: 2 sources (dead, simulated); dead is used" in warnings
-    assert "/speed/dead: constant throughout the log" in warnings
-    assert main(["replay", "x.mcap", "--source", "speed=simulated"]) == OK
+    assert "simulated is used (the others are constant or not measured)" in warnings
+    assert "dead is constant at 0 kn" in warnings
+    assert "/speed/dead: constant throughout the log" not in warnings
+    assert main(["replay", "x.mcap", "--source", "speed=dead"]) == OK
     warnings = capsys.readouterr().err
-    assert "constant throughout the log" not in warnings
+    assert "/speed/dead: constant throughout the log" in warnings
     assert "2 sources" not in warnings
     assert "no source 'doppler' of 'speed' in x.mcap; it has dead, simulated" in refusal(
         capsys, FAILURE, "replay", "x.mcap", "--source", "speed=doppler"

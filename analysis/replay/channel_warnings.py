@@ -1,4 +1,4 @@
-"""Warnings about sensors that seem dead, channels that start late, and sources to choose from."""
+"""Warnings about sensors that seem dead, and about channels that start late or end early."""
 
 from collections.abc import Iterator
 
@@ -12,28 +12,19 @@ MIN_TURN_RATE = np.radians(0.1)  # rad/s, range of the yaw rate beyond which the
 MIN_WAY = 1.0  # m/s, median speed beyond which the ship makes way
 
 
-def channel_warnings(log_stats: LogStats, names: tuple[str, ...]) -> Iterator[str]:
-    """Warn of channels with several sources, of sensors that seem dead, and of going astern.
+def channel_warnings(log_stats: LogStats) -> Iterator[str]:
+    """Warn of sensors that seem dead, and of going astern.
 
     Parameters
     ----------
     log_stats
         Statistics of the log's channels.
-    names
-        The channels that a replay uses.
 
     Yields
     ------
     str
         A warning, in a sentence.
     """
-    for name in names:
-        sources = [channel.source for channel in log_stats if channel.name == name]
-        if len(sources) > 1:
-            yield (
-                f"{name}: {len(sources)} sources ({', '.join(sources)}); {sources[0]} is used, "
-                f"--source {name}={sources[1]} selects another"
-            )
     yield from _dead_sensor_warnings(log_stats)
     for name in ("speed", "rpm"):
         share = log_stats[name].negative_share

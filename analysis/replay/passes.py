@@ -156,7 +156,7 @@ def second_pass(
     if strict:
         refuse_contradictions(findings)
     warnings = [
-        *channel_warnings(log_stats, REQUIRED_CHANNELS),
+        *channel_warnings(log_stats),
         *(finding.text for finding in findings),
         *end_warnings(log_stats, clock, REQUIRED_CHANNELS),
         *hold.warnings(),

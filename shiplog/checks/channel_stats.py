@@ -3,7 +3,7 @@
 `shiplog.checks.log_stats` computes them.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -176,6 +176,15 @@ class LogStats(ChannelsByName[ChannelStats]):
 
     name: str
     channels: tuple[ChannelStats, ...]
+
+    def select_sources(self, sources: Mapping[str, str]) -> "LogStats":
+        """Return the statistics with a single source for each of the names given."""
+        selected = tuple(
+            channel
+            for channel in self.channels
+            if sources.get(channel.name, channel.source) == channel.source
+        )
+        return replace(self, channels=selected)
 
     @property
     def span_ns(self) -> tuple[int, int]:

@@ -9,6 +9,7 @@ from shiplog.errors import LogError
 from shiplog.types import Log
 
 from .screened_log import ScreenedLog, Screening
+from .sources import choose_sources
 
 
 def screen_log(
@@ -30,7 +31,8 @@ def screen_log(
     purpose
         What needs them, for messages, such as ``a replay``.
     sources
-        The source to use, by the name of a quantity that has several.
+        The source to use, by the name of a quantity that has several. By default it is chosen
+        by comparing them.
 
     Raises
     ------
@@ -46,10 +48,14 @@ def screen_log(
     ()
     """
     chosen = dict(sources or {})
-    stats = compute_log_stats(log.select_sources(chosen), strict=True)
+    selected = log.select_sources(chosen) if chosen else log
+    stats = compute_log_stats(selected, strict=True)
     _require_channels(stats, required, purpose)
     present = tuple(name for name in optional if name in stats)
-    warnings = data_warnings(stats, (*required, *present))
+    found, source_warnings = choose_sources(selected, stats, (*required, *present), chosen)
+    chosen |= found
+    stats = stats.select_sources(chosen)
+    warnings = [*source_warnings, *data_warnings(stats, (*required, *present))]
     return ScreenedLog(log, Screening(stats, chosen, tuple(warnings)))
 
 

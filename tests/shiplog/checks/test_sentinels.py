@@ -99,7 +99,7 @@ def test_sentinels_are_counted_and_not_used_however_the_log_is_cut() -> None:
     (stats,) = compute_log_stats(TrialLog("x", (channel,)), strict=True)
     assert stats.sentinels == ((np.radians(511.0), 200),)
     assert (stats.valid, stats.missing) == (400, 0)
-    assert np.isnan(stats.clean(channel).values[::3]).all()
+    assert np.isnan(stats.screened(channel).values[::3]).all()
     assert stats.value_range[1] < 2 * np.pi
 
 
