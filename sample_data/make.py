@@ -4,13 +4,16 @@ The files stay the same to the last bit unless the simulation changes. After a c
 look at the replays, then run `shiplog check sample_data --update`.
 """
 
-from math import radians
+from math import cos, radians
 from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
 
 from recorders.record import record
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
-from shiplog import load_vessel, write
+from shiplog import load_vessel, read, write
 from shiplog.vessel.presets import PRESETS
 
 HERE = Path(__file__).parent
@@ -54,8 +57,44 @@ def main() -> None:
         record(trial, HERE / f"{name}.mcap")
         write(trial.truth(TRUTH_HZ), HERE / f"{name}.truth.mcap")
         print(name)
+    write_bridge_table(HERE / "bridge.csv")
     for preset, vessel_text in PRESETS.items():
         (HERE / "vessels" / f"{preset}.toml").write_text(vessel_text, encoding="utf-8")
+
+
+def write_bridge_table(path: Path) -> None:
+    """Write a simulated zig-zag as a bridge's data logger prints it, at 2 Hz."""
+    vessel, _ = load_vessel("table1")
+    trial = simulate(vessel, "zigzag-20-20", duration_secs=600.0, seed=5)
+    with TemporaryDirectory() as folder:
+        record(trial, Path(folder) / "bridge.mcap")
+        frame = read(Path(folder) / "bridge.mcap").to_pandas(0.5, display_units=True)
+    frame = frame.interpolate(limit_direction="both")
+    frame["heading [deg]"] += np.random.default_rng(5).normal(0, 0.1, len(frame))  # of the compass
+    lines = ["Date,Time,HDT [deg],ROT [deg/min],STW [kn],Rudder [deg],RPM,Lat,Lon"]
+    for instant, row in frame.iterrows():
+        north, east = row["position_north [m]"], row["position_east [m]"]
+        latitude = 59.5 + north / 111_412
+        longitude = 24.25 + east / (111_412 * cos(radians(59.5)))
+        cells = (
+            f"{instant:%d.%m.%Y}",
+            f"{instant:%H:%M:%S}.{instant.microsecond // 100_000}",
+            f"{row['heading [deg]'] % 360:.1f}",
+            f"{row['yaw_rate [deg/s]'] * 60:.1f}",
+            f"{row['speed [kn]']:.2f}",
+            f"{row['rudder [deg]']:.1f}",
+            f"{row['rpm [rpm]']:.1f}",
+            f"{_degrees_minutes(latitude, 2)}N",
+            f"{_degrees_minutes(longitude, 3)}E",
+        )
+        lines.append(",".join(cells))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _degrees_minutes(angle_deg: float, digits: int) -> str:
+    """Return an angle as ddmm.mmmm, with `digits` digits of degrees."""
+    degrees, minutes = divmod(round(angle_deg * 60, 4), 60)
+    return f"{int(degrees):0{digits}d}{minutes:07.4f}"
 
 
 if __name__ == "__main__":

@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from layout_texts import MINIMAL, layout
-from places import KVLCC2, LAYOUTS
+from places import KVLCC2, LAYOUTS, SAMPLE_DATA
 from scipy.signal import savgol_filter
 
+from recorders.simulated.simulate import simulate
+from shiplog import load_vessel
 from shiplog.checks.info import read_log_info
 from shiplog.errors import LayoutError
 from shiplog.mcap.reader import read
@@ -332,6 +334,25 @@ def test_a_short_heading_is_rebuilt_too(count: int) -> None:
         0.01 * time_secs,
         atol=1e-9,
     )
+
+
+# ---- the table of the sample data
+
+
+def test_the_bridges_table_agrees_with_its_simulated_trial() -> None:
+    log = read_table(SAMPLE_DATA / "bridge.csv", load_layout(LAYOUTS / "bridge.toml"))
+    truth = simulate(load_vessel("table1")[0], "zigzag-20-20", duration_secs=600.0, seed=5).truth(2)
+    start_ns = int(truth["yaw_rate"].measured_ns[0])
+    assert log["yaw_rate"].measured_ns[0] == pytest.approx(start_ns, abs=5 * 10**8)
+    for name, tolerance in {"yaw_rate": 1e-3, "heading": 0.01, "rudder": 0.02, "rpm": 1}.items():
+        channel, exact = log[name], truth[name]
+        values = np.interp(channel.measured_ns, exact.measured_ns, exact.values)
+        error = channel.values - values
+        if name == "heading":
+            error = (error + np.pi) % (2 * np.pi) - np.pi
+        assert np.sqrt(np.mean(error**2)) < tolerance, name
+    assert log["position"].fields[:2] == ("latitude", "longitude")
+    assert log.warnings == ()
 
 
 # ---- the real data
