@@ -1,4 +1,4 @@
-"""The verbs of the core: info, convert."""
+"""The verbs of the core: info, convert, layout."""
 
 import argparse
 import sys
@@ -129,4 +129,34 @@ CONVERT = Verb(
         "shiplog convert day.mcap zigzag.mcap --from 12:04:30 --to 12:21   (a part of it)",
         "shiplog convert trial.mcap.part trial.mcap   (a recording that was cut short)",
     ),
+)
+
+
+def _configure_layout(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("table", metavar="TABLE", type=Path, help="a foreign table with a header")
+    parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="layout file to write")
+
+
+def _layout(arguments: argparse.Namespace) -> ExitCode:
+    from shiplog.files import atomic_write
+    from shiplog.tables.draft import draft_layout
+
+    require_outputs(arguments.output)
+    require_distinct([arguments.output], [arguments.table])
+    draft = draft_layout(arguments.table)
+    if arguments.output is None:
+        print(draft.text, end="")
+    else:
+        with atomic_write(arguments.output) as part:
+            part.write_text(draft.text, encoding="utf-8")
+    for remark in draft.remarks:
+        print(f"{arguments.table.name}: {remark}", file=sys.stderr)
+    return ExitCode.OK
+
+
+LAYOUT = Verb(
+    "draft the layout of a foreign table from its header and values",
+    _configure_layout,
+    _layout,
+    ("shiplog layout run.csv -o run.toml", "shiplog convert run.csv run.mcap --layout run.toml"),
 )
