@@ -1,5 +1,8 @@
 """The time of each piece of work and of the whole replay, as a ratio to a peer in the same run.
 
+The theme `distortions` is not of times: it replays one trial distorted in 200 ways and counts the
+wrong results that are not reported.
+
 Each line times shiplog and a straightforward peer in turn, several rounds, and reports the median
 of the ratios: times differ between machines and moments, ratios within one run hardly do. Before,
 it is verified that both compute the same. A peer that would take hours is timed on the first
@@ -16,6 +19,7 @@ from pathlib import Path
 
 from . import files, filters, ranking, replays, start_up, windows
 from .bench import Bench
+from .distortion_matrix import measure_distortions
 from .logs import day_of_trial, write_repeated
 from .measure import Comparison, ComparisonResult, compare_with_peer, machine
 from .report import BenchmarkReport, print_report, report_as_markdown
@@ -23,6 +27,7 @@ from .stages import our_stages
 
 THEMES = (
     "files", "filter", "windows", "info", "start-up", "replay", "ranking", "stages", "growth",
+    "distortions",
 )  # fmt: skip
 MIN_JUDGED_HOURS = 24.0  # in shorter logs fixed costs count too much for the limits
 EPILOG = """\
@@ -101,12 +106,16 @@ def _sizes(arguments: argparse.Namespace) -> Sizes:
 
 def _measure(arguments: argparse.Namespace, folder: Path) -> BenchmarkReport:
     sizes = _sizes(arguments)
+    report = BenchmarkReport(machine(), sizes.hours, sizes.rounds, [])
+    if "distortions" in arguments.only:
+        report.distortions = measure_distortions(*((20, 2) if arguments.short else ()))
+    if set(arguments.only) == {"distortions"}:
+        return report
     log = day_of_trial(sizes.hours)
     path = write_repeated(log, sizes.hours, folder / "day.mcap")
     log_secs = 3600 * sizes.hours
     peer_secs = log_secs if arguments.full_peer else min(60 * sizes.peer_minutes, log_secs)
     bench = Bench(log, path, folder, peer_secs, sizes.info_hours, arguments.short)
-    report = BenchmarkReport(machine(), sizes.hours, sizes.rounds, [])
     judged = sizes.hours >= MIN_JUDGED_HOURS
     for theme, lines in _themes(bench, report).items():
         if theme not in arguments.only:

@@ -8,6 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from .distortion_matrix import OUTCOMES, SILENT, MatrixResults
 from .measure import ComparisonResult
 from .replays import MAX_GROWTH_EXPONENT, MAX_MEMORY_BYTES, Growth, ReplayCost
 
@@ -32,6 +33,8 @@ class BenchmarkReport:
         Seconds that a replay spends in each stage.
     growth
         How the cost of a replay grows; None if not measured.
+    distortions
+        Replays of distorted logs; None if not measured.
     """
 
     machine: dict[str, str]
@@ -41,6 +44,7 @@ class BenchmarkReport:
     our_stages: dict[str, float] = field(default_factory=dict)
     peer_stages: dict[str, float] = field(default_factory=dict)
     growth: Growth | None = None
+    distortions: MatrixResults | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Return the report as plain values for JSON."""
@@ -94,6 +98,8 @@ def _grids(report: BenchmarkReport) -> list[_Grid]:
         grids.append(_stage_grid(report))
     if report.growth is not None:
         grids.append(_growth_grid(report.growth))
+    if report.distortions is not None:
+        grids.append(_distortion_grid(report.distortions))
     grids.append(_Grid("Measured on", ("item", "value"), list(report.machine.items())))
     return grids
 
@@ -174,3 +180,15 @@ def _figure(value: float | None) -> str:
     if value is None:
         return ""
     return f"{value:,.0f}" if value >= 1000 else f"{value:.3g}"
+
+
+def _distortion_grid(results: MatrixResults) -> _Grid:
+    rows = [(family, *map(str, counts)) for family, counts in results.counts.items()]
+    silent, alarms = results.counts["total"][OUTCOMES.index(SILENT)], results.false_alarms
+    summary = (
+        f"{silent} silent wrong results; {len(alarms)} warnings of {results.trials} undistorted "
+        "trials."
+    )
+    remarks = (summary, *results.failures, *alarms)
+    title = f"A trial distorted in {sum(results.counts['total'])} ways"
+    return _Grid(title, ("distortion", *OUTCOMES), rows, remarks)
