@@ -18,6 +18,7 @@ from .clock_steps import (
     is_steady,
     pause_rows,
     sampling_interval,
+    steps_back,
 )
 
 MAX_DISTANCE_NS = 365 * 86_400 * 10**9  # of a time from the median of the log
@@ -122,8 +123,30 @@ def repair_clock_steps(
     for id_, channel in channels.items():
         channels[id_], warning = _repair_measured(channel)
         warnings += warning
-    warnings += _pause_warnings(list(channels.values()))
     return channels, change, warnings
+
+
+def pause_warnings(channels: Collection[MessageColumns]) -> list[str]:
+    """Report gaps in all channels at once: a pause of the recorder, or its clock set forward.
+
+    Parameters
+    ----------
+    channels
+        The messages with repaired times.
+    """
+    times = [ChannelTimes(c.topic, c.positions, c.received_ns) for c in channels]
+    times = [channel for channel in times if is_steady(channel)]
+    rows = [pause_rows(channel.times_ns) for channel in times]
+    if len(times) < 2 or not all(rows):
+        return []
+    return [
+        f"times: all channels have no samples for {step.size_ns / _SECOND_NS:.1f} s, "
+        f"{(step.before_ns - int(min(c.times_ns[0] for c in times))) / _SECOND_NS:.1f} s after the "
+        "start; the recorder paused, or its clock was set forward: times were not changed; if the "
+        "clock was set, evaluate the parts before and after separately"
+        for step in common_steps(times, rows)
+        if len(step.names) == len(times)
+    ]
 
 
 def _possible_rows(
@@ -181,7 +204,7 @@ def _received_steps(file: str, channels: Collection[MessageColumns]) -> list[Clo
     times = [
         ChannelTimes(c.topic, c.positions, c.received_ns) for c in channels if len(c.positions)
     ]
-    steps = common_steps(times, [backward_rows(c.times_ns) for c in times])
+    steps = steps_back(times)
     for step in steps:
         if step.steady_names:
             start = min(int(c.times_ns[0]) for c in times)
@@ -250,23 +273,6 @@ def _repair_measured(channel: MessageColumns) -> tuple[MessageColumns, list[str]
             "the sensor's clock"
         )
     return replace(channel, measured_ns=measured), warnings
-
-
-def _pause_warnings(channels: Sequence[MessageColumns]) -> list[str]:
-    """Report gaps in all channels at once: a pause of the recorder, or its clock set forward."""
-    times = [ChannelTimes(c.topic, c.positions, c.received_ns) for c in channels]
-    times = [channel for channel in times if is_steady(channel)]
-    rows = [pause_rows(channel.times_ns) for channel in times]
-    if len(times) < 2 or not all(rows):
-        return []
-    return [
-        f"times: all channels have no samples for {step.size_ns / _SECOND_NS:.1f} s, "
-        f"{(step.before_ns - int(min(c.times_ns[0] for c in times))) / _SECOND_NS:.1f} s after the "
-        "start; the recorder paused, or its clock was set forward: times were not changed; if the "
-        "clock was set, evaluate the parts before and after separately"
-        for step in common_steps(times, rows)
-        if len(step.names) == len(times)
-    ]
 
 
 def _date(time_ns: int) -> str:

@@ -1,6 +1,6 @@
 """Steps of a recorder's clock: detection in the order of a file, before samples are sorted."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,8 @@ from shiplog.types import TimeArray
 
 LEVEL_SAMPLES = 8  # on each side of a step, for its size; longer bursts are not jitter
 MIN_PAUSE_INTERVALS = 8.0  # of a gap in all channels that may be a step forward
+MIN_SAMPLES_BESIDE_STEP = 3  # of a channel on each side; fewer do not show a step
+MIN_GAP_INTERVALS = 3.0  # in sorted times, by which a clock set back differs from another order
 MAX_DEVIATION_INTERVALS = 0.75  # of a smaller change of level, jitter is the cause
 MAX_INTERVAL_SPREAD = 0.5  # relative to the interval, of a channel sampled at a steady rate
 
@@ -130,16 +132,61 @@ def backward_rows(times_ns: TimeArray) -> list[int]:
     >>> backward_rows(np.concatenate([clock[:10], clock[20:], clock[10:20]]))
     []
     """
-    interval, spread = sampling_interval(times_ns)
-    if interval == 0.0:
+    rows, interval = _candidate_rows(times_ns)
+    return _rows_with_repeated_times(times_ns, rows, interval)
+
+
+def earlier_rows(times_ns: TimeArray) -> list[int]:
+    """Return the rows after which all times are earlier than before, with a gap between them.
+
+    So is a clock that was set back by more than it had run; parts of a log in another order
+    have no gap between them when they are sorted, except where samples are missing.
+
+    Parameters
+    ----------
+    times_ns
+        (n,) times in the order of the file.
+
+    Examples
+    --------
+    >>> clock = 10 * np.arange(40)
+    >>> earlier_rows(np.where(clock < 200, clock, clock - 4000))
+    [20]
+    >>> earlier_rows(np.concatenate([clock[20:], clock[:20]]))
+    []
+    """
+    rows, interval = _candidate_rows(times_ns)
+    if not rows:
         return []
-    limit = max(MAX_DEVIATION_INTERVALS * interval, 4.0 * spread)
-    rows = np.flatnonzero(np.diff(times_ns) < 0) + 1
-    if len(rows) > len(times_ns) // LEVEL_SAMPLES:
-        return []  # network jitter or parallel writers, all over the log
-    levels = {int(row): change_of_level(times_ns, int(row), interval) for row in rows}
-    candidates = _separate_rows({row: level for row, level in levels.items() if level < -limit})
-    return _rows_with_repeated_times(times_ns, candidates, interval)
+    _, spread = sampling_interval(times_ns)
+    limit = max(MIN_GAP_INTERVALS * interval, 8.0 * spread)
+    ordered = np.sort(times_ns)
+    found = []
+    for row, before, after in _parts_at(times_ns, rows):
+        last = int(after.max())
+        following = int(np.searchsorted(ordered, last, "right"))
+        if last < before.min() and ordered[following] - last > limit:
+            found.append(row)
+    return found
+
+
+def steps_back(channels: Sequence[ChannelTimes]) -> list[ClockStep]:
+    """Return the steps back of the clock that the channels have in common.
+
+    Where the times before and after a step do not overlap, it must be in all channels of steady
+    rate: else a part of the file is in another order, and samples are missing.
+
+    Parameters
+    ----------
+    channels
+        The channels, with their times in the order of the file.
+    """
+    repeated = [backward_rows(c.times_ns) for c in channels]
+    earlier = [earlier_rows(c.times_ns) for c in channels]
+    steps = common_steps(
+        channels, [sorted({*a, *b}) for a, b in zip(repeated, earlier, strict=True)]
+    )
+    return [step for step in steps if _is_confirmed(step, channels, repeated)]
 
 
 def common_steps(channels: Sequence[ChannelTimes], rows: Sequence[list[int]]) -> list[ClockStep]:
@@ -218,6 +265,46 @@ def continued_times(channel: ChannelTimes, steps: Sequence[ClockStep]) -> TimeAr
     return times
 
 
+def _candidate_rows(times: TimeArray) -> tuple[list[int], float]:
+    """Return the rows at which the level of the times falls, and the sampling interval."""
+    interval, spread = sampling_interval(times)
+    if interval == 0.0:
+        return [], 0.0
+    limit = max(MAX_DEVIATION_INTERVALS * interval, 4.0 * spread)
+    rows = np.flatnonzero(np.diff(times) < 0) + 1
+    if len(rows) > len(times) // LEVEL_SAMPLES:
+        return [], interval  # network jitter or parallel writers, all over the log
+    rows = rows[np.minimum(rows, len(times) - rows) >= MIN_SAMPLES_BESIDE_STEP]
+    levels = {int(row): change_of_level(times, int(row), interval) for row in rows}
+    return _separate_rows({row: level for row, level in levels.items() if level < -limit}), interval
+
+
+def _parts_at(times: TimeArray, rows: list[int]) -> Iterator[tuple[int, TimeArray, TimeArray]]:
+    """Yield each row with the times from the row before it, and up to the row after it."""
+    ends = [0, *rows, len(times)]
+    for number, row in enumerate(rows):
+        yield row, times[ends[number] : row], times[row : ends[number + 2]]
+
+
+def _is_confirmed(
+    step: ClockStep, channels: Sequence[ChannelTimes], repeated: Sequence[list[int]]
+) -> bool:
+    """Whether times repeat after a step, or all channels of steady rate have it."""
+    for channel, rows in zip(channels, repeated, strict=True):
+        if int(np.searchsorted(channel.positions, step.position)) in rows:
+            return True
+    return not any(
+        is_steady(channel) and _has_both_sides(channel, step.position)
+        for channel in channels
+        if channel.name not in (*step.names, *step.steady_names)
+    )
+
+
+def _has_both_sides(channel: ChannelTimes, position: int) -> bool:
+    row = int(np.searchsorted(channel.positions, position))
+    return min(row, len(channel.times_ns) - row) >= MIN_SAMPLES_BESIDE_STEP
+
+
 def _separate_rows(levels: dict[int, float]) -> list[int]:
     """Return of rows close to each other the one with the greatest step."""
     rows: list[int] = []
@@ -235,7 +322,10 @@ def _rows_with_repeated_times(times: TimeArray, rows: list[int], interval: float
     if not rows:
         return []
     ordered = np.sort(times)
-    spans = [(int(times[row]), int(times[row - 1])) for row in rows]
+    spans = [
+        (max(int(times[row]), int(before.min())), min(int(times[row - 1]), int(after.max())))
+        for row, before, after in _parts_at(times, rows)
+    ]
     outside = np.ones(len(ordered) - 1, bool)
     for first, last in spans:
         outside &= (ordered[1:] <= first) | (ordered[:-1] >= last)
@@ -248,7 +338,9 @@ def _rows_with_repeated_times(times: TimeArray, rows: list[int], interval: float
     for row, (first, last) in zip(rows, spans, strict=True):
         count = np.searchsorted(ordered, last, "right") - np.searchsorted(ordered, first)
         expected = (last - first) / interval + 1
-        if count - expected > 0.4 * expected or last - first < 3 * interval:
+        if times[row - 1] - times[row] < 3 * interval or (
+            last - first >= 3 * interval and count - expected > 0.4 * expected
+        ):
             repeated.append(row)
     return repeated
 

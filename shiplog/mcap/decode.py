@@ -125,6 +125,8 @@ class McapContents:
         The sum of the steps of the recorder's clock in the samples drained so far, ns.
     clock_warnings
         Warnings about times of messages in the samples drained so far.
+    pause_warnings
+        Warnings about gaps in all channels in the samples drained so far.
     """
 
     schemas: dict[int, records.Schema] = field(default_factory=dict)
@@ -147,6 +149,7 @@ class McapContents:
     data_blocks: int = 0
     clock_change_ns: int = 0
     clock_warnings: list[str] = field(default_factory=list)
+    pause_warnings: list[str] = field(default_factory=list)
 
     def drain(self) -> dict[int, list[SampleBlock]]:
         """Return the blocks collected so far, by channel id, and release them."""

@@ -17,7 +17,7 @@ from shiplog.types import (
 )
 from shiplog.units import CATALOGUE, conversion_factor
 
-from .clock_repair import MessageColumns, drop_impossible_times, repair_clock_steps
+from .clock_repair import MessageColumns, drop_impossible_times, pause_warnings, repair_clock_steps
 from .decode import McapContents, SampleBlock, schema_of
 from .schema import FORMAT_VERSION, Schema
 
@@ -96,6 +96,7 @@ def _with_repaired_times(
     columns, dropped = drop_impossible_times(columns)
     columns, change_ns, steps = repair_clock_steps(path.name, columns)
     contents.clock_warnings += dropped + steps
+    contents.pause_warnings += pause_warnings(columns.values())
     before = contents.clock_change_ns  # steps in samples drained before
     contents.clock_change_ns += change_ns
     return {
@@ -107,7 +108,8 @@ def _with_repaired_times(
 
 
 def _warnings(contents: McapContents) -> list[str]:
-    warnings = [*contents.damage, *contents.clock_warnings]
+    pauses = [] if contents.damage else contents.pause_warnings  # else of the lost samples
+    warnings = [*contents.damage, *contents.clock_warnings, *pauses]
     if not contents.finished:
         warnings.append(
             "the file was not finished (the recorder was stopped or killed); "

@@ -8,7 +8,9 @@ from shiplog.mcap.clock_steps import (
     backward_rows,
     common_steps,
     continued_times,
+    earlier_rows,
     pause_rows,
+    steps_back,
 )
 
 SECOND = 1_000_000_000
@@ -39,10 +41,6 @@ def with_step(channel: ChannelTimes, at_secs: float, size_secs: float) -> Channe
     return ChannelTimes(channel.name, channel.positions, channel.times_ns + change)
 
 
-def steps_back(channels: list[ChannelTimes]) -> list:
-    return common_steps(channels, [backward_rows(c.times_ns) for c in channels])
-
-
 @pytest.mark.parametrize("seed", range(50))
 def test_undisturbed_clocks_have_no_steps(seed: int) -> None:
     channels = steady_channels(seed)
@@ -52,7 +50,7 @@ def test_undisturbed_clocks_have_no_steps(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(30))
-@pytest.mark.parametrize("size", [-3.3, -5.25, -47.0])
+@pytest.mark.parametrize("size", [-3.3, -5.25, -47.0, -180.0, -280.0, -400.0, -3600.0, -1e8])
 def test_a_clock_set_back_in_all_channels_is_repaired(seed: int, size: float) -> None:
     channels = steady_channels(seed)
     at = np.random.default_rng(seed).uniform(200, 250)
@@ -94,10 +92,40 @@ def test_data_in_another_order_are_no_steps(seed: int) -> None:
     times = steady_channels(seed)[0].times_ns
     parts = np.array_split(times, 12)
     order = np.random.default_rng(seed).permutation(12)
-    assert backward_rows(np.concatenate([parts[i] for i in order])) == []
+    disordered = np.concatenate([parts[i] for i in order])
+    assert backward_rows(disordered) == []
+    assert earlier_rows(disordered) == []
 
 
 def test_parallel_writers_of_alternate_samples_are_no_steps() -> None:
     times = np.arange(1000) * SECOND // 10
     parts = [part for block in np.split(times, 10) for part in (block[::2], block[1::2])]
     assert backward_rows(np.concatenate(parts)) == []
+
+
+def test_a_short_log_set_back_near_its_end_is_repaired() -> None:
+    times = np.concatenate([np.arange(20), np.arange(20, 24) - 7]) * SECOND
+    assert backward_rows(times) == [20]
+
+
+def test_a_late_last_message_is_no_step() -> None:
+    times = np.arange(40) * SECOND
+    times[-1] -= 5 * SECOND // 2
+    assert backward_rows(times) == []
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_parts_of_all_channels_in_another_order_with_lost_samples_are_no_steps(seed: int) -> None:
+    channels = steady_channels(seed)
+    half = max(int(c.positions.max()) for c in channels) // 2
+    swapped = []
+    for channel in channels:
+        late = channel.positions > half
+        order = np.concatenate([np.flatnonzero(late), np.flatnonzero(~late)])
+        positions = np.where(late, channel.positions - half - 1, channel.positions + half + 2)
+        swapped.append(ChannelTimes(channel.name, positions[order], channel.times_ns[order]))
+    lost = swapped[0].times_ns[-1] - 20 * SECOND
+    kept = swapped[0].times_ns > swapped[0].times_ns[0] - SECOND
+    kept |= swapped[0].times_ns < lost
+    swapped[0] = ChannelTimes("yaw_rate", swapped[0].positions[kept], swapped[0].times_ns[kept])
+    assert steps_back(swapped) == []
