@@ -139,7 +139,7 @@ def second_pass(
     )
     consistency = ConsistencyCheck(log_stats)
     hold, collector = InputHold(clock), SignalStatsCollector(alphas)
-    expected = [clock.channels[name].valid_interval_secs / clock.dt_secs for name in PAPER_OUTPUTS]
+    expected = [clock.channels[name].interval_secs / clock.dt_secs for name in PAPER_OUTPUTS]
     intervals = np.maximum(np.round(expected), 1.0)
     equations = _Equations(alphas, clock, intervals, window_secs)
     listeners = hold.add_raw, consistency.add

@@ -12,6 +12,7 @@ from shiplog.types import Channel, ChannelsByName
 from shiplog.units import CATALOGUE
 
 from .fixes import FixScreening
+from .on_change import HoldStats
 from .stuck import StuckStats
 
 GAP_PERIODS = 5.0  # an interval longer than this many typical ones is a gap,
@@ -53,16 +54,18 @@ class ChannelStats:
     span_ns
         First and last instant of measurement; (0, 0) without samples.
     interval_secs
-        Median interval between samples, in s; 0 where there is none.
+        Median interval between valid samples, in s; 0 where there is none.
+    row_interval_secs
+        Median interval between samples, valid or not, in s: shorter where a table has empty cells.
     gaps
-        Start, in s since the channel's start, and length, in s, of each gap.
+        Start, in s since the channel's start, and length, in s, of each gap between valid samples.
     irregular_share
         Share of the intervals, gaps excluded, that differ by more than half of `interval_secs`
         from it.
     interval_range_secs
         Percentiles 1 and 99 of the intervals, gaps excluded, in s.
     duplicate_times
-        Number of samples with the same time as the one before.
+        Number of valid samples with the same time as the one before.
     backward_steps
         Samples whose measured time lies before that of the previous sample; `extent` is the
         first such step in s.
@@ -89,8 +92,6 @@ class ChannelStats:
         Number of valid samples.
     valid_span_ns
         First and last instant of a valid sample; (0, 0) without any.
-    valid_interval_secs
-        Median interval between valid samples, in s.
     value_range
         Smallest and largest valid value; (inf, -inf) without any, and for channels with `fields`.
     median
@@ -99,6 +100,10 @@ class ChannelStats:
         Share of the valid values below zero.
     strict
         Whether impossible values count as not measured.
+    interpolation
+        What the channel's metadata states: `hold`, `linear`, or empty for nothing.
+    hold
+        Figures of a channel that is held between its samples; None for one that is not.
     fixes
         Of positions, which fixes are used, whether `strict` or not; None for other channels.
     """
@@ -110,6 +115,7 @@ class ChannelStats:
     samples: int
     span_ns: tuple[int, int]
     interval_secs: float
+    row_interval_secs: float
     gaps: tuple[tuple[float, float], ...]
     irregular_share: float
     interval_range_secs: tuple[float, float]
@@ -126,11 +132,12 @@ class ChannelStats:
     stuck: StuckStats | None
     valid: int
     valid_span_ns: tuple[int, int]
-    valid_interval_secs: float
     value_range: tuple[float, float]
     median: float
     negative_share: float
     strict: bool = False
+    interpolation: str = ""
+    hold: HoldStats | None = None
     fixes: FixScreening | None = None
 
     @property
@@ -140,8 +147,8 @@ class ChannelStats:
 
     @property
     def gap_threshold_secs(self) -> float:
-        """Longest interval between two samples, in s, that is not a gap of this channel."""
-        return gap_threshold_secs(self.interval_secs)
+        """Longest interval between two valid samples, in s, that is not a gap of this channel."""
+        return np.inf if self.hold else gap_threshold_secs(self.interval_secs)
 
     def select(self, chunk: tuple[Channel, ...]) -> Channel | None:
         """Return this channel's samples in a chunk of the log; None where it has none.

@@ -23,6 +23,7 @@ from .channel_stats import (
     without_unusable,
 )
 from .fixes import FixScreen
+from .on_change import HoldStats, is_order, is_written_on_change, stated_interpolation
 from .quantiles import Quantiles
 from .sentinels import MAX_WRAPPED, sentinel_values, unwrapped_limit
 from .stuck import StuckCheck
@@ -108,7 +109,9 @@ class _ChannelStatsCollector:
         self._worst_excess = 0.0  # of an impossible value over its limit
         self._long_intervals = [np.zeros((0, 2), np.int64)]  # rows of start and length, ns
         self._intervals, self._values = Quantiles(), Quantiles()
-        self._valid_intervals = self._intervals  # one object until the first invalid sample
+        self._row_intervals = self._intervals  # one object until the first invalid sample
+        self._changes = Quantiles() if kind is not None and kind.commanded else None
+        self._last_value = np.nan
 
     @property
     def name(self) -> str:
@@ -135,12 +138,13 @@ class _ChannelStatsCollector:
             self._fixes.add(channel)
             rows = _without_altitude(channel)
         valid = self._usable(channel, rows)
-        if not valid.all() and self._valid_intervals is self._intervals:
-            self._valid_intervals = deepcopy(self._intervals)
+        if not valid.all() and self._row_intervals is self._intervals:
+            self._row_intervals = deepcopy(self._intervals)
         self._add_times(channel, valid)
         self._add_values(channel, rows, valid)
         if self._stuck:
-            self._stuck.add((channel.measured_ns - self._start) * 1e-9, rows)
+            secs = (channel.measured_ns - self._start) * 1e-9
+            self._stuck.add(*((secs, rows) if valid.all() else (secs[valid], rows[valid])))
         self._samples += len(channel)
 
     def _usable(self, channel: Channel, rows: FloatArray) -> Mask:
@@ -159,22 +163,38 @@ class _ChannelStatsCollector:
             self._backward_steps = self._with_more(
                 self._backward_steps, len(backward), with_last[backward[0]], first_step
             )
-            with_last = np.sort(with_last)
-            steps = np.diff(with_last)
-        self._duplicates += int(np.count_nonzero(steps == 0))
-        self._intervals.add(steps[steps > 0].astype(float))
-        long = np.flatnonzero(steps > GAP_SECS * 1e9)
-        self._long_intervals.append(np.column_stack((with_last[long], steps[long])))
-        self._add_delays(channel)
-        if self._valid_intervals is not self._intervals:
-            with_last = np.concatenate(([self._last_valid] * (self._valid > 0), times[valid]))
+        if self._row_intervals is not self._intervals:
             steps = np.diff(np.sort(with_last))
-            self._valid_intervals.add(steps[steps > 0].astype(float))
+            self._row_intervals.add(steps[steps > 0].astype(float))
+        self._add_intervals(channel, valid)
+        self._add_delays(channel)
         self._span = _extended_span(self._span, times)
         self._valid_span = _extended_span(self._valid_span, times[valid])
         self._last = int(times[-1])
         if valid.any():
             self._last_valid = int(times[valid][-1])
+
+    def _add_intervals(self, channel: Channel, valid: Mask) -> None:
+        """Add the intervals between valid samples, and the changes of an input over them."""
+        times, values = channel.measured_ns[valid], channel.values[valid]
+        if self._valid:
+            times = np.concatenate(([self._last_valid], times))
+        steps = np.diff(times)
+        order: slice | NDArray[np.intp] = slice(None)
+        if (steps < 0).any():
+            order = np.argsort(times, kind="stable")
+            times = times[order]
+            steps = np.diff(times)
+        positive = steps > 0
+        self._duplicates += len(steps) - int(np.count_nonzero(positive))
+        self._intervals.add(steps[positive].astype(float))
+        long = np.flatnonzero(steps > GAP_SECS * 1e9)
+        self._long_intervals.append(np.column_stack((times[long], steps[long])))
+        if self._changes is not None and len(values):
+            if self._valid:
+                values = np.concatenate(([self._last_value], values))
+            self._changes.add(np.abs(np.diff(values[order]))[positive])
+            self._last_value = float(values[-1])
 
     def _add_delays(self, channel: Channel) -> None:
         lead = channel.measured_ns - channel.received_ns
@@ -251,8 +271,8 @@ class _ChannelStatsCollector:
         """Return the statistics of all samples added; `max_speed` of the log, m/s."""
         fixes = self._fixes.result(max_speed) if self._fixes else None
         channel, interval = self._channel, _median_secs(self._intervals)
-        all_valid = self._valid_intervals is self._intervals
         irregular_share, interval_range = _regularity(self._intervals.values * 1e-9, interval)
+        hold = self._hold(interval)
         return ChannelStats(
             name=channel.name,
             source=channel.source,
@@ -261,7 +281,8 @@ class _ChannelStatsCollector:
             samples=self._samples,
             span_ns=self._span if self._samples else (0, 0),
             interval_secs=interval,
-            gaps=self._gaps(interval),
+            row_interval_secs=_median_secs(self._row_intervals),
+            gaps=() if hold else self._gaps(interval),
             irregular_share=irregular_share,
             interval_range_secs=interval_range,
             duplicate_times=self._duplicates,
@@ -279,13 +300,30 @@ class _ChannelStatsCollector:
             valid_span_ns=(
                 fixes.usable_span_ns if fixes else self._valid_span if self._valid else (0, 0)
             ),
-            valid_interval_secs=interval if all_valid else _median_secs(self._valid_intervals),
             value_range=self._value_range,
             median=self._values.median(),
             negative_share=self._negative / self._valid if self._valid else 0.0,
             strict=self._strict,
+            interpolation=stated_interpolation(channel),
+            hold=hold,
             fixes=fixes,
         )
+
+    def _hold(self, interval: float) -> HoldStats | None:
+        """Return the figures of a channel to be held; None where it is to be interpolated."""
+        stated = stated_interpolation(self._channel)
+        if stated == "linear" or self._channel.fields or not self._valid:
+            return None
+        intervals = self._intervals.values * 1e-9
+        changes = np.zeros(0) if self._changes is None else self._changes.values
+        if stated != "hold":
+            order, gap_secs = is_order(self._channel.source), gap_threshold_secs(interval)
+            if self._changes is None or not is_written_on_change(
+                intervals, changes, gap_secs, order=order
+            ):
+                return None
+        longest, largest = (float(each.max(initial=0.0)) for each in (intervals, changes))
+        return HoldStats(stated == "hold", longest, largest)
 
     def _gaps(self, interval: float) -> tuple[tuple[float, float], ...]:
         """Start and length of each gap, s."""
