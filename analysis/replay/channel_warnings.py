@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from shiplog.checks.channel_stats import LogStats
+from shiplog.checks.channel_stats import GAP_SECS, LogStats
 from shiplog.resampling import Clock
 
 MAX_ASTERN_SHARE = 0.01  # of the samples; a single one may be noise about zero
@@ -68,16 +68,18 @@ def end_warnings(log_stats: LogStats, clock: Clock, names: tuple[str, ...]) -> I
     """
     clock_start, clock_end = clock.start_ns, clock.end_ns
     starts = {name: log_stats[name].valid_span_ns[0] for name in names}
+    names = tuple(name for name in names if not log_stats[name].hold)  # the others have no end
     ends = {name: log_stats[name].valid_span_ns[1] for name in names}
     last_to_start = max(starts, key=lambda name: starts[name])
     delay = (clock_start - min(starts.values())) * 1e-9
-    if delay > log_stats[last_to_start].gap_threshold_secs:
+    latest = log_stats[last_to_start]
+    if delay > (GAP_SECS if latest.hold else latest.gap_threshold_secs):
         yield (
             f"{last_to_start}: starts {delay:.1f} s after the other channels; "
             "the replay starts there"
         )
-    remainder = (max(ends.values()) - clock_end) * 1e-9
-    if remainder > max(log_stats[name].gap_threshold_secs for name in names):
+    remainder = (max(ends.values(), default=clock_end) - clock_end) * 1e-9
+    if remainder > max((log_stats[name].gap_threshold_secs for name in names), default=0.0):
         first_to_end = min(names, key=lambda name: abs(ends[name] - clock_end))
         yield (
             f"{first_to_end}: ends {remainder:.1f} s before the other channels; "

@@ -42,7 +42,7 @@ def _log_table(findings: Findings) -> TextTable:
     log_stats, rows = findings.plan.log_stats, []
     for channel in log_stats:
         rate = f"{1 / channel.interval_secs:.3g} Hz" if channel.interval_secs else ""
-        gaps = "none"
+        gaps = "held" if channel.hold else "none"
         if channel.gaps:
             longest = max(length for _, length in channel.gaps)
             gaps = f"{len(channel.gaps)}, longest {longest:.1f} s"

@@ -6,8 +6,13 @@ from shiplog.errors import LogError
 from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 
 from .channel_stats import ChannelStats, LogStats
+from .on_change import INTERPOLATION_KEY, INTERPOLATIONS, is_order
 
 MAX_IRREGULAR_SHARE = 0.1  # of the intervals
+MIN_SAMPLES_PER_STAMP = 1.5  # from which the time stamps are taken to be coarse
+MIN_TAIL_SECS = 10.0  # held at the end of a log, below which nothing is reported
+MIN_ORDER_STEP = 0.06  # rad, about 3.5 deg: a change at once of which no steering gear is capable
+MIN_ROWS_PER_VALUE = 1.5  # from which a table is taken to have empty cells on purpose
 
 
 def data_warnings(stats: LogStats, names: tuple[str, ...]) -> list[str]:
@@ -40,8 +45,58 @@ def data_warnings(stats: LogStats, names: tuple[str, ...]) -> list[str]:
     for name in names:
         channel = stats[name]
         _require_usable(stats, channel)
-        warnings += [f"{channel.topic}: {warning}" for warning in _channel_warnings(channel)]
+        texts = [*_channel_warnings(channel), *hold_warnings(channel, stats.span_ns[1])]
+        warnings += [f"{channel.topic}: {text}" for text in texts]
     return warnings
+
+
+def hold_warnings(channel: ChannelStats, end_ns: int) -> Iterator[str]:
+    """Report how a channel is held between its samples, and to the end of the log.
+
+    Parameters
+    ----------
+    channel
+        Statistics of the channel.
+    end_ns
+        End of the log, ns since 1970.
+
+    Yields
+    ------
+    str
+        Warnings, without the topic.
+    """
+    if channel.interpolation not in ("", *INTERPOLATIONS):
+        yield (
+            f"unknown {INTERPOLATION_KEY} {channel.interpolation!r} in its metadata, ignored; "
+            f"use one of {', '.join(INTERPOLATIONS)}"
+        )
+    hold = channel.hold
+    if hold:
+        after = (end_ns - channel.valid_span_ns[1]) * 1e-9
+        at_end = f" and for the last {after:.1f} s of the log" if after > 0 else ""
+        samples = _count(channel.valid, "sample")
+        if not hold.stated:
+            yield (
+                f"held at its last value between its {samples}, the longest interval "
+                f"{hold.longest_secs:.1f} s{at_end}: it seems to be written only when it changes; "
+                f'if it is sampled, set {INTERPOLATION_KEY} = "linear" in its layout'
+            )
+        elif after > max(hold.longest_secs, MIN_TAIL_SECS):
+            yield (
+                f"held at its last value for the last {after:.1f} s of the log, longer than "
+                f"between any of its {samples}; if the sensor was lost, cut the log there"
+            )
+    if channel.name == "rudder" and (is_order(channel.source) or _jumps(channel)):
+        jump = f" (changes of up to {_displayed(channel, hold.largest_step)})" if hold else ""
+        yield (
+            f"seems to be the order, not the angle of the rudder{jump}; the lag of the steering "
+            "gear is then taken for the ship's; use the rudder's feedback where there is one"
+        )
+
+
+def _jumps(channel: ChannelStats) -> bool:
+    """Whether a held rudder changes by more than a steering gear turns it between two samples."""
+    return channel.hold is not None and channel.hold.largest_step > MIN_ORDER_STEP
 
 
 def times_in_words(count: int) -> str:
@@ -89,12 +144,8 @@ def _time_warnings(channel: ChannelStats) -> Iterator[str]:
             "its start; samples were lost: check the sensor and its connection"
         )
     if channel.duplicate_times:
-        yield (
-            f"{_count(channel.duplicate_times, 'sample')} with the same time as the one before; "
-            "the time stamps are too coarse or samples were recorded twice: "
-            "check the sensor's clock and the recorder"
-        )
-    if channel.irregular_share > MAX_IRREGULAR_SHARE:
+        yield _duplicate_times_warning(channel)
+    if channel.irregular_share > MAX_IRREGULAR_SHARE and not channel.hold:
         low, high = channel.interval_range_secs
         yield (
             f"irregular sampling: {100 * channel.irregular_share:.0f} % of the intervals differ by "
@@ -109,9 +160,30 @@ def _time_warnings(channel: ChannelStats) -> Iterator[str]:
         )
 
 
+def _duplicate_times_warning(channel: ChannelStats) -> str:
+    """Word the warning of repeated time stamps, which are coarse where most of them repeat."""
+    text = f"{_count(channel.duplicate_times, 'sample')} with the same time as the one before"
+    per_stamp = channel.valid / max(channel.valid - channel.duplicate_times, 1)
+    if per_stamp < MIN_SAMPLES_PER_STAMP or not channel.interval_secs:
+        return (
+            f"{text}; the time stamps are too coarse or samples were recorded twice: "
+            "check the sensor's clock and the recorder"
+        )
+    secs = f"{channel.interval_secs:.3g} s"
+    return (
+        f"{text}: {per_stamp:.3g} samples share each time stamp, {secs} apart; they are averaged, "
+        f"motions within {secs} are lost, and the times may be up to {secs} wrong against other "
+        "channels; the time stamps are too coarse, or samples were recorded twice: set "
+        'rebuild = "uniform" in [time] of the layout of a table and convert it again, or record '
+        "finer time stamps"
+    )
+
+
 def _value_warnings(channel: ChannelStats) -> Iterator[str]:
     """Missing, stuck and impossible values."""
-    if channel.missing:
+    # where a table has a value in every n-th row only, the empty cells between are no defect
+    empty_cells = channel.interval_secs > MIN_ROWS_PER_VALUE * channel.row_interval_secs
+    if channel.missing and not empty_cells:
         share = 100 * channel.missing / channel.samples
         yield (
             f"{_count(channel.missing, 'sample')} ({share:.1f} %) not measured (NaN); "

@@ -142,7 +142,7 @@ class _ChannelStatsCollector:
             self._row_intervals = deepcopy(self._intervals)
         self._add_times(channel, valid)
         self._add_values(channel, rows, valid)
-        if self._stuck:
+        if self._stuck and valid.any():
             secs = (channel.measured_ns - self._start) * 1e-9
             self._stuck.add(*((secs, rows) if valid.all() else (secs[valid], rows[valid])))
         self._samples += len(channel)
@@ -315,6 +315,8 @@ class _ChannelStatsCollector:
         if stated == "linear" or self._channel.fields or not self._valid:
             return None
         intervals = self._intervals.values * 1e-9
+        if not (stated or len(intervals)) and self.name.startswith("rudder"):
+            return None  # one sample of a rudder shows nothing; revolutions may be written once
         changes = np.zeros(0) if self._changes is None else self._changes.values
         if stated != "hold":
             order, gap_secs = is_order(self._channel.source), gap_threshold_secs(interval)

@@ -64,16 +64,17 @@ class RudderSignCheck:
         self._interpolators: dict[ChannelStats, Interpolator] = {}
         if self._rudder is None or yaw_rate is None:
             return
-        if min(yaw_rate.valid, self._rudder.valid) < 2 * MIN_WINDOWS:
+        sampled = [channel for channel in (yaw_rate, self._rudder) if not channel.hold]
+        if min((channel.valid for channel in sampled), default=0) < 2 * MIN_WINDOWS:
             return
         start = max(yaw_rate.valid_span_ns[0], self._rudder.valid_span_ns[0])
-        span = (min(yaw_rate.valid_span_ns[1], self._rudder.valid_span_ns[1]) - start) * 1e-9
+        span = (min(channel.valid_span_ns[1] for channel in sampled) - start) * 1e-9
         dt = max(yaw_rate.interval_secs, WINDOW_SECS / 100, span / 100_000)
         if span < 2 * MIN_WINDOWS * dt:
             return
         self._dt, self._start, at = dt, start, np.arange(int(span / dt) + 1) * dt
         self._interpolators = {
-            channel: Interpolator(at, channel.gap_threshold_secs)
+            channel: Interpolator(at, channel.gap_threshold_secs, hold=channel.hold is not None)
             for channel in (yaw_rate, self._rudder)
         }
         self._names = ["yaw_rate", "rudder"]

@@ -54,7 +54,7 @@ def choose_clock(
 
     The clock starts at a sample of the first channel, as soon as all channels have a valid sample.
     It ends with the commanded channels (rudder, rpm), or, if there are none, with the last of the
-    others.
+    others. Channels that are held between their samples do not end it.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def choose_clock(
     stats
         Its statistics, from `compute_log_stats`.
     dt_secs
-        The time step, s. By default the median interval of the first channel.
+        The time step, s. By default the median interval of the first channel that is not held.
     channels
         The names of the channels to resample. By default all scalar channels of the log.
     optional
@@ -72,7 +72,7 @@ def choose_clock(
     Raises
     ------
     LogError
-        A channel is missing or has fewer than two samples; the channels have no time in common;
+        A channel is missing or has too few samples; the channels have no time in common;
         or the times span so long that they must be wrong.
     UsageError
         The time step is not positive, or a channel has several components.
@@ -83,18 +83,27 @@ def choose_clock(
     used = {name: stats[name] for name in names}
     for name, channel in used.items():
         _require_samples(log, name, channel)
-    first = used[names[0]]
+    first = next((channel for channel in used.values() if not channel.hold), used[names[0]])
+    if dt_secs is None and first.interval_secs == 0:
+        raise LogError(
+            f"no channel has samples at two instants, from which a time step could be taken; "
+            f"choose a longer log, or give dt_secs: {log.name}"
+        )
     dt = first.interval_secs if dt_secs is None else dt_secs
     if not 0 < dt < inf:
         raise UsageError(f"the time step must be positive, got {dt} s")
-    start_ns, end_ns = _common_span(log, list(used.values()))
+    start_ns, end_ns = _common_span(log, list(used.values()), first)
     steps = (end_ns - start_ns) * 1e-9 / dt + 1e-6
     if steps > MAX_INSTANTS and steps > MAX_INSTANTS_PER_SAMPLE * first.valid:
         raise LogError(
             f"the times span {(end_ns - start_ns) / 8.64e13:.4g} days, too many steps of {dt:g} s; "
             f"correct the clock of one of {', '.join(names)}: {log.name}"
         )
-    present = {name: stats[name] for name in optional if name in stats and stats[name].valid > 1}
+    present = {
+        name: stats[name]
+        for name in optional
+        if name in stats and (stats[name].valid > 1 or stats[name].hold)
+    }
     return Clock(start_ns, dt, int(steps) + 1, used | present)
 
 
@@ -104,7 +113,7 @@ def _require_samples(log: Log, name: str, channel: ChannelStats) -> None:
             f"channel {name!r} has components ({', '.join(channel.fields)}) and cannot be "
             f"resampled; name channels with one value per sample: {log.name}"
         )
-    if channel.valid < 2 or channel.interval_secs == 0:
+    if channel.valid < 1 or not (channel.hold or channel.interval_secs > 0):
         content = {0: "no measured value", 1: "one sample"}.get(
             channel.valid, "all its samples at one instant"
         )
@@ -114,16 +123,20 @@ def _require_samples(log: Log, name: str, channel: ChannelStats) -> None:
         )
 
 
-def _common_span(log: Log, channels: list[ChannelStats]) -> tuple[int, int]:
-    """Return the start and the end of the clock as `choose_clock` defines them, ns."""
+def _common_span(log: Log, channels: list[ChannelStats], first: ChannelStats) -> tuple[int, int]:
+    """Return the start and the end of the clock as `choose_clock` defines them, ns.
+
+    It starts at a sample of the channel `first`.
+    """
     all_valid_ns = max(channel.valid_span_ns[0] for channel in channels)
     commanded: list[int] = []
     measured: list[int] = []
-    for channel in channels:
+    sampled = [channel for channel in channels if not channel.hold]
+    for channel in sampled or channels:
         is_commanded = channel.name in CATALOGUE and CATALOGUE[channel.name].commanded
         (commanded if is_commanded else measured).append(channel.valid_span_ns[1])
     end = min([max(measured or commanded), *commanded])
-    start = _first_sample(log, channels[0], all_valid_ns)
+    start = _first_sample(log, first, all_valid_ns)
     if end <= start:
         names = ", ".join(c.name for c in channels)
         raise LogError(

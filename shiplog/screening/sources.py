@@ -135,7 +135,7 @@ def _on_one_clock(log: Log, channels: Sequence[ChannelStats]) -> tuple[FloatArra
     alive = [channel for channel in channels if channel.valid > 1]
     start = min((c.valid_span_ns[0] for c in alive), default=0)
     span = (max((c.valid_span_ns[1] for c in alive), default=0) - start) * 1e-9
-    intervals = [c.valid_interval_secs for c in alive if c.valid_interval_secs > 0]
+    intervals = [c.interval_secs for c in alive if c.interval_secs > 0]
     dt = max(min(intervals, default=1.0), span / MAX_INSTANTS, 1e-3)
     clock = np.arange(int(span / dt) + 1) * dt
     gathered = [_Gathered(channel, clock, start) for channel in channels]
@@ -153,7 +153,7 @@ class _Gathered:
     def __init__(self, channel: ChannelStats, clock: FloatArray, start_ns: int) -> None:
         self.channel, self._clock, self._start_ns = channel, clock, start_ns
         count = 2 if channel.fields else 1
-        gap_secs = max(channel.gap_threshold_secs, 5.0 * channel.valid_interval_secs)
+        gap_secs = max(channel.gap_threshold_secs, 5.0 * channel.interval_secs)
         self._components = [Interpolator(clock, gap_secs) for _ in range(count)]
         self._frame: LocalFrame | None = None
         self._angle: float | None = None
@@ -287,7 +287,7 @@ def _by_rate(
     _: str, sources: Sequence[_Source], __: Mapping[str, list[_Source]], ___: FloatArray
 ) -> tuple[_Source, str] | None:
     """Choose the source with the highest sampling rate."""
-    intervals = [source.stats.valid_interval_secs for source in sources]
+    intervals = [source.stats.interval_secs for source in sources]
     best = int(np.argmin(intervals))
     others = min(interval for i, interval in enumerate(intervals) if i != best)
     if intervals[best] <= 0 or others < DECISIVE_RATIO * intervals[best]:

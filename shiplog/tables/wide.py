@@ -82,11 +82,12 @@ def wide_table(
     usable = {
         key: channel
         for key, channel in zip(columns, stats, strict=True)
-        if channel.valid > 1 and channel.interval_secs > 0
+        if channel.hold or (channel.valid > 1 and channel.interval_secs > 0)
     }
     if not usable:
         raise LogError(f"no channel with two valid samples or more in {log.name}; check the log")
-    dt = min(c.interval_secs for c in usable.values()) if dt_secs is None else dt_secs
+    sampled = [c for c in usable.values() if not c.hold] or list(usable.values())
+    dt = min(c.interval_secs for c in sampled) if dt_secs is None else dt_secs
     if not 0 < dt < np.inf:
         raise UsageError(f"dt_secs must be a positive number of seconds, got {dt}")
     start_ns = min(channel.valid_span_ns[0] for channel in usable.values())

@@ -139,7 +139,7 @@ def _lag_findings(pair: TurningRatio | None, stats: LogStats) -> list[Finding]:
     if pair is None or gyro is None or compass is None or abs(pair.correlation) < 0.98:
         return []
     lag, error = pair.lag_secs, pair.lag_error_secs
-    resolution = max(gyro.valid_interval_secs, compass.valid_interval_secs, MIN_LAG_SECS)
+    resolution = max(gyro.interval_secs, compass.interval_secs, MIN_LAG_SECS)
     if abs(lag) < max(resolution, LAG_ERRORS * error):
         return []
     late, early = (compass, gyro) if lag > 0 else (gyro, compass)

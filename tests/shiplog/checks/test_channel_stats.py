@@ -56,8 +56,8 @@ def test_the_interval_between_valid_samples_leaves_out_the_others() -> None:
     values = np.full(100, np.nan)
     values[::10] = 1.0
     stats = stats_of(channel("speed", list(0.1 * np.arange(100)), values))
-    assert stats.interval_secs == pytest.approx(0.1)
-    assert stats.valid_interval_secs == pytest.approx(1.0)
+    assert stats.row_interval_secs == pytest.approx(0.1)
+    assert stats.interval_secs == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("seed", range(3))

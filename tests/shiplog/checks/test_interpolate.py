@@ -37,8 +37,8 @@ def test_without_samples_all_values_are_nan() -> None:
 
 
 @pytest.mark.parametrize("cuts", [[], [1], [2], [3], [1, 2, 3]])
-def test_samples_of_equal_times_are_treated_as_numpy_does_whatever_the_cuts(
+def test_samples_of_equal_times_are_averaged_whatever_the_cuts(
     cuts: list[int],
 ) -> None:
     times, values = np.array([0.0, 1.0, 1.0, 2.0]), np.array([0.0, 10.0, 20.0, 30.0])
-    assert interpolated(times, values, np.arange(3.0), np.inf, cuts).tolist() == [0.0, 20.0, 30.0]
+    assert interpolated(times, values, np.arange(3.0), np.inf, cuts).tolist() == [0.0, 15.0, 30.0]

@@ -229,8 +229,8 @@ def test_positions_are_omitted_by_default_and_rejected_by_name() -> None:
 def test_too_few_samples_are_an_error_that_names_the_channel(
     seconds: list[float], values: list[float], error: str
 ) -> None:
-    log = log_of(channel("speed", [0, 1], [1, 2]), channel("rudder", seconds, values))
-    with pytest.raises(LogError, match=rf"'rudder' .*{error}.*trial\.mcap"):
+    log = log_of(channel("speed", [0, 1], [1, 2]), channel("sway", seconds, values))
+    with pytest.raises(LogError, match=rf"'sway' .*{error}.*trial\.mcap"):
         resample(log)
 
 
