@@ -154,7 +154,9 @@ class _Gathered:
         self.channel, self._clock, self._start_ns = channel, clock, start_ns
         count = 2 if channel.fields else 1
         gap_secs = max(channel.gap_threshold_secs, 5.0 * channel.interval_secs)
-        self._components = [Interpolator(clock, gap_secs) for _ in range(count)]
+        self._components = [
+            Interpolator(clock, gap_secs, hold=channel.hold is not None) for _ in range(count)
+        ]
         self._frame: LocalFrame | None = None
         self._angle: float | None = None
 
