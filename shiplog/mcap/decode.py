@@ -105,6 +105,8 @@ class McapContents:
         Whether to keep them, because a later record may describe their channel.
     foreign
         The messages of other programs, by channel id.
+    foreign_records
+        The attachments and metadata records of other programs, in words; a dict for their order.
     metadata
         Text about the trial, by key.
     vessel_toml
@@ -139,6 +141,7 @@ class McapContents:
     undescribed_counts: dict[int, int] = field(default_factory=dict)
     keep_undescribed: bool = True
     foreign: dict[int, ForeignMessages] = field(default_factory=dict)
+    foreign_records: dict[str, None] = field(default_factory=dict)
     metadata: dict[str, str] = field(default_factory=dict)
     vessel_toml: str | None = None
     in_order: bool = True
@@ -234,10 +237,14 @@ def _read_record(opcode: int, stream: ReadDataStream, contents: McapContents) ->
         metadata = records.Metadata.read(stream)
         if metadata.name == METADATA_NAME:
             contents.metadata.update(metadata.metadata)
+        else:
+            contents.foreign_records[f"metadata {metadata.name!r}"] = None
     elif opcode == Opcode.ATTACHMENT:
         attachment = records.Attachment.read(stream)
         if attachment.name == VESSEL_ATTACHMENT:
             contents.vessel_toml = attachment.data.decode()
+        else:
+            contents.foreign_records[f"attachment {attachment.name!r}"] = None
 
 
 def _read_descriptions(data: bytes, contents: McapContents) -> int:

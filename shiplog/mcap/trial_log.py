@@ -21,6 +21,7 @@ from .clock_repair import MessageColumns, drop_impossible_times, pause_warnings,
 from .decode import McapContents, SampleBlock, schema_of
 from .schema import FORMAT_VERSION, Schema
 
+MAX_NAMES = 8  # of ignored records that a warning lists
 _CHANNEL_KEYS = {"channel", "source", "unit", "positive"}  # of the metadata: attributes of Channel
 
 
@@ -122,6 +123,13 @@ def _warnings(contents: McapContents) -> list[str]:
     ]
     if foreign:
         warnings.append(f"ignored {len(foreign)} topics of other programs: {', '.join(foreign)}")
+    if contents.foreign_records:
+        names = list(contents.foreign_records)
+        more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+        warnings.append(
+            f"ignored {len(names)} attachments and metadata records of other programs, which a "
+            f"conversion does not keep: {', '.join(names[:MAX_NAMES])}{more}"
+        )
     return warnings
 
 

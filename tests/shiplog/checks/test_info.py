@@ -158,3 +158,23 @@ def test_a_log_without_samples_has_no_start(tmp_path: Path) -> None:
     assert (info.start_utc, info.duration_secs, info.state) == (None, 0.0, "finished")
     with pytest.raises(UsageError, match=r"empty.mcap has no samples"):
         read_log_info(tmp_path / "empty.mcap", 10)
+
+
+def test_attachments_and_metadata_of_other_programs_are_reported_as_not_kept(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "mixed.mcap"
+    with path.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start()
+        writer.add_attachment(0, 0, "photo.jpg", "image/jpeg", b"...")
+        writer.add_metadata("rosbag2", {"version": "8"})
+        writer.finish()
+    (warning,) = read_log_info(path).warnings
+    assert "attachment 'photo.jpg', metadata 'rosbag2'" in warning
+    assert "does not keep" in warning
+
+
+def test_a_log_of_ours_has_no_foreign_records(zigzag: SimulatedTrial, tmp_path: Path) -> None:
+    record(zigzag, tmp_path / "z.mcap")
+    assert read_log_info(tmp_path / "z.mcap").warnings == ()
