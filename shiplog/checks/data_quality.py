@@ -16,7 +16,7 @@ MIN_ROWS_PER_VALUE = 1.5  # from which a table is taken to have empty cells on p
 
 
 def data_warnings(stats: LogStats, names: tuple[str, ...]) -> list[str]:
-    """Report the defects of some channels, one line each.
+    """Report the defects of some channels, a line for each defect that one or several have.
 
     A warning has what was found, the likely cause and the remedy.
 
@@ -41,13 +41,13 @@ def data_warnings(stats: LogStats, names: tuple[str, ...]) -> list[str]:
     >>> data_warnings(compute_log_stats(log), ("yaw_rate", "rudder"))
     []
     """
-    warnings = []
+    topics: dict[str, list[str]] = {}  # by the text, which channels from one clock share
     for name in names:
         channel = stats[name]
         _require_usable(stats, channel)
-        texts = [*_channel_warnings(channel), *hold_warnings(channel, stats.span_ns[1])]
-        warnings += [f"{channel.topic}: {text}" for text in texts]
-    return warnings
+        for text in (*_channel_warnings(channel), *hold_warnings(channel, stats.span_ns[1])):
+            topics.setdefault(text, []).append(channel.topic)
+    return [f"{', '.join(channels)}: {text}" for text, channels in topics.items()]
 
 
 def hold_warnings(channel: ChannelStats, end_ns: int) -> Iterator[str]:

@@ -188,3 +188,15 @@ def test_times_that_run_backwards_are_an_error_with_the_remedy() -> None:
     message = error_of(channel(noise(), times))
     assert "/yaw_rate/a run backwards 2 times, first by 0.250 s, 9.900 s after" in message
     assert "`shiplog convert IN.mcap OUT.mcap` sorts them" in message
+
+
+def test_a_defect_that_channels_share_is_one_warning() -> None:
+    times = np.repeat(np.arange(60.0), 5)
+    rng = np.random.default_rng(1)
+    channels = [
+        channel(0.01 * rng.standard_normal(300), times, name=name) for name in ("yaw_rate", "speed")
+    ]
+    (warning,) = data_warnings(
+        compute_log_stats(TrialLog("trial.mcap", tuple(channels))), ("yaw_rate", "speed")
+    )
+    assert warning.startswith("/yaw_rate/a, /speed/a: 240 samples with the same time")
