@@ -2,12 +2,13 @@
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from shiplog.mcap.clock_repair import mixed_times_in
 from shiplog.mcap.decode import McapContents, schema_of
 from shiplog.mcap.reader import open_mcap
 from shiplog.mcap.scan import scan
@@ -207,11 +208,13 @@ def read_log_info(
         if summary and summary.statistics.message_count > MAX_MESSAGES_TO_READ:
             if start is None and end is None:
                 return _info_of_summary(path.name, summary)
-            log = open_log(path).between(start, end)
+            log = open_log(path, start, end)
             return _info_of_log(log, _foreign_in_summary(summary), finished=True)
         for _ in scan(stream, contents):
             pass
     log = build_trial_log(path, contents).between(start, end)
+    mixed = mixed_times_in(contents.mixed_times, log.span_ns)
+    log = replace(log, warnings=(*log.warnings, *(span.message for span in mixed)))
     return _info_of_log(log, _foreign_in_contents(contents), finished=contents.finished)
 
 

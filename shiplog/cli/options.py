@@ -82,7 +82,7 @@ def open_cut(path: StrPath, arguments: argparse.Namespace) -> "TrialLog | LogFil
     """Open the part of a log between the bounds of the options ``--from`` and ``--to``."""
     from shiplog.mcap.stream import open_log
 
-    return open_log(path).between(arguments.start, arguments.end)
+    return open_log(path, arguments.start, arguments.end)
 
 
 def _time_bound(text: str) -> float | str:

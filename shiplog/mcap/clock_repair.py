@@ -1,6 +1,6 @@
 """Repair of the times of a file's messages: impossible times dropped, steps of a clock removed."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,10 +90,50 @@ def drop_impossible_times(
     return kept, warnings
 
 
-def repair_clock_steps(
-    file: str, columns: Mapping[int, MessageColumns]
-) -> tuple[dict[int, MessageColumns], int, list[str]]:
+@dataclass(frozen=True)
+class MixedTimes:
+    """A span in which samples from before and after a step of a clock have the same times.
+
+    Attributes
+    ----------
+    start_ns, end_ns
+        The span in times of measurement, both included, ns since 1970-01-01 UTC.
+    message
+        The cause and the remedy, in one line.
+    """
+
+    start_ns: int
+    end_ns: int
+    message: str
+
+
+@dataclass(frozen=True)
+class ClockRepair:
+    """The messages of a file with repaired times.
+
+    Attributes
+    ----------
+    columns
+        The messages by channel id, with times that go on at the sampling rate.
+    change_ns
+        The sum of the removed steps of the recorder's clock, ns.
+    warnings
+        What was repaired.
+    mixed
+        The steps that were not repaired, since the right times are not known.
+    """
+
+    columns: dict[int, MessageColumns]
+    change_ns: int
+    warnings: list[str]
+    mixed: list[MixedTimes]
+
+
+def repair_clock_steps(file: str, columns: Mapping[int, MessageColumns]) -> ClockRepair:
     """Remove the steps of the recorder's and the sensors' clocks.
+
+    A step back in some channels only, and one at a restart of the recorder, after a pause of
+    unknown length, are not removed.
 
     Parameters
     ----------
@@ -101,29 +141,45 @@ def repair_clock_steps(
         The name of the file, for messages.
     columns
         The messages by channel id.
+    """
+    channels = dict(columns)
+    change, mixed, warnings = 0, [], []
+    if not _in_order_of_reception(channels.values()):
+        steps = steps_back(_times_by_topic(channels.values()))
+        refused = [s for s in steps if s.steady_names or _is_restart(s, channels.values())]
+        steps = [step for step in steps if step not in refused]
+        warnings += [_step_warning(step, channels.values()) for step in steps]
+        change = sum(step.size_ns for step in steps)
+        channels = {id_: _continued(channel, steps) for id_, channel in channels.items()}
+        mixed = [_mixed_times(file, step, channels.values()) for step in refused]
+    for id_, channel in channels.items():
+        channels[id_], warning = _repair_measured(channel)
+        warnings += warning
+    return ClockRepair(channels, change, warnings, mixed)
 
-    Returns
-    -------
-    columns, change_ns, warnings
-        The messages with times that go on at the sampling rate, the sum of the removed steps of
-        the recorder's clock in ns, and what was done.
+
+def refuse_mixed_times(mixed: Collection[MixedTimes], span_ns: tuple[int, int]) -> None:
+    """Refuse a part of a log in which the samples from before and after a step are mixed.
+
+    Parameters
+    ----------
+    mixed
+        The steps of clocks in the log that were not repaired.
+    span_ns
+        The first and the last time of measurement of the part that is used, ns.
 
     Raises
     ------
     LogError
-        The clock was set back in some channels only, so that the right times are not known.
+        The part includes such a span.
     """
-    channels = dict(columns)
-    change, warnings = 0, []
-    if not all(is_sorted(c.received_ns) for c in channels.values()):
-        steps = _received_steps(file, channels.values())
-        warnings += [_step_warning(step, channels.values()) for step in steps]
-        change = sum(step.size_ns for step in steps)
-        channels = {id_: _continued(channel, steps) for id_, channel in channels.items()}
-    for id_, channel in channels.items():
-        channels[id_], warning = _repair_measured(channel)
-        warnings += warning
-    return channels, change, warnings
+    for span in mixed_times_in(mixed, span_ns):
+        raise LogError(span.message)
+
+
+def mixed_times_in(mixed: Collection[MixedTimes], span_ns: tuple[int, int]) -> list[MixedTimes]:
+    """Return the spans of mixed times that a part of a log includes; `span_ns` is its span."""
+    return [s for s in mixed if span_ns[0] <= s.end_ns and span_ns[1] >= s.start_ns]
 
 
 def pause_warnings(channels: Collection[MessageColumns]) -> list[str]:
@@ -199,28 +255,74 @@ def _beyond(times: TimeArray, limits: tuple[int, int]) -> NDArray[np.bool_]:
     return (times < max(limits[0], 0)) | (times > min(limits[1], 2**63 - 1))
 
 
-def _received_steps(file: str, channels: Collection[MessageColumns]) -> list[ClockStep]:
-    """Return the steps back of the recorder's clock; refuse those of some channels only."""
-    times = [
-        ChannelTimes(c.topic, c.positions, c.received_ns) for c in channels if len(c.positions)
-    ]
-    steps = steps_back(times)
-    for step in steps:
-        if step.steady_names:
-            start = min(int(c.times_ns[0]) for c in times)
-            raise LogError(
-                f"the times of {', '.join(step.names)} run back by "
-                f"{-step.size_ns / _SECOND_NS:.3g} s in the order of the file, "
-                f"{(step.before_ns - start) / _SECOND_NS:.6g} s after the start, those of "
-                f"{', '.join(step.steady_names)} do not; one of several clocks was set: use the "
-                f"part before {_instant(step.after_ns)}, or set --from after "
-                f"{_instant(step.before_ns)}: {file}"
-            )
-    return steps
+def _times_by_topic(channels: Collection[MessageColumns]) -> list[ChannelTimes]:
+    """Return the times of reception of each topic; a restarted recorder gives it a second id."""
+    by_topic: dict[str, list[MessageColumns]] = {}
+    for channel in channels:
+        if len(channel.positions):
+            by_topic.setdefault(channel.topic, []).append(channel)
+    times = []
+    for topic, parts in by_topic.items():
+        positions = np.concatenate([part.positions for part in parts])
+        received = np.concatenate([part.received_ns for part in parts])
+        order = np.argsort(positions, kind="stable")
+        times.append(ChannelTimes(topic, positions[order], received[order]))
+    return times
+
+
+def _in_order_of_reception(channels: Collection[MessageColumns]) -> bool:
+    """Whether each topic's times of reception increase in the order of the file."""
+    topics = {channel.topic for channel in channels if len(channel.positions)}
+    ids = sum(1 for channel in channels if len(channel.positions))
+    times: Iterable[TimeArray] = (
+        (channel.received_ns for channel in channels)
+        if ids == len(topics)
+        else (channel.times_ns for channel in _times_by_topic(channels))
+    )
+    return all(map(is_sorted, times))
+
+
+def _is_restart(step: ClockStep, channels: Collection[MessageColumns]) -> bool:
+    """Whether the channels of a step have other ids after it than before."""
+    return not any(
+        channel.positions[0] < step.position <= channel.positions[-1]
+        for channel in channels
+        if channel.topic in step.names and len(channel.positions)
+    )
+
+
+def _mixed_times(file: str, step: ClockStep, channels: Collection[MessageColumns]) -> MixedTimes:
+    """Return the span that a step makes unusable, with its cause and the parts that are good."""
+    stepped = [c for c in channels if c.topic in step.names and len(c.positions)]
+    before = [c.measured_ns[c.positions < step.position] for c in stepped]
+    after = [c.measured_ns[c.positions >= step.position] for c in stepped]
+    before_ns, after_ns = (
+        (min(int(t.min()) for t in times if len(t)), max(int(t.max()) for t in times if len(t)))
+        for times in (before, after)
+    )
+    start, end = max(before_ns[0], after_ns[0]), min(before_ns[1], after_ns[1])
+    if end < start:  # no times occur twice: only both parts together are wrong
+        start, end = end + 1, start - 1
+    at_secs = (step.before_ns - _start_ns(stepped)) / _SECOND_NS
+    size = f"{round(-step.size_ns / _SECOND_NS, 3):.12g}"
+    cause = (
+        f"the times of {', '.join(step.names)} run back by {size} s in the order of the "
+        f"file, {at_secs:.6g} s after the start, those of {', '.join(step.steady_names)} do not; "
+        "one of several clocks was set"
+        if step.steady_names
+        else f"the recorder was restarted {at_secs:.6g} s after the start and its times run back "
+        f"by {size} s there; its pause is unknown"
+    )
+    return MixedTimes(
+        start,
+        end,
+        f"{cause}: use one part, --to {_instant(start)} or --from "
+        f"{_instant(end + 1_000_000)}: {file}",
+    )
 
 
 def _step_warning(step: ClockStep, channels: Collection[MessageColumns]) -> str:
-    start = min(int(c.received_ns[0]) for c in channels if len(c.received_ns))
+    start = _start_ns(channels)
     return (
         f"times: the clock of the recorder was set back by {-step.size_ns / _SECOND_NS:.3f} s, "
         f"{(step.before_ns - start) / _SECOND_NS:.1f} s after the start, in the order of the file "
@@ -273,6 +375,12 @@ def _repair_measured(channel: MessageColumns) -> tuple[MessageColumns, list[str]
             "the sensor's clock"
         )
     return replace(channel, measured_ns=measured), warnings
+
+
+def _start_ns(channels: Collection[MessageColumns]) -> int:
+    """Return the time of the first message in the file, ns."""
+    first = min((c for c in channels if len(c.positions)), key=lambda c: int(c.positions[0]))
+    return int(first.received_ns[0])
 
 
 def _date(time_ns: int) -> str:

@@ -17,6 +17,7 @@ from mcap.opcode import Opcode
 
 from shiplog.types import FloatArray, TimeArray
 
+from .clock_repair import MixedTimes
 from .locate import (
     Offsets,
     complete_records,
@@ -127,6 +128,8 @@ class McapContents:
         The sum of the steps of the recorder's clock in the samples drained so far, ns.
     clock_warnings
         Warnings about times of messages in the samples drained so far.
+    mixed_times
+        Steps of clocks that were not repaired in the samples drained so far.
     pause_warnings
         Warnings about gaps in all channels in the samples drained so far.
     """
@@ -152,6 +155,7 @@ class McapContents:
     data_blocks: int = 0
     clock_change_ns: int = 0
     clock_warnings: list[str] = field(default_factory=list)
+    mixed_times: list[MixedTimes] = field(default_factory=list)
     pause_warnings: list[str] = field(default_factory=list)
 
     def drain(self) -> dict[int, list[SampleBlock]]:

@@ -12,6 +12,7 @@ import numpy as np
 from shiplog.errors import LogError, UsageError
 from shiplog.types import TimeArray, TrialLog
 
+from .clock_repair import MixedTimes, refuse_mixed_times
 from .decode import McapContents
 from .records import MAGIC
 from .scan import scan
@@ -92,7 +93,8 @@ def read(
     Raises
     ------
     LogError
-        The file is missing, is not MCAP, has an unknown unit, or lacks a requested channel.
+        The file is missing, is not MCAP, has an unknown unit, lacks a requested channel, or a clock
+        was set in the part so that its times are not known.
     UsageError
         `end_ns` is before `start_ns`.
 
@@ -101,6 +103,25 @@ def read(
     >>> log = read("sample_data/zigzag_20_20.mcap", channels=["rudder", "yaw_rate"])
     >>> [channel.name for channel in log]
     ['yaw_rate', 'rudder']
+    """
+    log, mixed = read_unchecked(path, channels=channels, start_ns=start_ns, end_ns=end_ns)
+    refuse_mixed_times(mixed, log.span_ns)
+    return log
+
+
+def read_unchecked(
+    path: str | os.PathLike[str],
+    *,
+    channels: Iterable[str] | None = None,
+    start_ns: int | None = None,
+    end_ns: int | None = None,
+) -> tuple[TrialLog, list[MixedTimes]]:
+    """Read a trial as `read` does, for a caller that uses a part of it.
+
+    Returns
+    -------
+    log, mixed
+        The trial, and the spans for which the caller has to call `refuse_mixed_times`.
     """
     path = Path(path)
     contents, skip = McapContents(), frozenset[int]()
@@ -122,7 +143,7 @@ def read(
         for _ in scan(stream, contents, skip):
             pass
     log = build_trial_log(path, contents)
-    return _selected_part(log, keys, span) if is_part else log
+    return _selected_part(log, keys, span) if is_part else log, contents.mixed_times
 
 
 @contextmanager

@@ -11,8 +11,9 @@ from mcap import records
 from shiplog.types import Channel, TrialLog
 from shiplog.types.time_cut import TimeCut, empty_cut_error, resolve_cut
 
+from .clock_repair import MixedTimes, refuse_mixed_times
 from .decode import McapContents
-from .reader import contents_described_by, open_mcap, read
+from .reader import contents_described_by, open_mcap, read_unchecked
 from .scan import scan
 from .summary import are_in_order, read_summary
 from .trial_log import build_trial_log
@@ -125,7 +126,7 @@ class LogFile:
             return self
         spans = [
             (int(channel.measured_ns.min()), int(channel.measured_ns.max()))
-            for chunk in self.chunks()
+            for chunk, _ in self._unchecked_chunks()
             for channel in chunk
             if len(channel)
         ] or [(0, 0)]
@@ -150,15 +151,26 @@ class LogFile:
         LogError
             Reading fails, as in `read`.
         """
+        span_ns = (
+            max((cut.start_ns for cut in self.cuts), default=-(2**63)),
+            min((cut.end_ns - 1 for cut in self.cuts), default=2**63),
+        )
+        for channels, mixed in self._unchecked_chunks():
+            refuse_mixed_times(mixed, span_ns)
+            yield channels
+
+    def _unchecked_chunks(self) -> Iterator[tuple[tuple[Channel, ...], list[MixedTimes]]]:
+        """Iterate over the chunks, with the spans of mixed times so far."""
         contents = McapContents(
             dict(self.schemas), dict(self.channel_records), keep_undescribed=False
         )
         with open_mcap(self.path) as stream:
             for _ in scan(stream, contents):
                 if contents.pending_samples >= FILE_CHUNK_SAMPLES:
-                    yield self._selected(build_trial_log(self.path, contents))
+                    chunk = build_trial_log(self.path, contents)
+                    yield self._selected(chunk), contents.mixed_times
         rest = build_trial_log(self.path, contents)
-        yield self._selected(rest)
+        yield self._selected(rest), contents.mixed_times
         self.outline = replace(rest, channels=self.outline.channels)
 
     def _selected(self, chunk: TrialLog) -> tuple[Channel, ...]:
@@ -170,7 +182,11 @@ class LogFile:
         return channels
 
 
-def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:
+def open_log(
+    path: str | os.PathLike[str],
+    start: float | str | None = None,
+    end: float | str | None = None,
+) -> TrialLog | LogFile:
     """Open a log: in memory if it has at most 16 million samples, else in its file.
 
     A file without a valid summary is scanned once to learn its content. A file whose MCAP chunks
@@ -180,6 +196,8 @@ def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:
     ----------
     path
         The MCAP file.
+    start, end
+        The part to open, as `TrialLog.between` takes them; by default all.
 
     Returns
     -------
@@ -190,6 +208,8 @@ def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:
     ------
     LogError
         Reading fails, as in `read`.
+    UsageError
+        A bound cannot be read, or no sample is between them.
 
     Examples
     --------
@@ -197,29 +217,37 @@ def open_log(path: str | os.PathLike[str]) -> TrialLog | LogFile:
     >>> sum(len(channel) for chunk in log.chunks() for channel in chunk) > 20_000
     True
     """
-    path = Path(path)
+    log, mixed = _open_unchecked(Path(path))
+    part = log.between(start, end)
+    if isinstance(part, TrialLog):
+        refuse_mixed_times(mixed, part.span_ns)
+    return part
+
+
+def _open_unchecked(path: Path) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
+    """Open a log whose parts may have mixed times, of which a `LogFile` learns by its chunks."""
     with open_mcap(path) as stream:
         summary = read_summary(stream)
         if summary is None:
             return _open_by_scan(path, stream)
         if summary.statistics.message_count <= MAX_SAMPLES_IN_MEMORY:
-            return read(path)
+            return read_unchecked(path)
         mcap_chunks = summary.mcap_chunk_locations()
         if mcap_chunks is None:
             return _open_by_scan(path, stream)
     if not are_in_order(mcap_chunks):
-        return read(path)
+        return read_unchecked(path)
     contents = contents_described_by(summary)
     contents.finished = True
     contents.metadata, contents.vessel_toml = dict(summary.metadata), summary.vessel_toml
-    return _log_file(path, contents)
+    return _log_file(path, contents), []
 
 
 def _log_file(path: Path, contents: McapContents) -> LogFile:
     return LogFile(path, build_trial_log(path, contents), contents.schemas, contents.channels)
 
 
-def _open_by_scan(path: Path, stream: IO[bytes]) -> TrialLog | LogFile:
+def _open_by_scan(path: Path, stream: IO[bytes]) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
     """Open a log by a scan of its file that keeps the samples only while they are few."""
     contents = McapContents()
     for _ in scan(stream, contents):
@@ -229,5 +257,7 @@ def _open_by_scan(path: Path, stream: IO[bytes]) -> TrialLog | LogFile:
             contents.undescribed.clear()
             contents.keep_undescribed = False
     if contents.keep_undescribed:
-        return build_trial_log(path, contents)
-    return _log_file(path, contents) if contents.in_order else read(path)
+        return build_trial_log(path, contents), contents.mixed_times
+    if contents.in_order:
+        return _log_file(path, contents), []
+    return read_unchecked(path)

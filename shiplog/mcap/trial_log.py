@@ -95,16 +95,20 @@ def _with_repaired_times(
 ) -> dict[int, MessageColumns]:
     """Drop impossible times and remove steps of the clocks; the contents receive the warnings."""
     columns, dropped = drop_impossible_times(columns)
-    columns, change_ns, steps = repair_clock_steps(path.name, columns)
-    contents.clock_warnings += dropped + steps
-    contents.pause_warnings += pause_warnings(columns.values())
+    repair = repair_clock_steps(path.name, columns)
     before = contents.clock_change_ns  # steps in samples drained before
-    contents.clock_change_ns += change_ns
+    contents.clock_change_ns += repair.change_ns
+    contents.clock_warnings += dropped + repair.warnings
+    contents.pause_warnings += pause_warnings(repair.columns.values())
+    contents.mixed_times += [
+        replace(span, start_ns=span.start_ns - before, end_ns=span.end_ns - before)
+        for span in repair.mixed
+    ]
+    if not before:
+        return repair.columns
     return {
         id_: replace(c, received_ns=c.received_ns - before, measured_ns=c.measured_ns - before)
-        if before
-        else c
-        for id_, c in columns.items()
+        for id_, c in repair.columns.items()
     }
 
 

@@ -9,7 +9,8 @@ from shiplog.checks.consistency.consistency_check import consistency_findings
 from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.checks.data_quality import times_in_words
 from shiplog.errors import LogError, UsageError
-from shiplog.mcap.reader import read
+from shiplog.mcap.clock_repair import refuse_mixed_times
+from shiplog.mcap.reader import read_unchecked
 from shiplog.mcap.writer import write
 from shiplog.types import TrialLog
 
@@ -67,9 +68,11 @@ def convert(
         )
     if source.resolve() == target.resolve():
         raise UsageError(f"source and target are the same file; name another target: {target}")
-    log = _read_any(source, layout)
+    is_mcap = layout is None and _suffix(source) == ".mcap"
+    log, mixed = read_unchecked(source) if is_mcap else (_read_table(source, layout), [])
     _require_samples(log, source)
     log = log.between(start, end)
+    refuse_mixed_times(mixed, log.span_ns)
     warnings = list(log.warnings)
     if source.suffix.lower() == target.suffix.lower() == ".mcap":
         log, sort_warnings = sorted_by_time(log)
@@ -91,18 +94,22 @@ def _require_samples(log: TrialLog, source: Path) -> None:
         raise LogError(f"nothing to convert, no samples of shiplog: {causes}: {source}")
 
 
-def _read_any(source: Path, layout: Path | None) -> TrialLog:
-    """Read a source in any format."""
-    suffix = Path(source.name.removesuffix(".part")).suffix.lower()  # of an unfinished recording
-    readers = {".mcap": read, ".parquet": read_parquet}
+def _suffix(source: Path) -> str:
+    """Return the suffix of a file, of an unfinished recording without its ``.part``."""
+    return Path(source.name.removesuffix(".part")).suffix.lower()
+
+
+def _read_table(source: Path, layout: Path | None) -> TrialLog:
+    """Read a table of shiplog, or a foreign one by its layout."""
+    suffix = _suffix(source)
     if layout is not None:
-        if suffix in readers or (suffix == ".csv" and _is_shiplog_csv(source)):
+        if suffix in (".mcap", ".parquet") or (suffix == ".csv" and _is_shiplog_csv(source)):
             raise UsageError(
                 f"a layout is for foreign tables, but this is a log; omit --layout: {source}"
             )
         return read_table(source, load_layout(layout))
-    if suffix in readers:
-        return readers[suffix](source)
+    if suffix == ".parquet":
+        return read_parquet(source)
     if suffix == ".csv" and (not source.is_file() or _is_shiplog_csv(source)):
         return read_csv(source)
     if not source.exists():

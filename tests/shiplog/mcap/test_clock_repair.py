@@ -1,5 +1,6 @@
 """Tests of the repair of messages' times, on files written message by message."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,11 +9,12 @@ import pytest
 from mcap.writer import Writer
 from mcap_files import scalar
 
-from shiplog import LogError
+from shiplog import LogError, TrialLog
 from shiplog.checks.info import read_log_info
 from shiplog.mcap.messages import descriptor_set
 from shiplog.mcap.reader import read
 from shiplog.mcap.schema import schema_for
+from shiplog.mcap.stream import open_log
 from shiplog.mcap.writer import write
 
 SECOND = 1_000_000_000
@@ -25,26 +27,38 @@ def unchanged(_name: str, time_ns: int) -> int:
     return time_ns
 
 
-def record(path: Path, received: Clock = unchanged, measured: Clock = unchanged) -> Path:
-    """Write 100 s of two channels at 2 Hz whose values are the true times, in s."""
+def record(
+    path: Path,
+    received: Clock = unchanged,
+    measured: Clock = unchanged,
+    restart_secs: float = 100.0,
+) -> Path:
+    """Write 100 s of two channels at 2 Hz whose values are the true times, in s.
+
+    From the restart on, the channels have other ids.
+    """
     schema = schema_for(())
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=2000)
         writer.start()
         schema_id = writer.register_schema(schema.name, "protobuf", descriptor_set(schema))
         unit = {"yaw_rate": "rad/s", "rudder": "rad"}
-        ids = {
-            name: writer.register_channel(
-                f"/{name}/test", "protobuf", schema_id, {"unit": unit[name]}
-            )
-            for name in NAMES
-        }
+        ids = [
+            {
+                name: writer.register_channel(
+                    f"/{name}/test", "protobuf", schema_id, {"unit": unit[name]}
+                )
+                for name in NAMES
+            }
+            for _ in range(2)
+        ]
         for row in range(200):
             time = row * SECOND // 2
             for name in NAMES:
                 data = scalar(time / SECOND)
                 times = START + received(name, time), START + measured(name, time)
-                writer.add_message(ids[name], times[0] % 2**64, data, times[1] % 2**64)
+                part = int(time >= restart_secs * SECOND)
+                writer.add_message(ids[part][name], times[0] % 2**64, data, times[1] % 2**64)
         writer.finish()
     return path
 
@@ -92,6 +106,63 @@ def test_a_step_of_one_channel_in_both_clocks_is_refused(tmp_path: Path) -> None
     path = record(tmp_path / "log.mcap", one_channel, one_channel)
     with pytest.raises(LogError, match=r"/rudder/test run back by 5.25 s .* /yaw_rate/test do not"):
         read(path)
+
+
+def test_a_part_beside_a_refused_step_is_read(tmp_path: Path) -> None:
+    def one_channel(name: str, time_ns: int) -> int:
+        return set_back(name, time_ns) if name == "rudder" else time_ns
+
+    path = record(tmp_path / "log.mcap", one_channel, one_channel)
+    with pytest.raises(LogError) as caught:
+        open_log(path)
+    remedy = re.search(r"--to (\S+) or --from (\S+):", str(caught.value))
+    assert remedy
+    before, after = open_log(path, end=remedy[1]), open_log(path, start=remedy[2])
+    for part in (before, after):
+        assert isinstance(part, TrialLog)
+        assert {len(channel) > 60 for channel in part} == {True}
+        times = (part["yaw_rate"].measured_ns - START) / SECOND
+        np.testing.assert_allclose(times, part["yaw_rate"].values)
+    times = (before["rudder"].measured_ns - START) / SECOND
+    np.testing.assert_allclose(times, before["rudder"].values)
+    times = (after["rudder"].measured_ns - START) / SECOND
+    np.testing.assert_allclose(times, after["rudder"].values - 5.25)
+    assert any("run back by 5.25 s" in warning for warning in read_log_info(path).warnings)
+    assert read_log_info(path, end=remedy[1]).warnings == ()
+    start_ns = int(after["yaw_rate"].received_ns[0])
+    assert len(read(path, start_ns=start_ns)["yaw_rate"]) == len(after["yaw_rate"])
+
+
+@pytest.mark.parametrize("size_secs", [5, 20, 70, 3600])
+def test_a_clock_set_back_in_all_channels_by_any_size_is_repaired(
+    tmp_path: Path, size_secs: int
+) -> None:
+    def clock(_name: str, time_ns: int) -> int:
+        return time_ns - (time_ns >= 50 * SECOND) * size_secs * SECOND
+
+    log = read(record(tmp_path / "log.mcap", clock, clock))
+    assert len(log.warnings) == 1
+    for channel in log:
+        np.testing.assert_allclose((channel.measured_ns - START) / SECOND, channel.values)
+
+
+@pytest.mark.parametrize("size_secs", [5, 20, 70, 3600])
+def test_a_clock_set_back_at_a_restart_is_refused(tmp_path: Path, size_secs: int) -> None:
+    def clock(_name: str, time_ns: int) -> int:
+        return time_ns - (time_ns >= 50 * SECOND) * size_secs * SECOND
+
+    path = record(tmp_path / "log.mcap", clock, clock, restart_secs=50.0)
+    with pytest.raises(LogError, match=f"restarted 49.5 s .* run back by {size_secs} s") as caught:
+        read(path)
+    remedy = re.search(r"--to (\S+) or --from (\S+):", str(caught.value))
+    assert remedy
+    for bounds in ({"end": remedy[1]}, {"start": remedy[2]}):
+        for channel in open_log(path, **bounds):
+            assert np.all(np.diff(channel.values) > 0)
+
+
+def test_a_restart_without_a_step_is_read(tmp_path: Path) -> None:
+    assert read(record(tmp_path / "log.mcap", restart_secs=50.0)).warnings == ()
 
 
 def test_a_gap_in_all_channels_is_reported_with_both_causes(tmp_path: Path) -> None:
