@@ -4,7 +4,9 @@ import argparse
 import os
 import sys
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from shiplog.cli.console import print_tables, print_warnings, progress, write_json
 from shiplog.cli.options import (
@@ -25,6 +27,9 @@ from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import extension_names
 from shiplog.files import atomic_write
 from shiplog.vessel.settings import DISTURBANCES
+
+if TYPE_CHECKING:
+    from shiplog.types import Log
 
 DEFAULT_REVIEW = "identified.rrd"
 LENGTH_HELP = "length between perpendiculars, such as 320; precedes that of the vessel file"
@@ -232,7 +237,7 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
     require_outputs(*outputs)
     from analysis.identification.identify import identify
     from analysis.identification.runs import require_distinct_logs
-    from analysis.identification.vessel_file import vessel_toml
+    from analysis.identification.vessel_file import undetermined_parts, vessel_toml
     from analysis.report.identification_json import identification_json
     from analysis.report.identification_tables import identification_tables
     from shiplog.vessel.vessel_parser import load_vessel
@@ -241,10 +246,12 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     with progress("analysis", lines=arguments.model == "auto") as on_progress:
         on_progress("read")
+        logs = _measured_logs(arguments.log, arguments)
+        validation_logs = _measured_logs(arguments.validate, arguments)
         ship = identify(
-            [open_cut(path, arguments) for path in arguments.log],
+            logs,
             arguments.model,
-            validation_logs=[open_cut(path, arguments) for path in arguments.validate],
+            validation_logs=validation_logs,
             fixed=fixed,
             vessel=vessel,
             sources=sources,
@@ -270,7 +277,31 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
         names = ", ".join(ship.uncertainty.unidentifiable)
         caution = f"; not identifiable, and valid for these logs only: {names}" if names else ""
         print(f"vessel file: {arguments.output}{caution}", file=sys.stderr)
+        for equation in undetermined_parts(ship):
+            print(
+                f"the vessel file gives no model, only comments: no parameter of the {equation} "
+                "equation is identifiable from these logs; add the log of a zig-zag",
+                file=sys.stderr,
+            )
     return ExitCode.DATA_LOST if ship.data_lost else ExitCode.OK
+
+
+def _measured_logs(paths: Sequence[str], arguments: argparse.Namespace) -> "list[Log]":
+    """Open the logs that are of trials; report the references and truths that are skipped."""
+    from analysis.identification.runs import is_measured
+    from shiplog.mcap.stream import open_log
+
+    uncut = {path: open_log(path) for path in paths}
+    skipped = [path for path, log in uncut.items() if not is_measured(log)]
+    if skipped and len(skipped) == len(paths):
+        raise UsageError(
+            "references of `shiplog check` and simulated truths are no trials; give the logs "
+            f"themselves, not {', '.join(skipped)}"
+        )
+    if skipped:
+        names = ", ".join(Path(path).name for path in skipped)
+        print(f"skipped, as references or simulated truths: {names}", file=sys.stderr)
+    return [open_cut(path, arguments) for path in paths if path not in skipped]
 
 
 # ---- check

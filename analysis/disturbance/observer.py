@@ -10,7 +10,7 @@ measurements", eqs (3), (4).
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import degrees, inf, pi, sqrt
+from math import degrees, inf, pi, radians, sqrt
 
 import numpy as np
 
@@ -32,6 +32,8 @@ from shiplog.vessel.settings import (
 from .loop import initial_state, make_ship_observer, observe_chunk, surge_plant, yaw_plant
 from .observer_design import ForceModel, Sampling, force_observer
 
+RUDDER_MAX = radians(35)  # of most ships; used where the steering gear is not known
+MIN_EFFECT_SHARE = 0.3  # of the rudder's largest effect: below it an angle is not counted
 # of each disturbance: the SI unit, the unit displayed, and the factor from the first to the second
 DISTURBANCE_UNITS = {
     "yaw": ("rad/s³", "0.001 deg/s³", degrees(1) * 1e3),
@@ -131,6 +133,8 @@ class ForceObserver:
         The kinds of disturbance, the pattern of the poles and their frequencies.
     wave_frequency
         Frequency of the wave, rad/s; required where a wave is one of the kinds.
+    rudder_max
+        The ship's largest rudder angle, rad, for `excess_share`.
 
     Raises
     ------
@@ -146,8 +150,10 @@ class ForceObserver:
         stats: SignalStats,
         settings: DisturbanceSettings = DEFAULT_SETTINGS,
         wave_frequency: float | None = None,
+        *,
+        rudder_max: float = RUDDER_MAX,
     ) -> None:
-        self._model = model
+        self._model, self._rudder_max = model, rudder_max
         models = force_models(settings, wave_frequency, stats)
         stiffness = yaw_stiffness(model, stats.yaw_rate_rms)
         yaw = force_observer(yaw_plant(model, stiffness), *models["yaw"])
@@ -157,6 +163,9 @@ class ForceObserver:
         self._state = initial_state(self._observer, stats)
         # at almost no speed and thrust the rudder has no effect, and the equivalent angle is NaN
         self._min_rudder_effect = 1e-3 * abs(model.d) * stats.max_rudder_effect
+        self._least_counted_effect = MIN_EFFECT_SHARE * abs(model.d) * stats.max_rudder_effect
+        self._unsettled = int(yaw.settling_secs / stats.dt_secs)
+        self._counted = self._excessive = 0
         self._rudder_effects = Quantiles()
         self._stds: dict[str, float] = {}
         self._summaries: dict[str, _SummaryCollector] = {}
@@ -193,6 +202,7 @@ class ForceObserver:
         effective = np.abs(effect) > self._min_rudder_effect
         with np.errstate(divide="ignore", invalid="ignore"):
             rudder = np.where(effective, yaw / effect, np.nan)
+        self._count_excess(rudder, np.abs(effect))
         disturbance = Disturbance(
             yaw,
             surge,
@@ -203,6 +213,23 @@ class ForceObserver:
         for name, collector in self._summaries.items():
             collector.add(getattr(disturbance, name))
         return disturbance
+
+    def _count_excess(self, rudder: FloatArray, effect: FloatArray) -> None:
+        """Count the instants at which the disturbance exceeds the rudder that the ship has.
+
+        The transient at the start does not count, nor instants at which the rudder has little
+        effect: there a small moment is worth much rudder.
+        """
+        counted = (effect > self._least_counted_effect)[self._unsettled :]
+        excessive = ~(np.abs(rudder[self._unsettled :]) <= self._rudder_max)
+        self._counted += int(np.sum(counted))
+        self._excessive += int(np.sum(counted & excessive))
+        self._unsettled = max(self._unsettled - len(rudder), 0)
+
+    @property
+    def excess_share(self) -> float:
+        """Share of the instants at which the yaw disturbance exceeds the largest rudder angle."""
+        return self._excessive / self._counted if self._counted else 0.0
 
     def result(self) -> dict[str, DisturbanceSummary]:
         """Return the summaries of yaw, rudder, surge and the waves estimated, over all chunks."""

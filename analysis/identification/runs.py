@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
+from pathlib import Path
 
 import numpy as np
 
@@ -244,7 +245,7 @@ def common_vessel(runs: Sequence[Run], given: Vessel | None) -> Vessel | None:
 def _physical(vessel: Vessel) -> Vessel:
     """Return the vessel with name, approach, unit and estimator settings set to defaults."""
     return replace(
-        vessel, name="", approach_rpm=1.0, angle_unit="rad",
+        vessel, name="", approach_rpm=1.0, angle_unit="rad", gear_given=(),
         filter=FilterSettings(), disturbance=DisturbanceSettings(),
         identifier=IdentifierSettings(),
     )  # fmt: skip
@@ -278,6 +279,25 @@ def consistency_warnings(runs: Sequence[Run]) -> Iterator[str]:
             f"{speed_per_rpm[slow]:.3g}: different ships, different units, or no steady start; "
             "check the logs, one model is fitted to both"
         )
+
+
+def is_measured(log: Log) -> bool:
+    """Return whether a log is of a trial, and not a reference of `check` or a simulated truth.
+
+    Parameters
+    ----------
+    log
+        An open log.
+
+    Examples
+    --------
+    >>> from shiplog import open_log
+    >>> is_measured(open_log("sample_data/zigzag_20_20.ref.mcap"))
+    False
+    """
+    name = Path(log.name).name
+    by_metadata = "reference_of" in log.metadata or "truth_of" in log.metadata
+    return not (by_metadata or name.endswith((".ref.mcap", ".truth.mcap")))
 
 
 def require_distinct_logs(fitted: Iterable[str], held_out: Iterable[str]) -> None:

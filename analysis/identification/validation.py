@@ -11,6 +11,7 @@ import numpy as np
 from analysis.identification.fit.output_error import OutputError
 from analysis.identification.fit.segment import Segment
 from analysis.manoeuvres.execute import first_execute
+from analysis.manoeuvres.indices import reason_without_indices
 from analysis.manoeuvres.manoeuvre import ManoeuvreIndex
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
@@ -42,6 +43,8 @@ class Validation:
         model predicts, and of the distance between the tracks (``track``): rad/s, m/s, rad, m.
     indices
         Indices of a turning circle or of a zig-zag; empty for any other run.
+    no_indices
+        The reason why there are no indices; empty where there are some.
     """
 
     segment: Segment
@@ -50,6 +53,7 @@ class Validation:
     measured_track: FloatArray
     rms: dict[str, float]
     indices: tuple[ManoeuvreIndex, ...]
+    no_indices: str = ""
 
     @property
     def diverged(self) -> bool:
@@ -98,7 +102,16 @@ def _validate_segment(fit: OutputError, segment: Segment, fixes: FloatArray | No
     }
     rms["track"] = nan_rms(np.hypot(*(track - measured_track).T))
     indices = predicted_indices(segment, measured, measured_track, simulated, track)
-    return Validation(segment, simulated, track, measured_track, rms, indices)
+    reason = "" if indices else _reason(segment, measured, simulated)
+    return Validation(segment, simulated, track, measured_track, rms, indices, reason)
+
+
+def _reason(segment: Segment, measured: FloatArray, simulated: FloatArray) -> str:
+    """Explain why a segment has no indices."""
+    if not np.isfinite(simulated).all():
+        return "the simulation diverges"
+    heading = measured[:, HEADING]
+    return reason_without_indices(segment.signals["rudder"], heading, segment.dt_secs)
 
 
 def filled_measurements(segment: Segment, heading: float = 0.0) -> FloatArray:

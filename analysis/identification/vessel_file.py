@@ -34,6 +34,7 @@ ANGLE_POWERS = {"b2": 1, "b3": 2, "f": 2}  # power of the angle in the unit's de
 PER_RADIAN = {"rad": 1.0, "deg": 180 / pi}
 # of the surge equations of all models; the other parameters are of the yaw and sway equations
 SURGE_PARAMETERS = ("f", "f1", "f2", "g", "h", "p", "xvr", "x4", "xd")
+NOT_CONVERGED = "NOT CONVERGED: the value of the last iteration"
 
 PAPER_MODEL_COMMENT = (
     "",
@@ -61,18 +62,17 @@ def vessel_toml(ship: IdentifiedShip, on_progress: ProgressCallback = no_progres
     text
         TOML; the comment of each value is its 95 % interval or a caution.
 
-    Raises
-    ------
-    LogError
-        No parameter of the yaw equations, or none of the surge equations, is identifiable, and
-        not all of them have a prior either.
+    Notes
+    -----
+    Where an equation is not identifiable, the model is written in comments: a vessel file gives a
+    whole model or none. The rest of the file is valid, and a replay fits a first model to its log.
     """
-    for part in _undetermined_parts(ship.model, ship.uncertainty):
-        raise LogError(
-            f"no parameter of the {part} equation is identifiable from these logs, so that no "
-            "vessel file is written; add the log of a zig-zag"
-        )
-    unit = _angle_unit(ship.vessel)
+    unit, missing = _angle_unit(ship.vessel), undetermined_parts(ship)
+    if missing:
+        is_paper = ship.model.name in PAPER_MODELS
+        paper_lines = _paper_sections(ship.fit, ship.uncertainty, unit) if is_paper else ()
+        lines = _as_comments(paper_lines or _model_section(ship), missing)
+        return _text([*_head(ship), *lines, *_rudder(ship.vessel)])
     if ship.model.name in PAPER_MODELS:
         own = [*_head(ship), *_paper_sections(ship.fit, ship.uncertainty, unit)]
         return _text([*own, *_rudder(ship.vessel, ship.fit)])
@@ -90,12 +90,26 @@ def _text(lines: Iterable[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _undetermined_parts(model: Model, estimates: Uncertainty) -> Iterator[str]:
-    """Yield "yaw" and "surge" where neither data nor priors determine any of their parameters.
+def _as_comments(lines: Iterable[str], missing: Iterable[str]) -> Iterator[str]:
+    """Yield the lines of a model as comments, after the reason."""
+    yield ""
+    for part in missing:
+        yield f"# MISSING: the {part} equation; none of its parameters is identifiable from these"
+        yield "# logs, so that the model is given in comments only; add the log of a zig-zag."
+    for line in "\n".join(lines).splitlines():
+        yield f"# {line}" if line else "#"
+
+
+def undetermined_parts(ship: IdentifiedShip) -> tuple[str, ...]:
+    """Return "yaw" and "surge" where neither data nor priors determine any of their parameters.
 
     Judged by the standard deviations of the noise alone: those of a model that does not fit the
     ship are wider, but the model may still be close enough to be used.
     """
+    return tuple(_undetermined(ship.model, ship.uncertainty))
+
+
+def _undetermined(model: Model, estimates: Uncertainty) -> Iterator[str]:
     by_data = estimates.coloured <= MAX_RELATIVE_STD * np.abs(estimates.values)
     by_data &= estimates.prior_share <= MAX_PRIOR_SHARE
     for part in ("yaw", "surge"):
@@ -153,7 +167,8 @@ def _angle_unit(vessel: Vessel | None) -> str:
 
 def _model_section(ship: IdentifiedShip) -> Iterator[str]:
     """Yield `[model]`."""
-    scale, comment = ship.fit.problem.scale, _comments(ship.uncertainty)
+    scale = ship.fit.problem.scale
+    comment = _comments(ship.uncertainty, converged=ship.fit.minimum.converged)
     yield "\n# `shiplog record simulate` uses this model."
     yield "[model]"
     yield f"name = {_quoted(ship.model.name)}"
@@ -167,7 +182,8 @@ def _paper_sections(fit: OutputError, estimates: Uncertainty, unit: str) -> Iter
     """Yield `[yaw]` and `[surge]`, with angles in `unit`."""
     divisors = {name: PER_RADIAN[unit] ** power for name, power in ANGLE_POWERS.items()}
     c = _coefficients(fit)
-    comment = _comments(estimates, divisors, tied=fit.problem.model.name == "burylin-tied")
+    tied = fit.problem.model.name == "burylin-tied"
+    comment = _comments(estimates, divisors, converged=fit.minimum.converged, tied=tied)
     for section, names in SECTIONS.items():
         yield f"\n[{section}]"
         for name in names:
@@ -183,10 +199,13 @@ def _rudder(vessel: Vessel | None, paper: OutputError | None = None) -> Iterator
         c = _coefficients(paper)
         for name in RUDDER_PARAMETERS:
             yield f"{name} = {getattr(c, name)!r}  # {COEFFICIENT_UNITS[name]}, fixed"
-    if vessel is not None:
-        unit, factor = vessel.angle_unit, PER_RADIAN[vessel.angle_unit]
-        yield f"max = {vessel.rudder_max * factor!r}  # {unit}"
-        yield f"rate = {vessel.rudder_rate * factor!r}  # {unit}/s"
+    unit = _angle_unit(vessel)
+    defaults = Vessel("", None)
+    for key, name, suffix in (("max", "rudder_max", ""), ("rate", "rudder_rate", "/s")):
+        value = getattr(vessel or defaults, name)
+        given = vessel is not None and key in vessel.gear_given
+        if given or value != getattr(defaults, name):
+            yield f"{key} = {value * PER_RADIAN[unit]!r}  # {unit}{suffix}"
 
 
 def _coefficients(fit: OutputError) -> Coefficients:
@@ -195,16 +214,24 @@ def _coefficients(fit: OutputError) -> Coefficients:
 
 
 def _comments(
-    estimates: Uncertainty, divisors: Mapping[str, float] | None = None, *, tied: bool = False
+    estimates: Uncertainty,
+    divisors: Mapping[str, float] | None = None,
+    *,
+    converged: bool,
+    tied: bool = False,
 ) -> Callable[[str], str]:
     """Return a function that comments on a parameter: its 95 % interval, or a caution.
 
-    `divisors` are what the values are divided by; `tied` where the fit is of the tied form.
+    `divisors` are what the values are divided by; `tied` where the fit is of the tied form. Each
+    value of a fit that has not converged is marked.
     """
     half = dict(zip(estimates.names, 1.96 * estimates.std, strict=True))
     prior = dict(zip(estimates.names, estimates.prior_share > MAX_PRIOR_SHARE, strict=True))
 
     def comment(name: str) -> str:
+        return precision(name) + ("" if converged or name not in half else f"; {NOT_CONVERGED}")
+
+    def precision(name: str) -> str:
         if name in estimates.unidentifiable:
             origin = "mostly its prior" if prior[name] else "one of many values that fit them"
             return f"NOT IDENTIFIABLE from these logs: {origin}"

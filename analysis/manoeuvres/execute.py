@@ -12,6 +12,7 @@ from shiplog.types import FloatArray
 REST_TOLERANCE = radians(0.5)  # a rudder within it is at rest, or held at one angle
 REST_SECS = 3.0  # at the start of a run, whose median rudder is the rest position
 HELM_SECS = 3.0  # before an order, whose median rudder is the helm that the order ends
+SLOW_WINDOWS = 3  # of `HELM_SECS`, over which an angle of an order's size must be steady
 ORDER_SHARE = 0.6  # of the largest rudder angle: beyond it the rudder follows the manoeuvre's order
 MIN_RUDDER_ORDER = 4 * REST_TOLERANCE  # a smaller deflection is no order
 MAX_SPIKE_SECS = 3.0  # a shorter deflection of the rudder is a measurement error
@@ -52,7 +53,10 @@ def first_execute(rudder: FloatArray, dt: float) -> int | None:
     towards, window = rudder * np.sign(rudder[ordered]), max(1, round(HELM_SECS / dt))
     for k in range(ordered, 0, -1):
         helm = towards[max(0, k - window) : k + 1]
-        if towards[k] - np.median(helm) <= REST_TOLERANCE:
+        longer = towards[max(0, k - SLOW_WINDOWS * window) : k + 1]  # a slow ramp is no helm
+        is_small = towards[k] <= MIN_RUDDER_ORDER
+        earlier = np.median(helm) if is_small else min(np.median(helm), np.median(longer))
+        if towards[k] - earlier <= REST_TOLERANCE:
             return k
     return 0
 

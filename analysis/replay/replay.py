@@ -37,6 +37,7 @@ from .plan import Plan, changed_settings, plan_replay, with_default_settings
 from .residuals import ResidualSummary, ResidualTest
 from .track import Track, Tracker
 
+MIN_EXCESS_SHARE = 0.1  # of the trial, with a disturbance beyond the rudder: the model is wrong
 DESIGN_ERRORS = (UsageError, np.linalg.LinAlgError, ArithmeticError)
 # the steps reported as progress; the fourth only where states are smoothed
 PROGRESS_STEPS = ("check the log", "resample", "choose the model", "smooth", "replay")
@@ -143,6 +144,7 @@ def analyse(
     filter: FilterKind | str | None = None,  # noqa: A002 - as on the command line
     settings: Mapping[str, object] | None = None,
     sources: Mapping[str, str] | None = None,
+    length: float | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> Analysis:
     """Replay a log: filter it, estimate disturbances and coefficients, test the residuals.
@@ -162,6 +164,8 @@ def analyse(
         Settings that take precedence over the vessel's, such as ``{"filter.gate": 4.0}``.
     sources
         The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
+    length
+        The ship's length, m, in place of the vessel's.
     on_progress
         Called with each of `PROGRESS_STEPS` and its share done.
 
@@ -183,7 +187,13 @@ def analyse(
     if isinstance(log, str | os.PathLike):
         log = open_log(log)
     plan = plan_replay(
-        log, vessel, filter=filter, settings=settings, sources=sources, on_progress=on_progress
+        log,
+        vessel,
+        filter=filter,
+        settings=settings,
+        sources=sources,
+        length=length,
+        on_progress=on_progress,
     )
     replay = Replay(log, plan, on_progress=on_progress)
     whole = concatenate(list(replay.chunks()))
@@ -334,6 +344,7 @@ class _Stages:
         residuals = tuple(test.result() for test in self._residual_tests)
         changes = self._change_test.result()
         warnings = [residual.warning for residual in residuals if residual.warning]
+        warnings += _excess_warnings(self._plan, self._observer.excess_share)
         return Findings(
             plan=self._plan,
             metadata=metadata,
@@ -369,10 +380,11 @@ def _estimators(plan: Plan, log_name: str) -> tuple[Filter, ForceObserver]:
     try:
         return _design(plan)
     except DESIGN_ERRORS as error:
-        names = _unsuitable_settings(plan)
+        with np.errstate(over="ignore", invalid="ignore"):
+            names = _unsuitable_settings(plan)
         if names:
             raise UsageError(
-                f"{names} does not suit this log: {error}; choose another value: {log_name}"
+                f"{names} does not suit this log or its model: {error}: {log_name}"
             ) from error
         raise _diverged(plan, log_name, f" ({error})") from error
 
@@ -382,7 +394,14 @@ def _design(plan: Plan) -> tuple[Filter, ForceObserver]:
     settings = plan.disturbance_settings
     with np.errstate(over="ignore", invalid="ignore"):
         filter_ = plan.filter_kind.make(model, noise, stats, plan.vessel.filter)
-        return filter_, ForceObserver(model, noise, stats, settings, settings.wave_frequency)
+        return filter_, ForceObserver(
+            model,
+            noise,
+            stats,
+            settings,
+            settings.wave_frequency,
+            rudder_max=plan.vessel.rudder_max,
+        )
 
 
 def _unsuitable_settings(plan: Plan) -> str:
@@ -405,6 +424,19 @@ def _diverged(plan: Plan, log_name: str, reason: str = "") -> LogError:
         f"({plan.model_origin}) or the settings do not fit this log; give another model with "
         f"--vessel{settings}: {log_name}"
     )
+
+
+def _excess_warnings(plan: Plan, share: float) -> list[str]:
+    """Warn where the yaw disturbance is worth more rudder than the ship has."""
+    if share < MIN_EXCESS_SHARE:
+        return []
+    text = (
+        f"for {100 * share:.0f} % of the trial the yaw disturbance is worth more than the largest "
+        f"rudder angle ({np.degrees(plan.vessel.rudder_max):.0f}°): the model "
+        f"({plan.model_origin}) is wrong for this log; check the signs and units of rudder and "
+        "yaw rate, or give another model with --vessel"
+    )
+    return [text]
 
 
 def _residual_test(plan: Plan, output: int) -> ResidualTest:

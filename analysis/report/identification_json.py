@@ -70,6 +70,7 @@ def _parameter(ship: IdentifiedShip, i: int) -> dict[str, Any]:
         "value": estimates.values[i] if identifiable else None,
         "unit": ship.model.parameter(name).unit,
         "identifiable": identifiable,
+        "converged": ship.fit.minimum.converged,
         "interval_95": estimates.interval[i].tolist() if identifiable else None,
         "std": estimates.std[i],
         "cramer_rao_std": estimates.bound[i],
@@ -120,6 +121,7 @@ def _validation(validation: Validation) -> dict[str, Any]:
         "log": validation.segment.name,
         "diverged": validation.diverged,
         "rms": validation.rms,
+        "no_indices": validation.no_indices or None,
         "indices": [
             {
                 "name": index.name,

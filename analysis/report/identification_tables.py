@@ -22,6 +22,7 @@ SENSORS = {
     "speed": "speed log",
     "heading": "compass",
 }  # whose bias is estimated
+NOT_CONVERGED_MARK = " (*)"  # after each value of a fit that has not converged
 MIN_CORRELATION, MAX_PAIRS = 0.97, 3  # of the correlated pairs that are reported
 
 
@@ -89,13 +90,14 @@ def mean_misfits(candidate: Candidate) -> list[float]:
 
 def _parameter_table(ship: IdentifiedShip) -> TextTable:
     estimates, rows = ship.uncertainty, []
+    mark = "" if ship.fit.minimum.converged else NOT_CONVERGED_MARK
     for i, name in enumerate(estimates.names):
         share, unit = _percent(estimates.prior_share[i]), ship.model.parameter(name).unit
         if name in estimates.unidentifiable:
-            rows.append((name, "not identifiable", "", "", share, unit))
+            rows.append((name, f"not identifiable{mark}", "", "", share, unit))
             continue
         half, bound = 1.96 * estimates.std[i], 1.96 * estimates.bound[i]
-        value = f"{estimates.values[i]:.5g}"
+        value = f"{estimates.values[i]:.5g}{mark}"
         rows.append((name, value, f"± {half:.2g}", f"± {bound:.2g}", share, unit))
     for name, fixed in ship.fixed.items():
         rows.append((name, f"{fixed:.5g}", "fixed", "", "", ship.model.parameter(name).unit))
@@ -107,6 +109,11 @@ def _parameter_table(ship: IdentifiedShip) -> TextTable:
 
 
 def _parameter_remarks(ship: IdentifiedShip) -> Iterator[str]:
+    if not ship.fit.minimum.converged:
+        yield (
+            f"{NOT_CONVERGED_MARK.strip()}: the fit has not converged; the value is that of the "
+            "last iteration, and its interval is not valid."
+        )
     for manoeuvre, names in _names_by_manoeuvre(ship).items():
         yield (
             f"{', '.join(names)}: not identifiable from these logs; "
@@ -239,13 +246,19 @@ def _validation_table(ship: IdentifiedShip) -> TextTable:
         "rudder and revolutions: the rms of simulated minus measured, and the distance between "
         "the final positions."
     )
-    return TextTable("Validation: rms of simulated minus measured", columns, tuple(rows), (remark,))
+    reasons = [
+        f"{each.segment.name}: no manoeuvring indices; {each.no_indices}."
+        for each in ship.validations
+        if each.no_indices
+    ]
+    title = "Validation: rms of simulated minus measured"
+    return TextTable(title, columns, tuple(rows), (remark, *reasons))
 
 
 def _index_table(validation: Validation) -> TextTable:
     rows = tuple(map(_index_row, validation.indices))
     columns = ("index", "measured", "simulated", "error", "error [%]")
-    remark = "Counted from where the rudder departs from its rest by 0.5°."
+    remark = "Counted from the rudder order that leads to the manoeuvre's angle."
     return TextTable(f"Manoeuvring indices: {validation.segment.name}", columns, rows, (remark,))
 
 

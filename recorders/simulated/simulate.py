@@ -69,7 +69,8 @@ class SimulatedTrial:
             for name, values in self.trajectory.at(times).items()
             if name != "sway" or name in ship.model.outputs
         ]
-        return TrialLog("truth", tuple(channels), self.metadata, self.vessel_toml)
+        metadata = dict(self.metadata) | {"truth_of": self.metadata.get("manoeuvre", "a trial")}
+        return TrialLog("truth", tuple(channels), metadata, self.vessel_toml)
 
 
 def simulate(

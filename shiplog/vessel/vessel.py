@@ -45,6 +45,9 @@ class Vessel:
         Largest rudder angle, rad.
     rudder_rate
         Rate of the steering gear, rad/s.
+    gear_given
+        Keys of the steering gear that the file gives, ``max`` and ``rate``; the others have their
+        defaults.
     filter, disturbance, identifier
         Settings of a replay.
     angle_unit
@@ -59,6 +62,7 @@ class Vessel:
     approach_rpm: float = 80.0
     rudder_max: float = 35 * pi / 180
     rudder_rate: float = 2.5 * pi / 180
+    gear_given: tuple[str, ...] = ()
     filter: FilterSettings = field(default_factory=FilterSettings)
     disturbance: DisturbanceSettings = field(default_factory=DisturbanceSettings)
     identifier: IdentifierSettings = field(default_factory=IdentifierSettings)

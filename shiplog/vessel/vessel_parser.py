@@ -29,6 +29,7 @@ TIME_CONSTANTS = ("T1", "T2", "T3", "c2", "c3")
 PRODUCTS = ("a", "b1", "b2", "b3", "d", "e")
 ALPHAS = ("alpha1", "alpha2", "alpha3")
 SURGE_KEYS = ("f", "g", "h")
+GEAR_KEYS = ("max", "rate")
 POSITIVE_KEYS = {"T1", "T2", "approach_rpm", "length", "max", "rate"}
 
 ANY = (-inf, inf)
@@ -274,4 +275,5 @@ def _vessel(
         approach_rpm=top.get("approach_rpm", defaults.approach_rpm),
         rudder_max=rudder["max"] / per_rad if "max" in rudder else defaults.rudder_max,
         rudder_rate=rudder["rate"] / per_rad if "rate" in rudder else defaults.rudder_rate,
+        gear_given=tuple(key for key in GEAR_KEYS if key in rudder),
     )

@@ -17,6 +17,8 @@ from analysis.identification.model_selection import Candidate
 from analysis.identification.vessel_file import vessel_toml
 from analysis.replay.plan import FITTED_MODEL
 from analysis.replay.replay import analyse
+from analysis.report.identification_json import identification_json
+from analysis.report.identification_tables import identification_tables
 from recorders.simulated.manoeuvres import manoeuvre
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
@@ -235,14 +237,42 @@ def test_values_that_are_not_identifiable_are_marked_with_their_origin() -> None
 
 
 @pytest.mark.xdist_group("identified nomoto")
-def test_an_equation_without_identifiable_parameters_is_not_written() -> None:
+def test_a_model_without_identifiable_parameters_is_written_in_comments() -> None:
     ship, _ = identified("nomoto")
     estimates = ship.uncertainty
     for part, names in (("yaw", ("a", "k")), ("surge", ("f", "g", "h"))):
         std = np.where(np.isin(estimates.names, names), 100.0, estimates.coloured)
         unidentifiable = replace(ship, uncertainty=replace(estimates, std=std, coloured=std))
-        with pytest.raises(LogError, match=f"no parameter of the {part} equation"):
-            vessel_toml(unidentifiable)
+        text = vessel_toml(unidentifiable)
+        assert f"# MISSING: the {part} equation" in text
+        assert f"# k = {ship.parameters['k']!r}" in text
+        vessel = parse_vessel(text, "v.toml")
+        assert (vessel.model, vessel.coefficients) == (None, None)
+        assert (vessel.length, vessel.gear_given) == (LENGTH, ("max", "rate"))
+
+
+@pytest.mark.xdist_group("identified nomoto")
+def test_a_gear_that_is_not_given_is_not_written() -> None:
+    ship, _ = identified("nomoto")
+    text = vessel_toml(replace(ship, vessel=Vessel("", None, length=LENGTH)))
+    assert "rate =" not in text
+    assert "max =" not in text
+    assert parse_vessel(text, "v.toml").gear_given == ()
+
+
+@pytest.mark.xdist_group("identified nomoto")
+def test_every_value_of_a_fit_that_has_not_converged_is_marked() -> None:
+    ship, _ = identified("nomoto")
+    minimum = replace(ship.fit.minimum, converged=False)
+    stopped = replace(ship, fit=replace(ship.fit, minimum=minimum))
+    lines = {line.split(" = ")[0]: line for line in vessel_toml(stopped).split("\n")}
+    values = {row[0]: row[1] for row in identification_tables(stopped)[0].rows}
+    parameters = identification_json(stopped)["parameters"]
+    for name in ship.uncertainty.names:
+        assert "NOT CONVERGED" in lines[name]
+        assert values[name].endswith("(*)")
+        assert not parameters[name]["converged"]
+        assert "(*)" not in {row[0]: row[1] for row in identification_tables(ship)[0].rows}[name]
 
 
 @pytest.mark.xdist_group("identified nomoto")
