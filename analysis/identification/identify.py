@@ -102,7 +102,7 @@ def identify(
         require_two_runs(len(to_fit))
     steps = _Steps(on_progress, auto=model == AUTO)
     steps.begin("read")
-    runs, held_out = distinct_runs(to_fit, to_predict, sources, strict=strict)
+    runs, held_out = distinct_runs(to_fit, to_predict, sources, vessel, strict=strict)
     ship = with_length(common_vessel([*runs, *held_out], vessel), length)
     steps.begin("fit")
     candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)

@@ -13,7 +13,7 @@ from shiplog.checks.consistency.consistency_check import ConsistencyCheck
 from shiplog.checks.consistency.findings import Finding, refuse_contradictions
 from shiplog.errors import LogError, UsageError
 from shiplog.geodesy import LocalFrame, positions_of
-from shiplog.resampling import choose_clock, resample_chunks
+from shiplog.resampling import choose_clock, resample_chunks, with_steering_gear
 from shiplog.screening import ScreenedLog, screen_log
 from shiplog.types import (
     FloatArray,
@@ -60,7 +60,11 @@ class Run:
 
 
 def run_from_log(
-    log: Log, sources: Mapping[str, str] | None = None, *, strict: bool = False
+    log: Log,
+    sources: Mapping[str, str] | None = None,
+    given: Vessel | None = None,
+    *,
+    strict: bool = False,
 ) -> Run:
     """Resample a log, split it into segments and check its data.
 
@@ -70,6 +74,8 @@ def run_from_log(
         A log with `REQUIRED_CHANNELS`; `OPTIONAL_CHANNELS` and positions are used if present.
     sources
         The source to use, by the name of a channel that has several.
+    given
+        The vessel, whose steering gear follows an order of the rudder; by default that of the log.
     strict
         Refuse a log whose channels contradict each other in unit or sign.
 
@@ -91,11 +97,13 @@ def run_from_log(
         sources=sources,
     )
     stats = screened.screening.stats
-    clock = choose_clock(screened, stats, None, REQUIRED_CHANNELS, OPTIONAL_CHANNELS)
-    signals = concatenate_signals(resample_chunks(screened.chunks(), clock))
-    segments = split_into_segments(signals, log.name)
     toml = log.vessel_toml
     vessel = parse_vessel(toml, f"vessel.toml in {log.name}") if toml is not None else None
+    gear = given or vessel or Vessel("", None)
+    clock = choose_clock(screened, stats, None, REQUIRED_CHANNELS, OPTIONAL_CHANNELS)
+    clock = with_steering_gear(clock, gear.rudder_rate)
+    signals = concatenate_signals(resample_chunks(screened.chunks(), clock))
+    segments = split_into_segments(signals, log.name)
     position = stats.get("position")
     fixes = _north_east(screened, position) if position is not None else None
     findings = _consistency(screened)
@@ -116,6 +124,7 @@ def distinct_runs(
     logs: Sequence[Log],
     held_out: Sequence[Log],
     sources: Mapping[str, str] | None = None,
+    given: Vessel | None = None,
     *,
     strict: bool = False,
 ) -> tuple[list[Run], list[Run]]:
@@ -129,6 +138,8 @@ def distinct_runs(
         The logs to predict.
     sources
         The source to use, by the name of a channel that has several, in each log that has it.
+    given
+        The vessel file named by the user.
     strict
         Refuse a log whose channels contradict each other in unit or sign.
 
@@ -144,7 +155,7 @@ def distinct_runs(
     """
     runs: list[Run] = []
     for log in (*logs, *held_out):
-        run = run_from_log(log, sources, strict=strict)
+        run = run_from_log(log, sources, given, strict=strict)
         for other in runs:
             if _same_data(run, other):
                 raise UsageError(

@@ -20,7 +20,7 @@ from shiplog.checks.channel_stats import LogStats
 from shiplog.checks.consistency.consistency_check import ConsistencyCheck
 from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.progress import ProgressCallback
-from shiplog.resampling import Clock, choose_clock, resample_chunks
+from shiplog.resampling import Clock, choose_clock, resample_chunks, with_steering_gear
 from shiplog.screening import ScreenedLog, Screening, screen_log
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
 from shiplog.types import FloatArray, Log
@@ -80,7 +80,7 @@ class SecondPass:
 
 
 def first_pass(
-    log: Log, sources: Mapping[str, str] | None, on_progress: ProgressCallback
+    log: Log, vessel: Vessel, sources: Mapping[str, str] | None, on_progress: ProgressCallback
 ) -> FirstPass:
     """Screen a log and define the clock of its replay.
 
@@ -88,6 +88,8 @@ def first_pass(
     ----------
     log
         The log as recorded.
+    vessel
+        The vessel, whose steering gear follows an order of the rudder.
     sources
         The source to use, by the name of a quantity that has several.
     on_progress
@@ -104,7 +106,7 @@ def first_pass(
     )
     stats = screened.screening.stats
     clock = choose_clock(screened, stats, channels=REQUIRED_CHANNELS, optional=("heading",))
-    return FirstPass(screened, clock)
+    return FirstPass(screened, with_steering_gear(clock, vessel.rudder_rate))
 
 
 def second_pass(

@@ -142,7 +142,7 @@ def plan_replay(
     vessel, origin = _stated_vessel(log, vessel, settings or {})
     vessel = with_length(vessel, length) or vessel
     vessel, kind = _with_filter(vessel, filter)
-    first = first_pass(log, sources, on_progress)
+    first = first_pass(log, vessel, sources, on_progress)
     second = second_pass(first, vessel, on_progress, strict=strict)
     on_progress("choose the model", 0.0)
     warnings = [*first.log.warnings, *second.warnings]

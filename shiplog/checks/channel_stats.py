@@ -12,11 +12,12 @@ from shiplog.types import Channel, ChannelsByName
 from shiplog.units import CATALOGUE
 
 from .fixes import FixScreening
-from .on_change import HoldStats
+from .on_change import HoldStats, is_order
 from .stuck import StuckStats
 
 GAP_PERIODS = 5.0  # an interval longer than this many typical ones is a gap,
 GAP_SECS = 1.0  # if it is longer than this, too
+MIN_ORDER_STEP = 0.06  # rad, about 3.5 deg: no steering gear moves a rudder by as much at once
 
 
 @dataclass(frozen=True)
@@ -206,6 +207,15 @@ class LogStats(ChannelsByName[ChannelStats]):
         """Time from the first measurement to the last, in s."""
         start, end = self.span_ns
         return (end - start) * 1e-9
+
+
+def is_rudder_order(channel: ChannelStats) -> bool:
+    """Return whether a rudder channel is the order, by its source or by its steps.
+
+    A held rudder is the order if it changes by more than `MIN_ORDER_STEP` at once.
+    """
+    steps = channel.hold is not None and channel.hold.largest_step > MIN_ORDER_STEP
+    return channel.name == "rudder" and (steps or is_order(channel.source))
 
 
 def gap_threshold_secs(interval_secs: float) -> float:

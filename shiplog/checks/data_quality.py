@@ -5,13 +5,12 @@ from collections.abc import Iterator
 from shiplog.errors import LogError
 from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 
-from .channel_stats import ChannelStats, LogStats
-from .on_change import INTERPOLATION_KEY, INTERPOLATIONS, is_order
+from .channel_stats import ChannelStats, LogStats, is_rudder_order
+from .on_change import INTERPOLATION_KEY, INTERPOLATIONS
 
 MAX_IRREGULAR_SHARE = 0.1  # of the intervals
 MIN_SAMPLES_PER_STAMP = 1.5  # from which the time stamps are taken to be coarse
 MIN_TAIL_SECS = 10.0  # held at the end of a log, below which nothing is reported
-MIN_ORDER_STEP = 0.06  # rad, about 3.5 deg: a change at once of which no steering gear is capable
 MIN_ROWS_PER_VALUE = 1.5  # from which a table is taken to have empty cells on purpose
 
 
@@ -86,17 +85,18 @@ def hold_warnings(channel: ChannelStats, end_ns: int) -> Iterator[str]:
                 f"held at its last value for the last {after:.1f} s of the log, longer than "
                 f"between any of its {samples}; if the sensor was lost, cut the log there"
             )
-    if channel.name == "rudder" and (is_order(channel.source) or _jumps(channel)):
+    if is_rudder_order(channel):
         jump = f" (changes of up to {_displayed(channel, hold.largest_step)})" if hold else ""
-        yield (
-            f"seems to be the order, not the angle of the rudder{jump}; the lag of the steering "
-            "gear is then taken for the ship's; use the rudder's feedback where there is one"
+        effect = (
+            "it is followed at the rate of the steering gear, 2.5 deg/s unless the vessel file "
+            "states rudder.rate"
+            if hold
+            else "the lag of the steering gear is taken for the ship's"
         )
-
-
-def _jumps(channel: ChannelStats) -> bool:
-    """Whether a held rudder changes by more than a steering gear turns it between two samples."""
-    return channel.hold is not None and channel.hold.largest_step > MIN_ORDER_STEP
+        yield (
+            f"seems to be the order, not the angle of the rudder{jump}; {effect}; use the rudder's "
+            "feedback where there is one"
+        )
 
 
 def times_in_words(count: int) -> str:

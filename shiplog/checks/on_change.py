@@ -32,11 +32,15 @@ class HoldStats:
         Longest interval between two samples, s.
     largest_step
         Largest change from one sample to the next, in the channel's unit.
+    max_rate
+        Rate at which the signal moves to a new value, unit/s; infinite for steps. That of the
+        steering gear, where the channel is the order of the rudder.
     """
 
     stated: bool
     longest_secs: float
     largest_step: float
+    max_rate: float = np.inf
 
 
 def stated_interpolation(channel: Channel) -> str:

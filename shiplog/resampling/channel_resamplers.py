@@ -40,7 +40,8 @@ def channel_resampler(channel: ChannelStats, clock: Clock) -> ChannelResampler:
     """
     kind = CATALOGUE.get(channel.name)
     if channel.hold:
-        return _HoldResampler(channel, clock)
+        steps = channel.hold.max_rate == inf
+        return (_HoldResampler if steps else _RateLimitedResampler)(channel, clock)
     interpolated = kind is not None and (kind.commanded or kind.circular)
     if interpolated or channel.interpolation == "linear":
         return _LinearResampler(channel, clock)
@@ -87,7 +88,7 @@ class _Samples:
         silent = (received_ns - self._channel.max_delay_ns - self._clock.start_ns) * 1e-9
         in_gap = silent - self._newest > self._channel.gap_threshold_secs
         until = silent if in_gap else self._complete_until()
-        return min(max(floor(until / self._clock.dt_secs), 0), self._clock.count)
+        return min(floor(max(until, 0.0) / self._clock.dt_secs), self._clock.count)
 
     def _append(self, times: FloatArray, values: FloatArray) -> None:
         self._times = np.concatenate((self._times, times))
@@ -131,7 +132,7 @@ class _HoldResampler(_Samples):
             return self._clock.count
         silent = (received_ns - self._channel.max_delay_ns - self._clock.start_ns) * 1e-9
         until = max(silent, self._newest)
-        return min(max(floor(until / self._clock.dt_secs), 0), self._clock.count)
+        return min(floor(max(until, 0.0) / self._clock.dt_secs), self._clock.count)
 
     def take(self, first: int, end: int) -> FloatArray:
         """Return the values at the instants `first` to `end` - 1, which must be ready."""
@@ -152,6 +153,52 @@ class _HoldResampler(_Samples):
         is_known = grid >= at[0] - INSTANT_TOLERANCE
         self._drop(max(int(within.stop) - 1, 0))
         return np.where(is_known, mean, np.nan)
+
+
+class _RateLimitedResampler(_HoldResampler):
+    """Orders followed at a constant rate, as by a steering gear (SOLAS II-1, regulation 29).
+
+    The angle is taken to be the first order when that is given.
+    """
+
+    def __init__(self, channel: ChannelStats, clock: Clock) -> None:
+        super().__init__(channel, clock)
+        self._rate = channel.hold.max_rate if channel.hold else inf
+        self._angles: FloatArray = np.zeros(0)  # the angle when each order was given
+
+    def take(self, first: int, end: int) -> FloatArray:
+        """Return the values at the instants `first` to `end` - 1, which must be ready."""
+        if not len(self._times):
+            return np.full(end - first, np.nan)
+        grid = np.arange(first, end) * self._clock.dt_secs
+        tolerance = INSTANT_TOLERANCE * self._clock.dt_secs
+        last = np.searchsorted(self._times, grid + tolerance, side="right") - 1
+        k = np.clip(last, 0, None)
+        turned = self._turned(grid - self._times[k], self._values[k] - self._angles[k])
+        angle: FloatArray = np.where(last >= 0, self._angles[k] + turned, np.nan)
+        self._drop(int(k[-1]))
+        return angle
+
+    def _turned(self, secs: FloatArray, distance: FloatArray) -> FloatArray:
+        """Return the angle turned since an order that is a distance away."""
+        limit = self._rate * np.maximum(secs, 0.0)
+        return np.clip(distance, -limit, limit)
+
+    def _append(self, times: FloatArray, values: FloatArray) -> None:
+        super()._append(times, values)
+        angles = self._angles.tolist()
+        for k in range(len(angles), len(self._times)):
+            angle = self._values[k]
+            if k:
+                limit = self._rate * (self._times[k] - self._times[k - 1])
+                distance = self._values[k - 1] - angles[-1]
+                angle = angles[-1] + min(max(distance, -limit), limit)
+            angles.append(angle)
+        self._angles = np.array(angles, dtype=np.float64)
+
+    def _drop(self, count: int) -> None:
+        super()._drop(count)
+        self._angles = self._angles[count:]
 
 
 class _LinearResampler(_Samples):

@@ -1,12 +1,12 @@
 """Uniform clock of a resampled log: its start, time step and end."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
 
-from shiplog.checks.channel_stats import ChannelStats, LogStats
+from shiplog.checks.channel_stats import ChannelStats, LogStats, is_rudder_order
 from shiplog.errors import LogError, UsageError
 from shiplog.types import Log
 from shiplog.units import CATALOGUE
@@ -105,6 +105,25 @@ def choose_clock(
         if name in stats and (stats[name].valid > 1 or stats[name].hold)
     }
     return Clock(start_ns, dt, int(steps) + 1, used | present)
+
+
+def with_steering_gear(clock: Clock, rate: float) -> Clock:
+    """Return the clock with a held order of the rudder followed at the steering gear's rate.
+
+    Other rudder channels stay as they are: the angle was measured, or is interpolated.
+
+    Parameters
+    ----------
+    clock
+        The clock, from `choose_clock`.
+    rate
+        Rate of the steering gear, rad/s.
+    """
+    rudder = clock.channels.get("rudder")
+    if rudder is None or rudder.hold is None or not is_rudder_order(rudder):
+        return clock
+    followed = replace(rudder, hold=replace(rudder.hold, max_rate=rate))
+    return replace(clock, channels={**clock.channels, "rudder": followed})
 
 
 def _require_samples(log: Log, name: str, channel: ChannelStats) -> None:

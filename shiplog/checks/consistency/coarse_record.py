@@ -80,7 +80,9 @@ class _Series:
         self._stats, self._start, self._at = stats, start, at
         columns = 2 if stats.fields else 1
         gap = stats.gap_threshold_secs
-        self._interpolators = [Interpolator(at, gap) for _ in range(columns)]
+        self._interpolators = [
+            Interpolator(at, gap, hold=stats.hold is not None) for _ in range(columns)
+        ]
         self._last: tuple[FloatArray, FloatArray] | None = None
         self._sum, self._begun, self.first = np.zeros(columns), False, 0.0
         self._changes = self._change_function()
