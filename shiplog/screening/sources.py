@@ -180,7 +180,8 @@ class _Gathered:
     def result(self) -> FloatArray:
         """Return the values, (n,) or (n, 2)."""
         if self.channel.valid < 2:
-            return np.full((len(self._clock), len(self._components)), np.nan).squeeze(axis=1)
+            values = np.full((len(self._clock), len(self._components)), np.nan)
+            return values if self.channel.fields else values[:, 0]
         first, last = ((t - self._start_ns) * 1e-9 for t in self.channel.valid_span_ns)
         values = np.column_stack([component.result() for component in self._components])
         values[(self._clock < first - 1e-6) | (self._clock > last + 1e-6)] = np.nan

@@ -111,6 +111,15 @@ def test_a_second_position_source_elsewhere_is_reported(trial: TrialLog) -> None
     assert "differs by" in warning
 
 
+def test_a_second_position_source_with_a_single_fix_is_not_used(trial: TrialLog) -> None:
+    def only_first(values: np.ndarray) -> np.ndarray:
+        values[1:] = np.nan
+        return values
+
+    result = screened(with_source(trial, "position", only_first))
+    assert result.screening.stats["position"].source == trial["position"].source
+
+
 def test_the_user_can_choose_any_source(trial: TrialLog) -> None:
     log = with_source(trial, "yaw_rate", lambda x: -x)
     result = screened(log, {"yaw_rate": "other"})
