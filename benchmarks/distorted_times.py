@@ -68,9 +68,9 @@ def clock_distortions() -> list[Distortion]:
         ("in whole seconds", lambda t: t // SECOND * SECOND, ("same time", "time stamps coarse")),
         ("in whole half seconds", lambda t: t // (SECOND // 2) * (SECOND // 2), ("same time",)),
         ("in ms read as s", lambda t: t * 1000, ("time ms", "time unit")),
-        ("in s read as ms", lambda t: t // 1000, ("time ms", "time unit", "1970")),
+        ("in s read as ms", lambda t: t // 1000, ("time ms", "time unit")),
         ("in min read as s", lambda t: t // 60, ("time min", "time unit")),
-        ("30 years late", lambda t: t + 30 * 365 * 86400 * SECOND, ("time",)),
+        ("in s read as min", lambda t: t * 60, ("time min", "time unit")),
     )
     lags = (("yaw_rate", 3.0), ("rudder", 3.0), ("rudder", 1.5), ("speed", 6.0),
             ("heading", 4.0), ("position", 18.0), ("yaw_rate", -3.0))  # fmt: skip
@@ -105,7 +105,7 @@ def sampling_distortions() -> list[Distortion]:
         ("yaw rate in tenths of deg/s", ("yaw_rate",), _rounded("yaw_rate", 0.1 * DEG)),
     )
     words = ("written", "held", "gap", "not measured", "sampl", "interval", "coarse", "steps",
-             "resol")  # fmt: skip
+             "resol", "constant")  # fmt: skip
     return [
         Distortion("sampling", name, tuple(f"{c} {w}" for c in channels for w in words), apply)
         for name, channels, apply in sampled

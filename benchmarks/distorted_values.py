@@ -113,7 +113,7 @@ def sentinel_distortions() -> list[Distortion]:
         ("rpm", "0 rpm in every third sample", 0.0, THIRD),
         ("rpm", "-1 rpm at the start", -1.0, START),
     )
-    words = ("not available", "impossible", "not used", "jumps", "stuck", "negative")
+    words = ("not available", "impossible", "not used", "jumps", "stuck", "negative", "constant")
     stuck = (("yaw_rate", slice(0.7, None)), ("speed", slice(0.4, None)), ("rudder", SOME),
              ("heading", slice(0.3, 0.7)))  # fmt: skip
     return [

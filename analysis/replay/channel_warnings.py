@@ -34,10 +34,11 @@ def channel_warnings(log_stats: LogStats) -> Iterator[str]:
 
 def _dead_sensor_warnings(log_stats: LogStats) -> Iterator[str]:
     """Warn of sensors whose value never changes although the ship moved."""
-    ranges = {name: np.ptp(log_stats[name].value_range) for name in ("yaw_rate", "speed", "rudder")}
+    names = [n for n in ("yaw_rate", "speed", "rudder", "heading") if n in log_stats]
+    ranges = {name: np.ptp(log_stats[name].value_range) for name in names}
     turned = ranges["yaw_rate"] > MIN_TURN_RATE
     for name, value_range in ranges.items():
-        if value_range == 0 and (turned or name != "rudder"):
+        if value_range == 0 and (turned or name in {"yaw_rate", "speed"}):
             yield (
                 f"{log_stats[name].topic}: constant throughout the log; "
                 "if the sensor was dead, choose another source"

@@ -18,7 +18,7 @@ from analysis.signals.signal_stats import SignalStats, SignalStatsCollector
 from shiplog import Channel, LogError, Signals, Vessel
 from shiplog.checks.channel_stats import LogStats
 from shiplog.checks.consistency.consistency_check import ConsistencyCheck
-from shiplog.checks.consistency.findings import refuse_contradictions
+from shiplog.checks.consistency.findings import CONTRADICTIONS, refuse_contradictions
 from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, choose_clock, resample_chunks, with_steering_gear
 from shiplog.screening import ScreenedLog, Screening, screen_log
@@ -71,12 +71,15 @@ class SecondPass:
         The least-squares sums of each equation over the whole trial.
     warnings
         Problems of the data, each in a sentence.
+    contradictions
+        Those of the warnings by which a unit or a sign is wrong.
     """
 
     stats: SignalStats
     yaw: WholeTrialRegression
     surge: WholeTrialRegression
     warnings: tuple[str, ...]
+    contradictions: tuple[str, ...] = ()
 
 
 def first_pass(
@@ -164,7 +167,8 @@ def second_pass(
         *hold.warnings(),
         *equations.window_warnings(),
     ]
-    return SecondPass(stats, equations.yaw, equations.surge, tuple(warnings))
+    wrong = tuple(finding.text for finding in findings if finding.kind in CONTRADICTIONS)
+    return SecondPass(stats, equations.yaw, equations.surge, tuple(warnings), wrong)
 
 
 def resampled_chunks(

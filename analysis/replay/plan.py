@@ -19,6 +19,7 @@ from analysis.regression.sliding import RegressionSolution
 from analysis.signals.signal_stats import SignalStats
 from shiplog import Vessel
 from shiplog.checks.channel_stats import LogStats
+from shiplog.checks.consistency.findings import naming_contradictions
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.resampling import Clock
 from shiplog.screening import Screening
@@ -64,6 +65,8 @@ class Plan:
         Least squares of each equation over the whole trial, without errors.
     warnings
         Problems found so far, each in a sentence.
+    contradictions
+        Those of the warnings by which a unit or a sign is wrong.
     """
 
     screening: Screening
@@ -77,6 +80,7 @@ class Plan:
     yaw_solution: RegressionSolution
     surge_solution: RegressionSolution
     warnings: tuple[str, ...]
+    contradictions: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -145,9 +149,17 @@ def plan_replay(
     first = first_pass(log, vessel, sources, on_progress)
     second = second_pass(first, vessel, on_progress, strict=strict)
     on_progress("choose the model", 0.0)
+    with naming_contradictions(second.contradictions):
+        return _plan(vessel, origin, kind, first, second)
+
+
+def _plan(
+    vessel: Vessel, origin: str, kind: FilterKind, first: FirstPass, second: SecondPass
+) -> Plan:
+    """Choose the model, the noise and the disturbances after the passes over the log."""
     warnings = [*first.log.warnings, *second.warnings]
     if vessel.coefficients is None:
-        vessel, model_warnings = _with_first_model(vessel, second, log.name)
+        vessel, model_warnings = _with_first_model(vessel, second, first.log.name)
         origin = FITTED_MODEL
     else:
         model_warnings = _other_model_warnings(vessel)
@@ -166,6 +178,7 @@ def plan_replay(
         yaw_solution=second.yaw.solution(),
         surge_solution=second.surge.solution(),
         warnings=(*warnings, *noise_warnings, *wave_warnings),
+        contradictions=second.contradictions,
     )
 
 

@@ -26,6 +26,7 @@ from analysis.regression.sliding import CoefficientHistory
 from analysis.signals.concat import concatenate
 from analysis.signals.hold import InputHold, held_throughout
 from shiplog import LogError, Signals, Vessel, open_log
+from shiplog.checks.consistency.findings import naming_contradictions
 from shiplog.errors import UsageError
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.screening import ScreenedLog
@@ -250,6 +251,10 @@ class Replay:
         if self._started:
             raise ValueError("the chunks of a replay can be read once only; make another Replay")
         self._started = True
+        with naming_contradictions(self.plan.contradictions):
+            yield from self._chunks()
+
+    def _chunks(self) -> Iterator[ReplayChunk]:
         clock = self.plan.clock
         adjoints = self._backward_pass() if self.plan.vessel.filter.smooth else None
         hold, stages = InputHold(clock), _Stages(self.plan, self._log.name)

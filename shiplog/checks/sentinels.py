@@ -66,7 +66,7 @@ def sentinel_values(values: FloatArray, unit: str) -> tuple[float, ...]:
     found: list[float] = []
     while len(found) < MAX_SENTINELS and len(values):
         suspects = (float(values.max()), float(values.min()), 0.0)
-        sentinel = next((v for v in suspects if _is_sentinel(values, v, codes)), None)
+        sentinel = next((v for v in suspects if _is_sentinel(values, v, codes, unit)), None)
         if sentinel is None:
             break
         found.append(sentinel)
@@ -109,7 +109,7 @@ def _codes(unit: str) -> FloatArray:
     return np.array(codes or GENERAL_CODES)
 
 
-def _is_sentinel(values: FloatArray, suspect: float, codes: FloatArray) -> bool:
+def _is_sentinel(values: FloatArray, suspect: float, codes: FloatArray, unit: str) -> bool:
     """Whether one value of a channel is a sentinel."""
     at = values == suspect
     count = int(np.count_nonzero(at))
@@ -128,10 +128,12 @@ def _is_sentinel(values: FloatArray, suspect: float, codes: FloatArray) -> bool:
     median_step, ordinary_step = np.percentile(np.abs(np.diff(rest)), [50, 95])
     if listed and beyond > max(MIN_CODE_STEPS * median_step, MIN_CODE_GAP * (high - low)):
         return True
-    return _is_left_and_rejoined(values, at, float(ordinary_step))
+    return _is_left_and_rejoined(values, at, float(ordinary_step), unit)
 
 
-def _is_left_and_rejoined(values: FloatArray, at: NDArray[np.bool_], step: float) -> bool:
+def _is_left_and_rejoined(
+    values: FloatArray, at: NDArray[np.bool_], step: float, unit: str
+) -> bool:
     """Whether the channel jumps to one value and back to its course, several times.
 
     Parameters
@@ -142,6 +144,8 @@ def _is_left_and_rejoined(values: FloatArray, at: NDArray[np.bool_], step: float
         (n,) where they equal the suspected one.
     step
         The ordinary step between the other values.
+    unit
+        The unit of the values.
     """
     edges = np.flatnonzero(np.diff(at.astype(np.int8), prepend=0, append=0))
     starts, ends = edges[::2], edges[1::2]
@@ -155,4 +159,21 @@ def _is_left_and_rejoined(values: FloatArray, at: NDArray[np.bool_], step: float
     rejoins = float(np.median(np.abs(after - before))) < jump / 4
     if not rejoins or jump <= MIN_JUMP_STEPS * step:
         return False
+    if unit == "rpm" and _interrupts_a_steady_value(values, at, starts, ends):
+        return True
     return len(np.unique(values[~at])) >= MIN_OTHER_SAMPLES
+
+
+def _interrupts_a_steady_value(
+    values: FloatArray, at: NDArray[np.bool_], starts: NDArray[np.intp], ends: NDArray[np.intp]
+) -> bool:
+    """Whether single samples of one value interrupt revolutions that are repeated otherwise.
+
+    A propeller does not stop for one sample and go on as before. Revolutions that are written only
+    when they change do not repeat a value.
+    """
+    others = values[~at]
+    repeated = np.mean(np.diff(others) == 0) if len(others) > 1 else 0.0
+    lengths = np.diff(np.concatenate((ends[:-1], starts[1:])).reshape(2, -1), axis=0)
+    single = float(np.median(ends - starts)) == 1
+    return bool(single and repeated > 0.5 and lengths.size and np.median(lengths) >= 2)

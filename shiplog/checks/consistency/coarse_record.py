@@ -10,6 +10,7 @@ from shiplog.types import Channel, FloatArray
 from shiplog.units import GEOGRAPHIC
 
 MIN_STEP_SECS = 0.1
+MIN_INSTANTS = 300  # of a log so short that its times may have a wrong unit
 MAX_INSTANTS = 50_000
 EARTH_RADIUS = 6_371_000.0  # m
 TURN = 2 * np.pi
@@ -36,7 +37,8 @@ class CoarseRecord:
         self._series: dict[str, _Series] = {}
         start, end = stats.span_ns
         span = (end - start) * 1e-9
-        self.dt_secs = max(MIN_STEP_SECS, span / MAX_INSTANTS) if span > 0 else 0.0
+        step_secs = max(min(MIN_STEP_SECS, span / MIN_INSTANTS), span / MAX_INSTANTS)
+        self.dt_secs = step_secs if span > 0 else 0.0
         self._start = start
         at = np.arange(int(span / self.dt_secs) + 1) * self.dt_secs if span > 0 else np.zeros(1)
         self._count = len(at)
@@ -64,6 +66,12 @@ class CoarseRecord:
         series = self._series.get("heading")
         return series.first if series else 0.0
 
+    @property
+    def is_geographic(self) -> bool:
+        """Whether the positions are latitude and longitude."""
+        series = self._series.get("position")
+        return series is not None and series.is_geographic
+
     def track(self) -> tuple[FloatArray, FloatArray]:
         """Return the position north and east, each (n,) m; all NaN without positions."""
         series = self._series.get("position")
@@ -86,6 +94,10 @@ class _Series:
         self._last: tuple[FloatArray, FloatArray] | None = None
         self._sum, self._begun, self.first = np.zeros(columns), False, 0.0
         self._changes = self._change_function()
+
+    @property
+    def is_geographic(self) -> bool:
+        return self._stats.fields == GEOGRAPHIC
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
         channel = self._stats.select(chunk)

@@ -11,6 +11,7 @@ from shiplog.types import Channel, FloatArray, Log
 from .coarse_record import CoarseRecord
 from .findings import Finding
 from .speed_findings import heading_zero_findings, range_findings, speed_findings
+from .time_findings import time_findings
 from .turning_findings import Pair, sense_explanations, sense_findings, unit_findings
 from .turning_ratio import TurningRatio, turning_ratio
 
@@ -74,8 +75,12 @@ class ConsistencyCheck:
         ratios = _ratios(dt, series)
         explanations = sense_explanations(self._senses(ratios))
         findings += sense_findings(explanations, topics)
-        findings += unit_findings(ratios, topics)
-        findings += speed_findings(dt, speed, north, east, topics)
+        wrong_times = list(time_findings(dt, yaw, heading, speed, (north, east)))
+        findings += wrong_times
+        if not wrong_times:
+            findings += unit_findings(ratios, topics)
+            geographic = self._record.is_geographic
+            findings += speed_findings(dt, speed, north, east, topics, geographic=geographic)
         swing = max((float(np.ptp(x[np.isfinite(x)])) for x in (yaw, heading)
                      if np.isfinite(x).any()), default=0.0)  # fmt: skip
         findings += range_findings({"speed": speed, "rpm": rpm, "rudder": rudder}, swing, topics)

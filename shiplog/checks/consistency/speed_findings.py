@@ -15,11 +15,18 @@ WINDOW_SECS = 20.0  # over which the speed over ground is measured
 MAX_CURRENT = 2.5  # m/s
 MAX_ADVANCE, MIN_ADVANCE = 30.0, 0.15  # m per revolution
 MAX_RUDDER, RADIANS_READ_AS_DEGREES = np.radians(50.0), np.radians(0.7)
+MIN_RADIANS_RATIO, MAX_RADIANS_RATIO = 15.0, 65.0  # of speeds, for positions in rad read as deg
 MIN_OFFSET_DEG = 30.0  # of heading against course: less may be drift or current
 
 
 def speed_findings(
-    dt: float, speed: FloatArray, north: FloatArray, east: FloatArray, topics: Mapping[str, str]
+    dt: float,
+    speed: FloatArray,
+    north: FloatArray,
+    east: FloatArray,
+    topics: Mapping[str, str],
+    *,
+    geographic: bool,
 ) -> Iterator[Finding]:
     """Compare the speed with that of the fixes."""
     n = max(round(WINDOW_SECS / dt), 1)
@@ -41,8 +48,9 @@ def speed_findings(
         length_units = []
     causes = [f"[speed] {in_words(speed_units)}"] if speed_units else []
     causes += [f"[position] {in_words(length_units)}"] if length_units else []
-    if abs(np.log(ratio / 57.3)) < 0.12:
-        causes.append("latitude and longitude in rad read as deg")
+    # near 0 deg of latitude the meridians are farther apart than where the ship was
+    if geographic and MIN_RADIANS_RATIO < ratio < MAX_RADIANS_RATIO:
+        causes.insert(0, "[position] latitude and longitude in rad read as deg")
     remedy = f'[speed] unit = "{speed_units[0][0]}"' if speed_units else "the unit of the positions"
     yield Finding(
         "unit",

@@ -62,8 +62,10 @@ def sense_findings(explanations: list[tuple[str, ...]], topics: Mapping[str, str
         "position": "mirrored: the course over ground turns opposite to the ship; "
         "likely north and east, or latitude and longitude, are swapped",
     }
+    if first == ("position",):  # as well the ship's channels may all be mirrored
+        others = [tuple(n for n in ("yaw_rate", "heading", "rudder") if n in topics), *others]
     alternative = " or ".join(" and ".join(each) for each in others)
-    doubt = f"; or else the fault lies in {alternative}" if others else ""
+    doubt = f"; or else the sign is reversed of {alternative}" if others else ""
     return [
         Finding("sign", f"{topics[name]}: {texts[name]} (of the channels compared, this is the "
                 f"simplest explanation{doubt}); change in the layout: {remedies[name]}")
