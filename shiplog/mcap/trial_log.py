@@ -20,6 +20,7 @@ from shiplog.units import CATALOGUE, conversion_factor
 from .clock_repair import MessageColumns, drop_impossible_times, pause_warnings, repair_clock_steps
 from .decode import McapContents, SampleBlock, schema_of
 from .schema import FORMAT_VERSION, Schema
+from .unset_times import replace_unset_times
 
 MAX_NAMES = 8  # of ignored records that a warning lists
 _CHANNEL_KEYS = {"channel", "source", "unit", "positive"}  # of the metadata: attributes of Channel
@@ -94,11 +95,12 @@ def _with_repaired_times(
     path: Path, columns: dict[int, MessageColumns], contents: McapContents
 ) -> dict[int, MessageColumns]:
     """Drop impossible times and remove steps of the clocks; the contents receive the warnings."""
+    columns, replaced = replace_unset_times(columns)
     columns, dropped = drop_impossible_times(columns)
     repair = repair_clock_steps(path.name, columns)
     before = contents.clock_change_ns  # steps in samples drained before
     contents.clock_change_ns += repair.change_ns
-    contents.clock_warnings += dropped + repair.warnings
+    contents.clock_warnings += replaced + dropped + repair.warnings
     contents.pause_warnings += pause_warnings(repair.columns.values())
     contents.mixed_times += [
         replace(span, start_ns=span.start_ns - before, end_ns=span.end_ns - before)
