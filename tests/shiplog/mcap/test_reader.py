@@ -55,7 +55,7 @@ def test_the_samples_are_those_that_the_mcap_library_reads_bit_for_bit(path: Pat
     original = (
         channel("yaw_rate", 30_000, 1),
         channel("yaw_rate", 3000, 2, "imu"),
-        channel("torque", 500, 3),
+        channel("winch_force", 500, 3),
         position(100, ("north", "east")),
         position(50, GEOGRAPHIC),
     )
@@ -150,7 +150,7 @@ def parts_by_mcap(
 @pytest.mark.parametrize("seed", range(12))
 def test_a_part_is_what_the_mcap_library_reads_of_it(path: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    original = channel("yaw_rate", 2000, 1), channel("speed", 700, 2), channel("torque", 90, 3)
+    original = channel("yaw_rate", 2000, 1), channel("speed", 700, 2), channel("winch_force", 90, 3)
     write_by_mcap(path, *original, chunk_size=int(rng.integers(100, 20_000)))
     topics = rng.choice([c.topic for c in original], rng.integers(1, 4), replace=False).tolist()
     instants = np.concatenate([c.received_ns for c in original])
@@ -345,9 +345,9 @@ def test_a_channel_in_another_unit_is_converted(path: Path) -> None:
 
 
 def test_a_channel_that_is_not_in_the_catalogue_keeps_its_unit(path: Path) -> None:
-    write_messages(path, [scalar(3.0)], unit="kN·m", topic="/torque/shaft")
-    torque = read(path)["torque"]
-    assert (torque.unit, torque.source, torque.values[0]) == ("kN·m", "shaft", 3.0)
+    write_messages(path, [scalar(3.0)], unit="kN", topic="/winch_force/shaft")
+    winch_force = read(path)["winch_force"]
+    assert (winch_force.unit, winch_force.source, winch_force.values[0]) == ("kN", "shaft", 3.0)
 
 
 @pytest.mark.parametrize("unit", ["deg/sec", "m", None])

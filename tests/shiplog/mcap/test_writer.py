@@ -18,7 +18,7 @@ from shiplog.units import GEOGRAPHIC
 
 START = 1_700_000_000_000_000_000
 HOUR = 3_600_000_000_000
-UNIT = {"yaw_rate": "rad/s", "speed": "m/s", "rpm": "rpm", "rudder": "rad", "torque": "kN·m"}
+UNIT = {"yaw_rate": "rad/s", "speed": "m/s", "rpm": "rpm", "rudder": "rad", "winch_force": "kN"}
 
 
 def channel(name: str, count: int, seed: int = 0) -> Channel:
@@ -68,7 +68,7 @@ def test_a_log_is_read_as_it_was_written(path: Path) -> None:
         ("north", "east"),
         {"origin": "59.9 30.2"},
     )
-    original = trial(channel("yaw_rate", 1000), fixes, local, channel("torque", 10))
+    original = trial(channel("yaw_rate", 1000), fixes, local, channel("winch_force", 10))
     write(original, path)
     log = read(path)
     assert log.name == "trial.mcap"
@@ -159,7 +159,7 @@ def test_the_file_has_the_metadata_of_each_channel(path: Path) -> None:
         [0.1],
         metadata={"model": "X1", "unit": "no"},  # type: ignore[arg-type]
     )
-    write(trial(rudder, channel("torque", 1)), path)
+    write(trial(rudder, channel("winch_force", 1)), path)
     with path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
     assert summary is not None
@@ -171,7 +171,7 @@ def test_the_file_has_the_metadata_of_each_channel(path: Path) -> None:
         "positive": "turns the bow to starboard",
         "model": "X1",
     }
-    assert "positive" not in metadata["/torque/test"]
+    assert "positive" not in metadata["/winch_force/test"]
 
 
 def test_the_file_has_its_metadata_and_the_vessel_file(path: Path) -> None:
@@ -232,7 +232,7 @@ def test_parts_written_one_by_one_are_one_channel(path: Path) -> None:
 
 def test_parts_of_many_channels_written_one_by_one_are_joined(path: Path) -> None:
     rng = np.random.default_rng(8)
-    whole = [channel("yaw_rate", 5000, 1), channel("speed", 900, 2), channel("torque", 70, 3)]
+    whole = [channel("yaw_rate", 5000, 1), channel("speed", 900, 2), channel("winch_force", 70, 3)]
     times = np.sort(rng.choice(whole[0].received_ns, 400, replace=False))
     cuts = [[0, *np.searchsorted(c.received_ns, times), len(c)] for c in whole]
     with LogWriter(path) as writer:
