@@ -8,6 +8,7 @@ from pathlib import Path
 
 from shiplog.errors import LayoutError
 
+from .header_words import is_units_row
 from .layout import DELIMITERS, Layout
 
 
@@ -25,12 +26,15 @@ class CellTable:
         Cells of each row; all rows have the same number.
     header
         Names of the columns; empty without a header.
+    units
+        Cells of the row of units under the header; empty without one.
     """
 
     path: Path
     lines: list[int]
     rows: list[list[str]]
     header: list[str] = field(default_factory=list)
+    units: list[str] = field(default_factory=list)
 
 
 def read_cells(path: Path, layout: Layout) -> CellTable:
@@ -63,11 +67,15 @@ def read_cells(path: Path, layout: Layout) -> CellTable:
         else:
             header = rows.pop(0)
             numbers.pop(0)
+    units: list[str] = []
+    if header and len(rows) > 1 and is_units_row(rows[0], rows[1]):
+        units = rows.pop(0) + [""] * len(header)
+        numbers.pop(0)
     if not rows:
         raise LayoutError(f"no rows of numbers after line {layout.skip_rows}: {path}")
     reference = first_line if header else numbers[0]
     _equalise(rows, numbers, header, reference, path, layout)
-    return CellTable(path, numbers, rows, header)
+    return CellTable(path, numbers, rows, header, units[: len(header)])
 
 
 def _split(body: list[str], path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:

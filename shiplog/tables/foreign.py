@@ -12,14 +12,21 @@ from shiplog.types import Channel, FloatArray, TimeArray, TrialLog
 from shiplog.units import CATALOGUE, GEOGRAPHIC, UNITS, conversion_factor, did_you_mean
 
 from .delimited import CellTable, read_cells
+from .header_words import bracketed_unit, named_unit
 from .layout import DEGREES_MINUTES, HEMISPHERES, ROLES, VELOCITIES, Layout
 from .printed_positions import PositionTextError, looks_packed, parse_degrees
-from .printed_times import TimeTextError, excel_ns, is_time_text, parse_times
+from .printed_times import TimeTextError, excel_ns, is_time_text, looks_hhmmss, parse_times
 from .rebuild import rebuilt_heading, uniform_times
 
 LAST_NS = 2**63 - 1  # 2262
 NOT_MEASURED = frozenset(  # cells in lower case
     ("", "nan", "na", "n/a", "#n/a", "-", "--", "---", "null", "none", "nil", "-nan", "#nv")
+)
+SIDED = ("rudder", "rudder_order", "yaw_rate", "heel", "roll")  # positive to starboard
+_SIDE = re.compile(  # a number with the letter of its side, such as 5.0P or STBD 5.0
+    r"(?:(?P<before>P|S|PORT|STBD|STB)\s*(?P<number>[\d.,]+))"
+    r"|(?:(?P<digits>[\d.,]+)\s*(?P<after>P|S|PORT|STBD|STB))",
+    re.IGNORECASE,
 )
 NOT_CHANNELS = {"time", "date", "north", "east", *GEOGRAPHIC, *HEMISPHERES, *VELOCITIES}
 
@@ -62,12 +69,30 @@ def read_table(path: str | os.PathLike[str], layout: Layout) -> TrialLog:
         }
     if "velocity_north" in values:
         _rotate_velocities(values, notes)
+    warnings += _unit_warnings(table, layout)
     channels = _channels(layout, measured_ns, values, notes)
     metadata = {"converted_from": table.path.name, "layout": layout.name}
     if layout.froude_scale != 1:
         metadata["froude_scale"] = repr(float(layout.froude_scale))
     warnings = [f"{table.path.name}: {text} in {layout.where}" for text in warnings]
     return TrialLog(table.path.name, tuple(channels), metadata, warnings=tuple(warnings))
+
+
+def _unit_warnings(table: CellTable, layout: Layout) -> list[str]:
+    """Compare the units that the table states with those of the layout."""
+    warnings = []
+    for role, column in layout.columns.items():
+        if not table.header or column.unit not in UNITS:
+            continue
+        at = _column_index(table, layout, role)
+        stated = named_unit(table.units[at]) if table.units else ""
+        stated = stated if stated in UNITS else bracketed_unit(table.header[at])
+        if stated and UNITS[stated] != UNITS[column.unit]:
+            warnings.append(
+                f"the table states {stated} for the column {table.header[at]!r}, which is read in "
+                f"{column.unit}; correct the unit of {role}"
+            )
+    return warnings
 
 
 def _channels(
@@ -127,7 +152,14 @@ def _column_values(table: CellTable, layout: Layout, role: str, texts: list[str]
 
 
 def _numbers(table: CellTable, layout: Layout, role: str, texts: list[str]) -> FloatArray:
-    """Parse the numbers of a column, (n,), as they are printed."""
+    """Parse the numbers of a column, (n,), as they are printed; those to port are negative."""
+    if role.partition(".")[0] in SIDED and any(map(_SIDE.fullmatch, texts)):
+        if layout.columns[role].sign < 0:
+            raise LayoutError(
+                f"the cells of {role} state port and starboard, so that sign = -1 is wrong; "
+                f"remove it from {layout.where}: {table.path}"
+            )
+        texts = [_signed(text) for text in texts]
     try:
         return np.array([_number(text, layout.decimal_comma) for text in texts])
     except ValueError as error:
@@ -142,6 +174,15 @@ def _numbers(table: CellTable, layout: Layout, role: str, texts: list[str]) -> F
             f"line {table.lines[row]}, column {at}: {texts[row]!r} is not a number; "
             f"{remedy}: {table.path}"
         ) from None
+
+
+def _signed(text: str) -> str:
+    """Replace the letter of a side by a sign: positive to starboard."""
+    match = _SIDE.fullmatch(text)
+    if match is None:
+        return text
+    side = (match["before"] or match["after"]).upper()
+    return ("-" if side.startswith("P") else "") + (match["number"] or match["digits"])
 
 
 def _geographic(
@@ -243,7 +284,13 @@ def _times_ns(
         elif not column.unit:
             raise TimeTextError(0, f"has the number {printed_texts[0]!r}; state time.unit")
         else:
-            return _numeric_times_ns(table, layout, printed_texts), []
+            times_ns = _numeric_times_ns(table, layout, printed_texts)
+            if column.unit == "s" and _wraps_like_clock(printed_texts):
+                warnings.append(
+                    "the times step by 41 s at each minute, as day times in six digits do; state "
+                    "time.unit = 'hhmmss'"
+                )
+            return times_ns, warnings
     except TimeTextError as error:
         raise LayoutError(
             f"line {table.lines[error.row]} {error.reason} ({layout.where}): {table.path}"
@@ -270,6 +317,14 @@ def _numeric_times_ns(table: CellTable, layout: Layout, texts: list[str]) -> Tim
     _require_range(table, layout, np.round(printed * 1e9) + float(start_ns))
     times_ns: TimeArray = np.round(printed * 1e9).astype(np.int64) + start_ns
     return times_ns
+
+
+def _wraps_like_clock(texts: list[str]) -> bool:
+    """Whether six-digit numbers are day times that pass a minute."""
+    if not looks_hhmmss(texts):
+        return False
+    steps = np.diff([float(text) for text in texts if text])
+    return len(steps) > 1 and bool(np.any(np.abs(steps - np.median(steps) - 40) < 0.5))
 
 
 def _require_ascending(table: CellTable, times: FloatArray | TimeArray) -> None:

@@ -56,12 +56,15 @@ class TimeForm:
         One of `DATE_ORDERS`; None where the dates themselves determine it.
     uniform
         Whether the times are to be rebuilt at a uniform step.
+    assumed
+        Whether a draft assumed the date order, which is still to be confirmed.
     """
 
     start_ns: int | None = None
     zone: tzinfo | None = None
     date_order: str | None = None
     uniform: bool = False
+    assumed: bool = False
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
 }
 _REBUILDS = {"time": "uniform", "heading": "from yaw_rate"}  # role: the only value of `rebuild`
 _COLUMN_KEYS = ("column", "unit", "sign", "positive", "interpolation")
-_TIME_KEYS = ("column", "unit", "date", "zone", "date_order", "rebuild")
+_TIME_KEYS = ("column", "unit", "date", "zone", "date_order", "assumed", "rebuild")
 
 
 def parse_layout(text: str, where: str) -> Layout:
@@ -139,7 +139,11 @@ class _LayoutParser:
             where=self._where,
             columns=self._columns,
             time=TimeForm(
-                start_ns, self._zone, section.get("date_order"), "rebuild" in section
+                start_ns,
+                self._zone,
+                section.get("date_order"),
+                uniform="rebuild" in section,
+                assumed="assumed" in section,
             ),
             rebuild_heading="rebuild" in self._table.get("heading", {}),
             **top,
@@ -170,6 +174,8 @@ class _LayoutParser:
             self._errors.append(
                 f"time.date_order must be one of {', '.join(map(repr, DATE_ORDERS))}, got {order!r}"
             )
+        if section.get("assumed", "date_order") != "date_order":
+            self._errors.append(f"time.assumed must be 'date_order', got {section['assumed']!r}")
         if "zone" in section:
             self._zone = self._parse_zone(section["zone"])
         self._add("time", "time.column", section.get("column"), Column(0, str(unit)))

@@ -1,10 +1,12 @@
 """Printed dates and day times as nanoseconds: ISO 8601, date orders, time zones."""
 
 import re
+from collections.abc import Sequence
 from datetime import UTC, tzinfo
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shiplog.types import FloatArray, TimeArray
 
@@ -15,6 +17,7 @@ if TYPE_CHECKING:  # slow to import: only printed times wait for it
 
 DAY_NS = 86_400 * 10**9
 HALF_DAY_NS = DAY_NS // 2
+MAX_TIME_CHARACTERS = 64  # of a printed time with its date and zone
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _DATE = r"(?P<a>\d{1,4})[-./ ](?P<b>\d{1,2}|[A-Za-z]{3,9})[-./ ](?P<c>\d{1,4})"
 _PACKED = r"(?P<packed>\d{6}|\d{8})"
@@ -24,6 +27,7 @@ _CLOCK = (
 )
 _TIME = re.compile(rf"(?:(?:{_DATE}|{_PACKED})(?:[Tt ,]\s?|\s+))?{_CLOCK}")
 _ONLY_DATE = re.compile(rf"{_DATE}|{_PACKED}")
+_SIX_DIGITS = re.compile(r"([01]\d|2[0-3])[0-5]\d[0-5]\d(\.\d*)?")
 _NEEDS = "state time.date_order = 'dmy', 'mdy' or 'ymd'"
 
 
@@ -45,6 +49,18 @@ def is_time_text(text: str) -> bool:
     """
     plain = text.strip()
     return bool((":" in plain or "T" in plain.upper()) and _TIME.fullmatch(plain))
+
+
+def looks_hhmmss(texts: Sequence[str]) -> bool:
+    """Whether numbers are day times in six digits, such as 235959.5.
+
+    Examples
+    --------
+    >>> looks_hhmmss(["235958", "235959"]), looks_hhmmss(["0.5", "1.0"])
+    (True, False)
+    """
+    filled = [text.strip() for text in texts if text.strip()]
+    return bool(filled) and all(map(_SIX_DIGITS.fullmatch, filled))
 
 
 def parse_times(
@@ -84,14 +100,14 @@ def parse_times(
     """
     import pandas as pd  # noqa: PLC0415 - slow to import
 
-    parts = _parts(texts, _TIME)
+    parts = _clock_parts(texts)
     clock_ns = _clock_ns(parts)
     warnings: list[str] = []
-    dated = (parts["a"].notna() | parts["packed"].notna()).to_numpy()
+    dated = parts["date"] != ""
     if dates is None and np.any(dated) and not np.all(dated):
         raise TimeTextError(int(np.argmin(dated)), "has no date, though other rows do")
     if dates is not None or np.any(dated):
-        days = _days(parts if dates is None else _parts(dates, _ONLY_DATE), form.date_order)
+        days = _date_days(parts["date"] if dates is None else np.array(dates), form.date_order)
         if dates is not None:
             days = days + _late_dates(days, clock_ns)
     else:
@@ -100,8 +116,14 @@ def parse_times(
             warnings.append("day times without a date, counted from 1970-01-01; state `start`")
         first = pd.Timestamp(form.start_ns or 0, tz="UTC").tz_convert(form.zone or UTC)
         days = turns + (first.tz_localize(None).normalize().value // DAY_NS)
+    if form.assumed:
+        example = (dates or texts)[0]
+        warnings.append(
+            f"day and month are assumed in the order {form.date_order}; check it with the first "
+            f"date {example!r} and remove time.assumed"
+        )
     local_ns = days * DAY_NS + clock_ns
-    stated = parts["zone"].notna().to_numpy()
+    stated = parts["zone"] != ""
     if np.any(stated):
         if not np.all(stated):
             raise TimeTextError(int(np.argmin(stated)), "has no time zone, though other rows do")
@@ -120,38 +142,101 @@ def excel_ns(days: FloatArray, zone: tzinfo | None) -> TimeArray:
     return _to_utc(microseconds.astype(np.int64) * 1000, zone or UTC)
 
 
-def _parts(texts: list[str], pattern: re.Pattern[str]) -> "pd.DataFrame":
-    """Split each text by the pattern; one column per group."""
-    import pandas as pd  # noqa: PLC0415 - slow to import
-
-    matches = [pattern.fullmatch(text.strip()) for text in texts]
-    names = list(pattern.groupindex)
-    if None in matches:
-        row = matches.index(None)
+def _match(text: str, row: int, pattern: re.Pattern[str]) -> re.Match[str]:
+    """Match the text of a row, or raise the reason why it does not match."""
+    match = pattern.fullmatch(text.strip())
+    if match is None:
         what = "a time" if pattern is _TIME else "a date"
-        empty = "is empty" if not texts[row].strip() else f"{texts[row]!r} is not {what}"
+        empty = "is empty" if not text.strip() else f"{text!r} is not {what}"
         example = "2026-03-29T00:55:00Z or 29.03.2026 00:55:00"
         raise TimeTextError(row, f"{empty}, such as {example}; correct it or remove the line")
-    rows = [match.group(*names) for match in matches if match]
-    return pd.DataFrame(rows, columns=names, dtype=object)
+    return match
+
+
+def _clock_parts(texts: list[str]) -> dict[str, NDArray[Any]]:
+    """Split each text into its day time and its date; (n,) arrays by name.
+
+    Where all texts have the form of the first one, they are split at its places at once.
+    """
+    if not texts or max(map(len, texts)) > MAX_TIME_CHARACTERS:
+        return _clock_parts_by_row(texts)
+    letters = np.array(texts, dtype=str)
+    codes = letters.view(np.uint32).reshape(len(texts), -1)
+    is_digit = (codes >= ord("0")) & (codes <= ord("9"))
+    same = (codes == codes[0]) | (is_digit & is_digit[0])
+    if not (np.all(same) and _TIME.fullmatch(texts[0])):
+        return _clock_parts_by_row(texts)
+    match = _match(texts[0], 0, _TIME)
+    parts: dict[str, NDArray[Any]] = {}
+    for name in ("hour", "minute", "second", "fraction"):
+        first, last = match.span(name)
+        digits = codes[:, first : min(last, first + 9)].astype(np.int64) - ord("0")
+        parts[name] = digits @ 10 ** np.arange(digits.shape[1])[::-1]
+        if name == "fraction":
+            parts[name] *= 10 ** (9 - digits.shape[1])
+    for name in ("half", "zone"):
+        parts[name] = np.full(len(texts), match[name] or "")
+    if (match["zone"] or "")[:1] in ("+", "-"):
+        parts["zone"] = _cut(codes, *match.span("zone"))
+    parts["date"] = _cut(codes, 0, len(_date_text(match)))
+    return parts
+
+
+def _cut(codes: NDArray[np.uint32], first: int, last: int) -> NDArray[np.str_]:
+    """Return the same places of each text, (n,)."""
+    if first == last:
+        return np.full(len(codes), "")
+    return np.ascontiguousarray(codes[:, first:last]).view(f"U{last - first}")[:, 0]
+
+
+def _clock_parts_by_row(texts: list[str]) -> dict[str, NDArray[Any]]:
+    """Split texts of several forms."""
+    matches = [_match(text, row, _TIME) for row, text in enumerate(texts)]
+    parts: dict[str, NDArray[Any]] = {
+        name: np.array([int(match[name] or 0) for match in matches], np.int64)
+        for name in ("hour", "minute", "second")
+    }
+    fractions = [int((match["fraction"] or "")[:9].ljust(9, "0")) for match in matches]
+    parts["fraction"] = np.array(fractions, np.int64)
+    parts |= {n: np.array([m[n] or "" for m in matches], dtype=str) for n in ("half", "zone")}
+    parts["date"] = np.array([_date_text(match) for match in matches], dtype=str)
+    return parts
+
+
+def _date_text(match: re.Match[str]) -> str:
+    """Return the date before a day time; empty if there is none."""
+    end = max(match.end("packed"), match.end("c"))
+    return match.string[:end] if end > 0 else ""
+
+
+def _date_days(dates: NDArray[np.str_], order: str | None) -> TimeArray:
+    """Return the day of each row, counted from 1970-01-01; each date is parsed once."""
+    import pandas as pd  # noqa: PLC0415 - slow to import
+
+    codes, distinct = pd.factorize(dates.astype(object))
+    names = list(_ONLY_DATE.groupindex)
+    try:
+        rows = [_match(text, row, _ONLY_DATE).group(*names) for row, text in enumerate(distinct)]
+        return _days(pd.DataFrame(rows, columns=names, dtype=object), order)[codes]
+    except TimeTextError as error:
+        raise TimeTextError(int(np.argmax(codes == error.row)), error.reason) from None
 
 
 def _ints(column: "pd.Series[str]") -> TimeArray:
     return np.array([int(text) if text else 0 for text in column], np.int64)
 
 
-def _clock_ns(parts: "pd.DataFrame") -> TimeArray:
+def _clock_ns(parts: dict[str, NDArray[Any]]) -> TimeArray:
     """Return the time of day of each row, ns."""
-    hour, minute, second = (_ints(parts[name]) for name in ("hour", "minute", "second"))
-    half = parts["half"].str.lower()
-    if half.notna().any():
-        _require((hour >= 1) & (hour <= 12) | half.isna().to_numpy(), "has an hour beyond 12")
-        hour = np.where(half.isna(), hour, hour % 12) + 12 * (half == "p").to_numpy()
+    hour, minute, second = (parts[name] for name in ("hour", "minute", "second"))
+    half = np.char.lower(parts["half"])
+    if np.any(half != ""):
+        _require((hour >= 1) & (hour <= 12) | (half == ""), "has an hour beyond 12")
+        hour = np.where(half == "", hour, hour % 12) + 12 * (half == "p")
     _require(
         (hour < 24) & (minute < 60) & (second <= 60), "has an hour, minute or second too large"
     )
-    fraction = np.array([int((text or "")[:9].ljust(9, "0")) for text in parts["fraction"]])
-    result: TimeArray = ((hour * 60 + minute) * 60 + second) * 10**9 + fraction
+    result: TimeArray = ((hour * 60 + minute) * 60 + second) * 10**9 + parts["fraction"]
     return result
 
 
@@ -240,14 +325,15 @@ def _late_dates(days: TimeArray, clock_ns: TimeArray) -> TimeArray:
     return late
 
 
-def _offsets_ns(zones: "pd.Series[str]") -> TimeArray:
+def _offsets_ns(zones: NDArray[np.str_]) -> TimeArray:
     """Return the offset from UTC of each row, ns."""
-    known = {}
-    for text in zones.unique():
+    distinct, codes = np.unique(zones, return_inverse=True)
+    minutes = []
+    for text in distinct:
         digits = text[1:].replace(":", "").ljust(4, "0")
-        minutes = int(digits[:2]) * 60 + int(digits[2:]) if text[0] in "+-" else 0
-        known[text] = (-minutes if text[0] == "-" else minutes) * 60 * 10**9
-    return zones.map(known).to_numpy(np.int64)
+        size = int(digits[:2]) * 60 + int(digits[2:]) if text[0] in "+-" else 0
+        minutes.append(-size if text[0] == "-" else size)
+    return np.array(minutes, np.int64)[codes] * (60 * 10**9)
 
 
 def _to_utc(local_ns: TimeArray, zone: tzinfo) -> TimeArray:

@@ -19,6 +19,7 @@ from shiplog.tables.convert import convert
 from shiplog.tables.csv_form import write_csv
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import Layout, load_layout
+from shiplog.tables.layout_parser import parse_layout
 from shiplog.tables.parquet_form import write_parquet
 from shiplog.tables.rebuild import rebuilt_heading, uniform_times
 from shiplog.types import TrialLog
@@ -429,3 +430,48 @@ def test_a_fine_heading_rounded_as_marins_is_rebuilt_from_the_yaw_rate(path: Pat
     rebuilt = rebuilt_heading(time_secs, printed, biased)
     assert np.degrees(np.std(printed - fine)) > 0.28
     assert np.degrees(np.std(rebuilt - fine)) < 0.06
+
+
+def sided_layout(role: str, unit: str, extra: str = "") -> str:
+    """A layout of seconds and one quantity, by their headers."""
+    return (
+        'header = true\n[time]\ncolumn = "t"\nunit = "s"\n'
+        f'[{role}]\ncolumn = "x"\nunit = "{unit}"\n{extra}'
+    )
+
+
+def test_letters_of_port_and_starboard_are_signs(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text("t,x\n0,5.0P\n1,STBD 5.0\n2,0.0\n3,\n")
+    log = read_table(path, parse_layout(sided_layout("rudder", "deg"), "x.toml"))
+    np.testing.assert_allclose(np.degrees(log["rudder"].values), [-5, 5, 0, np.nan])
+    opposite = parse_layout(sided_layout("rudder", "deg", "sign = -1\n"), "x.toml")
+    with pytest.raises(LayoutError, match="sign = -1 is wrong"):
+        read_table(path, opposite)
+
+
+@pytest.mark.parametrize("top", ["t,x [kn]\n", "t,x\ns,kn\n"])
+def test_a_unit_in_the_table_that_contradicts_the_layout_is_a_warning(
+    tmp_path: Path, top: str
+) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(top + "0,5\n1,5\n")
+    name = top.split("\n", maxsplit=1)[0].split(",")[1]
+    for unit, count in (("m/s", 1), ("kn", 0)):
+        text = sided_layout("speed", unit).replace('"x"', f'"{name}"')
+        warnings = read_table(path, parse_layout(text, "x.toml")).warnings
+        assert sum("the table states kn" in w for w in warnings) == count
+
+
+@pytest.mark.parametrize(
+    ("times", "count"),
+    [(("100057", "100058", "100059", "100100"), 1), (("100058", "100059", "100060", "100100"), 0),
+     (("100000", "100100", "100200"), 0), (("0", "1", "2"), 0)],
+)  # fmt: skip
+def test_six_digit_day_times_read_as_seconds_are_a_warning(
+    tmp_path: Path, times: tuple[str, ...], count: int
+) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text("t,x\n" + "".join(f"{t},5\n" for t in times))
+    warnings = read_table(path, parse_layout(sided_layout("speed", "kn"), "x.toml")).warnings
+    assert sum("hhmmss" in w for w in warnings) == count

@@ -95,3 +95,15 @@ def test_summer_time_of_a_named_zone() -> None:
 def test_an_impossible_time_is_refused(text: str) -> None:
     with pytest.raises(TimeTextError):
         read([text], zone=UTC)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["2026-03-29T10:00:01.25Z", "29.03.2026 10:00:01,25+02:00", "3/29/2026 10:00:01 PM", "10:00:01",
+     "20260329T100001.123456789123Z", "29-Mar-2026 1:00:01"],
+)  # fmt: skip
+def test_texts_of_one_form_give_the_times_of_texts_of_several_forms(text: str) -> None:
+    form = TimeForm(0, UTC)
+    alike, _ = parse_times([text, text], None, form)
+    mixed, _ = parse_times([text, text + " "], None, form)  # the blank is another form
+    np.testing.assert_array_equal(alike, mixed)

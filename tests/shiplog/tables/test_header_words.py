@@ -1,0 +1,36 @@
+"""Words of headers: quantities, sides and units."""
+
+import pytest
+
+from shiplog.tables.header_words import is_units_row, recognise, split_header
+
+
+@pytest.mark.parametrize(
+    ("header", "role", "unit"),
+    [
+        ("HDT [deg]", "heading", "deg"), ("rot_dps", "yaw_rate", "deg/s"),
+        ("Rudder (port)", "rudder.port", ""), ("Fahrt [kn]", "speed", "kn"),
+        ("Shaft RPM Stbd", "rpm.starboard", ""), ("N/S", "north_south", ""),
+        ("Drehzahl [1/min]", "rpm", "rpm"), ("Length", None, ""),
+    ],
+)  # fmt: skip
+def test_a_header_gives_quantity_side_and_unit(header: str, role: str | None, unit: str) -> None:
+    words, stated = split_header(header)
+    assert stated == unit
+    assert list(recognise({header: words}, ())) == ([role] if role else [])
+
+
+@pytest.mark.parametrize(
+    ("row", "following", "expected"),
+    [
+        (["", "deg", "knots"], ["x", "1", "2"], True),
+        (["[s]", "[deg]", "[-]"], ["0", "1", "2"], True),
+        (["0", "1", "kn"], ["1", "1", "kn"], False),
+        (["", "", ""], ["0", "1", "2"], False),
+        (["nan", "nan", "NA"], ["0", "1", "2"], False),
+    ],
+)
+def test_a_row_of_units_has_units_and_no_numbers(
+    row: list[str], following: list[str], expected: bool
+) -> None:
+    assert is_units_row(row, following) is expected
