@@ -99,7 +99,7 @@ CAUTION = """\
 The noise settings matter more than the choice of the filter. A small `process_ratio` in the vessel
 file states that the model is accurate. Where the model is inaccurate or a gyro is biased, omit the
 setting: the process noise is then estimated from the log. Innovations larger than expected and many
-gated samples show that the process noise is set too small."""
+rejected samples show that the process noise is set too small."""
 
 
 def main() -> None:
@@ -580,7 +580,7 @@ def kvlcc2_filters(runs: Sequence[Replays]) -> None:
         " of every minute. The model is a first model, fitted to the whole run. The table shows the"
         " rms deviation of the estimates from the withheld samples, in percent of the standard"
         " deviation of the channel; the normalised innovation squared (NIS), which is 1 for a"
-        " consistent filter; and the share of gated samples. All values are medians over the runs."
+        " consistent filter; and the share of rejected samples. All values are medians over the runs."
     )
     tests = [GapTest(run.log, run.plan({}).vessel) for run in runs]
     rows = []
@@ -589,7 +589,7 @@ def kvlcc2_filters(runs: Sequence[Replays]) -> None:
         errors = (f"{100 * error:.3g} %" for error in medians[:2])
         nis = (number(value, 3) for value in medians[2:4])
         rows.append((label, *errors, *nis, f"{100 * medians[4]:.2g} %"))
-    header = ("filter", "yaw rate", "speed", "NIS of yaw rate", "NIS of speed", "gated")
+    header = ("filter", "yaw rate", "speed", "NIS of yaw rate", "NIS of speed", "rejected")
     table("", header, rows)
 
 
@@ -622,7 +622,7 @@ class GapTest:
         -------
         tuple of float
             The rms errors of yaw rate and speed over the standard deviations of the channels; the
-            NIS of both; the share of gated samples.
+            NIS of both; the share of rejected samples.
         """
         series, findings = self._replays.series_and_findings(settings)
         errors = []
@@ -633,9 +633,9 @@ class GapTest:
             error = state_at(series, at[kept], channel.name) - channel.values[kept]
             errors.append(rms(error) / float(np.nanstd(channel.values)))
         residuals = findings.residuals
-        gated = sum(residual.gated for residual in residuals)
+        rejected = sum(residual.rejected for residual in residuals)
         count = sum(residual.count for residual in residuals)
-        return (*errors, *(residual.mean_nis for residual in residuals), gated / count)
+        return (*errors, *(residual.mean_nis for residual in residuals), rejected / count)
 
     def _in_gap(self, channel: Channel) -> np.ndarray:
         """Return for each sample whether it is withheld."""

@@ -110,6 +110,16 @@ def compiled_in_caller(function: F) -> F:
     return cast("F", numba.njit(error_model="numpy", nogil=True)(function))
 
 
+def inlined(function: F) -> F:
+    """Insert the body of a function into each compiled function that calls it.
+
+    For a part of a long loop that is called in one place. A compiled function is optimised anew in
+    each compiled function that calls it, directly or through others; an inlined one only once.
+    """
+    options = {"error_model": "numpy", "nogil": True, "inline": "always"}
+    return cast("F", numba.njit(**options)(function))
+
+
 def overload_for(generic: Callable[..., object], kind: type) -> Callable[[F], F]:
     """Register a function as the implementation of `generic` for one type of first argument.
 

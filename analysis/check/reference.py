@@ -116,7 +116,7 @@ def _residual_tests(analysis: Analysis) -> Iterator[Channel]:
         yield _single(analysis, f"{name}_nis", "residual_test", residuals.mean_nis)
         yield _single(analysis, f"{name}_nis_limit", "residual_test", residuals.nis_band[1])
         yield _single(analysis, f"{name}_whiteness", "residual_test", residuals.whiteness_p)
-        yield _single(analysis, f"{name}_rejected", "count", float(residuals.gated))
+        yield _single(analysis, f"{name}_rejected", "count", float(residuals.rejected))
 
 
 def _disturbances(analysis: Analysis) -> Iterator[Channel]:

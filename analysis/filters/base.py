@@ -36,7 +36,7 @@ class Estimates:
         (n, 2): yaw rate, rad/s, and speed, m/s, measured minus predicted; NaN where not measured.
     innovation_stds
         (n, 2): the standard deviations that the filter predicts for them.
-    gated
+    rejected
         (n, 2): whether a sample was rejected by the gate.
     wave
         (n,): the part of the yaw rate that is due to waves, rad/s; None where no wave is modelled.
@@ -46,7 +46,7 @@ class Estimates:
     stds: FloatArray
     innovations: FloatArray
     innovation_stds: FloatArray
-    gated: NDArray[np.bool_]
+    rejected: NDArray[np.bool_]
     wave: FloatArray | None = None
 
 

@@ -101,7 +101,7 @@ class PseudoInputFilter:
     ) -> tuple[Estimates, Trace]:
         measured = np.column_stack([chunk[name] for name in PAPER_OUTPUTS])
         delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
-        rows, innovations, gated, trace = _filter(
+        rows, innovations, rejected, trace = _filter(
             self._model, self._x, self._P, self._F, self._Q, measured, self._r, self._gate,
             self.outputs, delta, n, chunk.dt_secs, self._last_rate, self._jumps, self._rejected,
             keep,
@@ -109,7 +109,7 @@ class PseudoInputFilter:
         count = len(STATES)
         estimates = Estimates(
             rows[:, :count], np.sqrt(rows[:, count:]), innovations[:, :2],
-            np.sqrt(innovations[:, 2:]), gated,
+            np.sqrt(innovations[:, 2:]), rejected,
         )  # fmt: skip
         x, P, K, e, S = trace
         F = np.repeat(self._F[None], len(P), axis=0)
@@ -163,14 +163,14 @@ def _filter(
         (n, 10): the states and their variances.
     innovations
         (n, 4): innovations of yaw rate and speed, and their variances.
-    gated
+    rejected
         (n, 2): which samples were rejected.
     trace
         States, covariances, gains, innovations and variances of `Trace`; empty unless `keep`.
     """
     count, size = len(measured), len(x)
     rows, innovations = np.empty((count, 2 * size)), np.empty((count, 4))
-    gated = np.zeros((count, 2), np.bool_)
+    rejected = np.zeros((count, 2), np.bool_)
     kept = count if keep else 0
     xs, Ps = np.empty((kept, size)), np.empty((kept, size, size))
     Ks, es, Ss = np.zeros((kept, 2, size)), np.zeros((kept, 2)), np.ones((kept, 2))
@@ -185,7 +185,7 @@ def _filter(
                 x, P, C[output], r[output], measured[k, output], gate, output, rejected_in_a_row, Pc
             )
             innovations[k, output], innovations[k, 2 + output] = innovation, S
-            gated[k, output] = status == REJECTED
+            rejected[k, output] = status == REJECTED
             if status != ACCEPTED:
                 continue
             K = Pc / S
@@ -200,7 +200,7 @@ def _filter(
             copy_matrix(Ps[k], P)
         _predict(c, x, delta[k], delta_dot, n[k], n_dot, dt)
         propagate(P, F, Q, FP)
-    return rows, innovations, gated, (xs, Ps, Ks, es, Ss)
+    return rows, innovations, rejected, (xs, Ps, Ks, es, Ss)
 
 
 @compiled

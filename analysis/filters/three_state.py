@@ -153,13 +153,13 @@ class ThreeStateFilter:
             self.outputs, self._r, self._gate, self._gain, self._constant_gain,
             self._poles, self._interval, self._settling_secs, self._wave_per_sample,
         )  # fmt: skip
-        states, rows, innovations, gated, trace = _filter(
+        states, rows, innovations, rejected, trace = _filter(
             self._model, self._x, self._P, self._Q, self._wave.F, correction, measured, delta, n,
             chunk.dt_secs, self._rejected, self._ages, keep,
         )  # fmt: skip
         estimates = Estimates(
             rows[:, :5], np.sqrt(rows[:, 5:]), innovations[:, :2], np.sqrt(innovations[:, 2:]),
-            gated, self._wave_rate(states),
+            rejected, self._wave_rate(states),
         )  # fmt: skip
         return estimates, Trace(states, *trace)
 
@@ -284,14 +284,14 @@ def _filter(
         (n, 10): w, w', w'', v, v' and their variances.
     innovations
         (n, 4): innovations of yaw rate and speed, and their variances.
-    gated
+    rejected
         (n, 2): which samples were rejected.
     trace
         The arrays of `Trace` after the states; empty unless `keep`.
     """
     count, size = len(measured), len(x)
     xs, rows, innovations = np.empty((count, size)), np.empty((count, 10)), np.empty((count, 4))
-    gated = np.zeros((count, 2), np.bool_)
+    rejected = np.zeros((count, 2), np.bool_)
     kept = count if keep else 0  # rows of the trace
     Ps, Fs = np.empty((kept, size, size)), np.empty((kept, size, size))
     Ks, es, Ss = np.zeros((kept, 2, size)), np.zeros((kept, 2)), np.ones((kept, 2))
@@ -306,7 +306,7 @@ def _filter(
                 correction.gate, output, rejected_in_a_row, Pc,
             )  # fmt: skip
             innovations[k, output], innovations[k, 2 + output] = innovation, S
-            gated[k, output] = status == REJECTED
+            rejected[k, output] = status == REJECTED
             if status != ACCEPTED:
                 continue
             if correction.gain == RELINEARISED:
@@ -324,7 +324,7 @@ def _filter(
         if keep:
             copy_matrix(Fs[k], F)
         propagate(P, F, Q, FP)
-    return xs, rows, innovations, gated, (Ps, Fs, Ks, es, Ss)
+    return xs, rows, innovations, rejected, (Ps, Fs, Ks, es, Ss)
 
 
 @compiled

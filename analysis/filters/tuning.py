@@ -173,8 +173,8 @@ def _fitted_wave(
     Its gate is open, because a filter without a wave model would reject the crests. Spikes are left
     out by their distance from the typical innovation.
     """
-    ungated = replace(settings, gate=OPEN_GATE)
-    innovations = _filter_head(stats, model, noise, ungated, kind).innovations[:, 0]
+    unlimited = replace(settings, gate=OPEN_GATE)
+    innovations = _filter_head(stats, model, noise, unlimited, kind).innovations[:, 0]
     std = MAD_TO_STD * float(np.nanmedian(np.abs(innovations)))
     from .wave_fit import fit_wave  # noqa: PLC0415 - scipy.fft takes long to import
 

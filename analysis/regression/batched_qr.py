@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shiplog.compiled import compiled
+from shiplog.compiled import compiled, inlined
 from shiplog.types import FloatArray
 
 MIN_SQUARE_SUM = 1e-290  # a smaller sum of squares is zero: no rotation can be computed from it
@@ -105,7 +105,8 @@ def solve_batch(factors: FloatArray, m: int, first: int, solutions: BatchSolutio
     gram, inverse_gram = np.zeros((p, p, m)), np.zeros((p, p, m))
     _products(factors, inverse, gram, inverse_gram)
     for i in range(p):
-        value[:] = 0.0
+        for s in range(m):
+            value[s] = 0.0
         for k in range(i, p):
             for s in range(m):
                 value[s] += inverse[i, k, s] * factors[k, p, s]
@@ -118,8 +119,8 @@ def solve_batch(factors: FloatArray, m: int, first: int, solutions: BatchSolutio
                 solutions.inverses[i, j, first + s] = element
                 solutions.inverses[j, i, first + s] = element
     largest, inverse_least = np.empty(m), np.empty(m)
-    _largest_eigenvalues(gram, largest)
-    _largest_eigenvalues(inverse_gram, inverse_least)  # 1 / the smallest of R'R
+    for A, eigenvalues in ((gram, largest), (inverse_gram, inverse_least)):
+        _largest_eigenvalues(A, eigenvalues)  # of the inverse: 1 / the smallest of R'R
     for s in range(m):
         condition = sqrt(largest[s] * inverse_least[s])
         is_finite = 0 < condition < MAX_FINITE_CONDITION
@@ -160,7 +161,7 @@ def merge_factors(factors: FloatArray, others: FloatArray, m: int) -> None:
                     others[i, k, s] += projection[s] * others[i, j, s]
 
 
-@compiled
+@inlined
 def _reflection(
     factors: FloatArray, others: FloatArray, j: int, lead: FloatArray, gain: FloatArray
 ) -> None:
@@ -170,7 +171,8 @@ def _reflection(
     column j of `others`. The diagonal element of `factors` is updated.
     """
     m = len(lead)
-    gain[:] = 0.0
+    for s in range(m):
+        gain[s] = 0.0
     for i in range(j + 1):
         for s in range(m):
             gain[s] += others[i, j, s] ** 2
@@ -183,7 +185,7 @@ def _reflection(
         factors[j, j, s] = pivot if is_nonzero else diagonal
 
 
-@compiled
+@inlined
 def _scale(factors: FloatArray, units: FloatArray) -> None:
     """Scale the columns of R to unit length; `units` (p, m) receives the factors.
 
@@ -191,7 +193,8 @@ def _scale(factors: FloatArray, units: FloatArray) -> None:
     """
     p, m = units.shape
     for j in range(p):
-        units[j] = 0.0
+        for s in range(m):
+            units[j, s] = 0.0
         for i in range(j + 1):
             for s in range(m):
                 units[j, s] += factors[i, j, s] ** 2
@@ -202,7 +205,7 @@ def _scale(factors: FloatArray, units: FloatArray) -> None:
                 factors[i, j, s] *= units[j, s]
 
 
-@compiled
+@inlined
 def _invert(factors: FloatArray, units: FloatArray, inverse: FloatArray) -> None:
     """Add R^-1 to the zeros of `inverse` (p, p, m), by back substitution.
 
@@ -220,7 +223,7 @@ def _invert(factors: FloatArray, units: FloatArray, inverse: FloatArray) -> None
                 inverse[i, j, s] *= inverse[i, i, s]
 
 
-@compiled
+@inlined
 def _products(
     factors: FloatArray, inverse: FloatArray, gram: FloatArray, inverse_gram: FloatArray
 ) -> None:
@@ -236,7 +239,7 @@ def _products(
                     inverse_gram[i, j, s] += inverse[i, k, s] * inverse[j, k, s]
 
 
-@compiled
+@inlined
 def _largest_eigenvalues(A: FloatArray, largest: FloatArray) -> None:
     """Compute the largest eigenvalues of positive semidefinite matrices.
 
@@ -260,7 +263,7 @@ def _largest_eigenvalues(A: FloatArray, largest: FloatArray) -> None:
         largest[s] *= traces[s]
 
 
-@compiled
+@inlined
 def _tridiagonalise(A: FloatArray, squares: FloatArray) -> None:
     """Reduce symmetric matrices to tridiagonal form T by Householder reflections.
 
@@ -269,24 +272,24 @@ def _tridiagonalise(A: FloatArray, squares: FloatArray) -> None:
     """
     p, _, m = A.shape
     w, gain = np.empty((p, m)), np.empty(m)
-    squares[0] = 0.0
+    for k in range(p):
+        for s in range(m):
+            squares[k, s] = 0.0
     for k in range(p - 1):
-        below = squares[k + 1]
-        below[:] = 0.0
         for i in range(k + 2, p):
             for s in range(m):
-                below[s] += A[i, k, s] ** 2
+                squares[k + 1, s] += A[i, k, s] ** 2
         for s in range(m):
-            lead, is_nonzero = A[k + 1, k, s], below[s] > MIN_SQUARE_SUM
-            below[s] += lead**2
-            norm = sqrt(below[s])
+            lead, is_nonzero = A[k + 1, k, s], squares[k + 1, s] > MIN_SQUARE_SUM
+            squares[k + 1, s] += lead**2
+            norm = sqrt(squares[k + 1, s])
             pivot = -norm if lead > 0 else norm
             A[k + 1, k, s] = lead - pivot
             gain[s] = 1 / (pivot * (pivot - lead)) if is_nonzero else 0.0
         _reflect_both_sides(A, k, gain, w)
 
 
-@compiled
+@inlined
 def _reflect_both_sides(A: FloatArray, k: int, gain: FloatArray, w: FloatArray) -> None:
     """Apply ``I - gain v v'`` from both sides to B, the block right of and below column k.
 
@@ -296,7 +299,8 @@ def _reflect_both_sides(A: FloatArray, k: int, gain: FloatArray, w: FloatArray) 
     p, _, m = A.shape
     projection = np.zeros(m)
     for i in range(k + 1, p):
-        w[i] = 0.0
+        for s in range(m):
+            w[i, s] = 0.0
         for j in range(k + 1, p):
             row, column = max(i, j), min(i, j)
             for s in range(m):
@@ -312,7 +316,7 @@ def _reflect_both_sides(A: FloatArray, k: int, gain: FloatArray, w: FloatArray) 
                 A[i, j, s] -= A[i, k, s] * w[j, s] + w[i, s] * A[j, k, s]
 
 
-@compiled
+@inlined
 def _laguerre(A: FloatArray, squares: FloatArray, x: FloatArray) -> None:
     """Compute the largest root x (m,) of det(x I - T) by Laguerre's method.
 
@@ -322,11 +326,12 @@ def _laguerre(A: FloatArray, squares: FloatArray, x: FloatArray) -> None:
     """
     p, _, m = A.shape
     f, g, h = np.empty((2, m)), np.empty((2, m)), np.empty((2, m))
-    x[:] = 1.0
+    for s in range(m):
+        x[s] = 1.0
     for _ in range(MAX_LAGUERRE_STEPS):
-        f[0], f[1] = 0.0, 1.0
-        g[:] = 0.0
-        h[:] = 0.0
+        for s in range(m):
+            f[0, s], g[0, s], h[0, s] = 0.0, 0.0, 0.0
+            f[1, s], g[1, s], h[1, s] = 1.0, 0.0, 0.0
         for i in range(p):
             for s in range(m):
                 a, b = x[s] - A[i, i, s], squares[i, s]

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shiplog.compiled import compiled
+from shiplog.compiled import compiled, inlined
 from shiplog.types import FloatArray
 
 from .batched_qr import (
@@ -32,7 +32,7 @@ from .batched_qr import (
     solve_batch,
 )
 
-BATCH_SIZE = 56  # windows solved together; a power of two would map them to the same cache lines
+BATCH_SIZE = 120  # windows solved together; a power of two would map them to the same cache lines
 CHUNK_ROWS = 8192  # rows processed at once where all are available
 EMPTY_TALLY = (0.0, np.inf, -np.inf)
 
@@ -196,7 +196,16 @@ def push_rows(
     length, row_count = len(state.rows), int(state.row_count[0])
     k = max(0, row_count + len(y) - length + 1) - max(0, row_count - length + 1)
     windows = RawWindows(allocate_solutions(k, X.shape[1]), np.tile(EMPTY_TALLY, (k, 1)))
-    _push_rows(state, rows, tallies, windows)
+    factors, others = np.zeros((2, X.shape[1], X.shape[1] + 1, BATCH_SIZE))
+    first = 0
+    for start in range(0, len(rows), BATCH_SIZE):
+        batch = slice(start, start + BATCH_SIZE)
+        m = _push_batch(
+            state, rows[batch], tallies[batch], factors, others, windows.tallies[first:]
+        )
+        if m > 0:
+            solve_batch(factors, m, first, windows.solutions)
+        first += m
     return windows
 
 
@@ -235,14 +244,38 @@ def rotate_rows(factor: FloatArray, rows: FloatArray) -> None:
 
 
 @compiled
-def _push_rows(
-    state: WindowState, rows: FloatArray, tallies: FloatArray, windows: RawWindows
-) -> None:
-    """Add rows (m, p + 1), overwritten, with tallies (m, 3); write the windows that end in them."""
+def _push_batch(
+    state: WindowState,
+    rows: FloatArray,
+    tallies: FloatArray,
+    factors: FloatArray,
+    others: FloatArray,
+    window_tallies: FloatArray,
+) -> int:
+    """Add rows, and compute the factors and the tallies of the windows that end in them.
+
+    Parameters
+    ----------
+    state
+        The window's state; changed in place.
+    rows
+        (m, p + 1) the rows ``[X y]``, at most `BATCH_SIZE`; overwritten.
+    tallies
+        (m, 3) their tallies.
+    factors
+        (p, p + 1, BATCH_SIZE) receives the factors ``[R Q'y]`` of the windows.
+    others
+        (p, p + 1, BATCH_SIZE) work space.
+    window_tallies
+        (m, 3) the tallies of the windows, which are updated.
+
+    Returns
+    -------
+    count
+        The number of windows.
+    """
     length, p, _ = state.suffixes.shape
-    factors, others = np.zeros((p, p + 1, BATCH_SIZE)), np.empty((p, p + 1, BATCH_SIZE))
-    zero: int = np.int64(0)  # type: ignore[assignment] # a literal compiles `solve_batch` again
-    first, waiting = zero, zero
+    count: int = np.int64(0)  # type: ignore[assignment] # a literal compiles `merge_factors` again
     for t in range(len(rows)):
         index = state.row_count[0] % length
         if index == 0 and state.row_count[0] > 0:
@@ -259,25 +292,22 @@ def _push_rows(
         weight = 1.0 if suffix else 0.0
         for i in range(p):
             for j in range(i, p + 1):
-                factors[i, j, waiting] = state.prefix[i, j]
-                others[i, j, waiting] = weight * state.suffixes[suffix, i, j]
-        _add_tally(windows.tallies, first + waiting, state.prefix_tally, 0)
+                factors[i, j, count] = state.prefix[i, j]
+                others[i, j, count] = weight * state.suffixes[suffix, i, j]
+        _add_tally(window_tallies, count, state.prefix_tally, 0)
         if suffix:
-            _add_tally(windows.tallies, first + waiting, state.suffix_tallies, suffix)
-        waiting += 1
-        if waiting == BATCH_SIZE or t + 1 == len(rows):
-            merge_factors(factors, others, waiting)
-            solve_batch(factors, waiting, first, windows.solutions)
-            first, waiting = first + waiting, zero
+            _add_tally(window_tallies, count, state.suffix_tallies, suffix)
+        count += 1
+    merge_factors(factors, others, count)
+    return count
 
 
-@compiled
+@inlined
 def _complete_block(state: WindowState) -> None:
     """Compute the suffixes of the block that is complete, and start an empty one."""
     length, p, _ = state.suffixes.shape
     factor, tally = state.prefix, state.prefix_tally
-    factor[:] = 0.0
-    tally[0, 0], tally[0, 1], tally[0, 2] = EMPTY_TALLY
+    _clear(factor, tally)
     for t in range(length - 1, -1, -1):
         rotate_row(factor, state.rows, t)
         _add_tally(tally, 0, state.row_tallies, t)
@@ -287,11 +317,21 @@ def _complete_block(state: WindowState) -> None:
         for j in range(3):
             state.suffix_tallies[t, j] = tally[0, j]
             state.row_tallies[t, j] = EMPTY_TALLY[j]
-    factor[:] = 0.0
-    tally[0, 0], tally[0, 1], tally[0, 2] = EMPTY_TALLY
+    _clear(factor, tally)
 
 
-@compiled
+@inlined
+def _clear(factor: FloatArray, tally: FloatArray) -> None:
+    """Set a factor and its tally to those of no rows."""
+    p = len(factor)
+    for i in range(p):
+        for j in range(p + 1):
+            factor[i, j] = 0.0
+    for j in range(3):
+        tally[0, j] = EMPTY_TALLY[j]
+
+
+@inlined
 def _add_tally(tallies: FloatArray, i: int, others: FloatArray, j: int) -> None:
     """Add tally j of `others` to tally i of `tallies`."""
     tallies[i, 0] += others[j, 0]

@@ -330,9 +330,11 @@ class _Stages:
         estimates = self._estimates(held, following, adjoint)
         for i, test in enumerate(self._residual_tests):
             test.add(
-                estimates.innovations[:, i], estimates.innovation_stds[:, i], estimates.gated[:, i]
+                estimates.innovations[:, i],
+                estimates.innovation_stds[:, i],
+                estimates.rejected[:, i],
             )
-        disturbance = self._observer.step(_without_gated(held, estimates), following)
+        disturbance = self._observer.step(_without_rejected(held, estimates), following)
         yaw_rows, surge_rows = self._weak_form.step(signals, self._plan.stats.max_speed)
         self._change_test.add(yaw_rows, surge_rows)
         return ReplayChunk(
@@ -451,12 +453,12 @@ def _residual_test(plan: Plan, output: int) -> ResidualTest:
     return ResidualTest(name, unit, interval, noise_measured=noise_measured)
 
 
-def _without_gated(held: Signals, estimates: Estimates) -> Signals:
+def _without_rejected(held: Signals, estimates: Estimates) -> Signals:
     """Return the signals with the samples that the filter rejected set to NaN."""
-    if not estimates.gated.any():
+    if not estimates.rejected.any():
         return held
     accepted = {
-        name: np.where(estimates.gated[:, i], np.nan, held[name])
+        name: np.where(estimates.rejected[:, i], np.nan, held[name])
         for i, name in enumerate(PAPER_OUTPUTS)
     }
     return replace(held, values=dict(held.values) | accepted)

@@ -13,7 +13,7 @@ from shiplog.types import FloatArray
 
 LAGS = 20
 MIN_MEASUREMENTS = 40  # needed for the whiteness test, and of pairs at each lag
-MAX_GATED_SHARE = 0.01  # of the measurements; spikes are rarer
+MAX_REJECTED_SHARE = 0.01  # of the measurements; spikes are rarer
 SIGNIFICANCE = 0.01
 BAND_99 = 2.576  # standard deviations of a normal distribution: 99 % lie within
 
@@ -43,7 +43,7 @@ class ResidualSummary:
         The 99 % band of that mean for white innovations.
     whiteness_p
         The p-value of the whiteness test; NaN with too few samples.
-    gated
+    rejected
         The number of measurements rejected by the gate.
     """
 
@@ -54,7 +54,7 @@ class ResidualSummary:
     mean_nis: float
     nis_band: tuple[float, float]
     whiteness_p: float
-    gated: int
+    rejected: int
 
     @property
     def white(self) -> bool | None:
@@ -70,8 +70,8 @@ class ResidualSummary:
     @property
     def warning(self) -> str:
         """A warning where the gate rejected more than spikes explain; else empty."""
-        share = self.gated / max(self.gated + self.count, 1)
-        if share <= MAX_GATED_SHARE:
+        share = self.rejected / max(self.rejected + self.count, 1)
+        if share <= MAX_REJECTED_SHARE:
             return ""
         return (
             f"{self.name}: the gate rejected {share:.1%} of the samples, too many for spikes: the "
@@ -97,10 +97,10 @@ class ResidualTest:
     def __init__(self, name: str, unit: str, median_step: float, *, noise_measured: bool) -> None:
         self._name, self._unit, self._noise_measured = name, unit, noise_measured
         self._innovations, self._normalised = Moments(), Moments()
-        self._products, self._gated = _Products(median_step), 0
+        self._products, self._rejected = _Products(median_step), 0
 
     def add(
-        self, innovations: FloatArray, innovation_stds: FloatArray, gated: NDArray[np.bool_]
+        self, innovations: FloatArray, innovation_stds: FloatArray, rejected: NDArray[np.bool_]
     ) -> None:
         """Add the next innovations.
 
@@ -110,11 +110,11 @@ class ResidualTest:
             (n,) in the unit of the output; NaN where nothing was measured.
         innovation_stds
             (n,) the standard deviations that the filter expects.
-        gated
+        rejected
             (n,) whether the gate rejected the measurement.
         """
-        self._gated += int(np.count_nonzero(gated))
-        innovations = np.where(gated, np.nan, innovations)
+        self._rejected += int(np.count_nonzero(rejected))
+        innovations = np.where(rejected, np.nan, innovations)
         self._innovations.add(innovations)
         self._normalised.add(innovations / innovation_stds)
         self._products.add(innovations)
@@ -132,7 +132,7 @@ class ResidualTest:
             self._normalised.mean_square,
             (1 - half_width, 1 + half_width),
             self._products.whiteness(self._innovations.mean, count),
-            self._gated,
+            self._rejected,
         )
 
 

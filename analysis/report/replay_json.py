@@ -100,7 +100,7 @@ def _residuals(findings: Findings, output: int) -> JsonObject:
         "nis_band_99": list(residuals.nis_band),
         "whiteness_p": residuals.whiteness_p,
         "white": residuals.white,
-        "rejected": residuals.gated,
+        "rejected": residuals.rejected,
         "measurement_std": float(noise.measurement_std[output]),
         "measurement_std_origin": "log" if noise.measured[output] else "vessel file",
         "process_ratio": float(noise.process_ratio[output]),

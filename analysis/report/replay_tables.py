@@ -64,7 +64,7 @@ def _residual_table(findings: Findings) -> TextTable:
             f"{residuals.mean_nis:.3f}",
             f"{low:.2f}–{high:.2f}",
             f"{residuals.whiteness_p:.2g}",
-            f"{residuals.gated}",
+            f"{residuals.rejected}",
         )
         rows.append(cells)
     columns = (
@@ -158,7 +158,7 @@ def _coefficient_remarks(findings: Findings) -> Iterator[str]:
         "Not determined: the data do not separate it from the other coefficients, or not even its "
         "sign is certain. A bias of the gyro goes into b1, b2, b3 and e."
     )
-    if any(residuals.gated for residuals in findings.residuals):
+    if any(residuals.rejected for residuals in findings.residuals):
         yield (
             "Samples rejected by the filter are used in this fit all the same: spikes distort b1, "
             "b2, b3 and e."

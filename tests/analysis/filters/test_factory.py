@@ -62,27 +62,27 @@ def filtered(vessel: Vessel, signals: Signals, kind: str, gate: float = 6.0) -> 
 
 @of_each_kind
 @of_each_output
-def test_a_spike_is_gated_and_counted_and_hardly_felt(
+def test_a_spike_is_rejected_counted_and_hardly_changes_the_estimate(
     vessel: Vessel, kind: str, output: int, name: str
 ) -> None:
     clean = straight_run(vessel, 1)
     spiked = off_by(clean, name, slice(500, 501), 20 * STDS[output])
     before, after = (filtered(vessel, signals, kind) for signals in (clean, spiked))
-    assert np.argwhere(after.gated).tolist() == [[500, output]]
+    assert np.argwhere(after.rejected).tolist() == [[500, output]]
     assert after.innovations[500, output] > 6 * after.innovation_stds[500, output]
-    assert after.gated[500, output]
+    assert after.rejected[500, output]
     assert np.all(np.abs(after.states - before.states) < after.stds)
 
 
 @of_each_kind
 @of_each_output
-def test_what_is_gated_is_as_what_was_not_measured(
+def test_rejected_sample_is_treated_as_missing(
     vessel: Vessel, kind: str, output: int, name: str
 ) -> None:
     clean = straight_run(vessel, 1)
     spiked = off_by(clean, name, slice(500, 503), 20 * STDS[output])
     missing = off_by(clean, name, slice(500, 503), np.nan)
-    assert filtered(vessel, spiked, kind).gated.sum() == 3
+    assert filtered(vessel, spiked, kind).rejected.sum() == 3
     stats, found = signal_stats(clean, vessel.coefficients), []
     for signals in (spiked, missing):
         filtering = made(vessel, stats, kind)
@@ -102,7 +102,7 @@ def test_with_the_gate_wide_open_a_spike_is_taken_in(
     clean = straight_run(vessel, 1)
     spiked = off_by(clean, name, slice(500, 501), 20 * STDS[output])
     before, after = (filtered(vessel, signals, kind, 1e6) for signals in (clean, spiked))
-    assert not after.gated.any()
+    assert not after.rejected.any()
     state = (0, 3)[output]
     assert after.states[500, state] - before.states[500, state] > after.stds[500, state]
 
@@ -115,9 +115,9 @@ def test_a_step_that_lasts_is_believed_after_five_samples(
     stepped = off_by(straight_run(vessel, 1), name, slice(500, None), 20 * STDS[output])
     found = filtered(vessel, stepped, kind)
     assert MAX_REJECTED_IN_A_ROW == 5
-    at = np.flatnonzero(found.gated[:530, output])
+    at = np.flatnonzero(found.rejected[:530, output])
     assert at.tolist() == [500 + k for k in range(MAX_REJECTED_IN_A_ROW)]
-    assert not found.gated[:, 1 - output].any()
+    assert not found.rejected[:, 1 - output].any()
     state = (0, 3)[output]
     assert found.states[-1, state] - found.states[499, state] > 10 * STDS[output]
 
@@ -129,13 +129,13 @@ def test_a_step_that_is_believed_is_not_doubted_again_on_the_way_to_it(
 ) -> None:
     """Else what noise takes towards the estimate is taken in, and what it takes away is not."""
     stepped = off_by(straight_run(vessel, 1), name, slice(500, None), 20 * STDS[output])
-    assert filtered(vessel, stepped, kind).gated.sum() == MAX_REJECTED_IN_A_ROW
+    assert filtered(vessel, stepped, kind).rejected.sum() == MAX_REJECTED_IN_A_ROW
 
 
 @of_each_kind
 @pytest.mark.parametrize("seed", range(5))
-def test_of_white_noise_nothing_is_gated(vessel: Vessel, kind: str, seed: int) -> None:
-    assert not filtered(vessel, straight_run(vessel, seed), kind).gated.any()
+def test_of_white_noise_no_sample_is_rejected(vessel: Vessel, kind: str, seed: int) -> None:
+    assert not filtered(vessel, straight_run(vessel, seed), kind).rejected.any()
 
 
 @pytest.fixture(scope="module")

@@ -207,7 +207,7 @@ def test_the_settings_smooth_what_is_told_and_leave_the_innovations_alone(
     c, noise = vessel.coefficients, NOISES[kind]
     plain = filter_states(signals, c, noise, FilterSettings(kind=kind))
     found = filter_states(signals, c, noise, FilterSettings(kind=kind, smooth=True))
-    for name in ("innovations", "innovation_stds", "gated"):
+    for name in ("innovations", "innovation_stds", "rejected"):
         assert np.array_equal(getattr(found, name), getattr(plain, name), equal_nan=True), name
     filtering = made(vessel, signals, kind)
     _, _, (x, P) = smoothed_run(filtering, signals)

@@ -268,7 +268,7 @@ def test_any_other_gain_is_kept_in_a_straight_ship_once_the_best_one_has_fallen_
         assert max(apart(found, (run.mean[k] + off, P))) < 1e-9
         off, P = run.F @ off, run.F @ P @ run.F.T + run.Q
     assert settled == [True, True]
-    assert not estimates.gated.any()
+    assert not estimates.rejected.any()
 
 
 @WAVES

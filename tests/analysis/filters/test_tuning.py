@@ -184,7 +184,7 @@ def test_spikes_make_no_process_noise(signals: Signals, vessel: Vessel, kind: st
     )
     assert np.all(spiked.process_ratio < 3 * clean.process_ratio)
     estimates = filter_states(replace(signals, values=values), c, spiked, FilterSettings(kind=kind))
-    assert estimates.gated.sum(axis=0).tolist() == pytest.approx([25, 25], abs=3)
+    assert estimates.rejected.sum(axis=0).tolist() == pytest.approx([25, 25], abs=3)
 
 
 def waved(signals: Signals, std: float) -> Signals:

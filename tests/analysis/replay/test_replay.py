@@ -414,16 +414,16 @@ def test_a_spike_is_rejected_counted_and_harmless(
 ) -> None:
     spiked = spike("yaw_rate", 150.0, np.radians(1.0))(zigzag_log)
     found = analyse(spiked)
-    assert found.findings.residuals[0].gated == 1
+    assert found.findings.residuals[0].rejected == 1
     away = np.abs(found.estimates.states - zigzag_analysis.estimates.states)
     assert np.all(away < 0.3 * zigzag_analysis.estimates.stds)
     moment = np.abs(found.disturbance.yaw - zigzag_analysis.disturbance.yaw)
     assert (
         moment.max() < zigzag_analysis.findings.disturbances["yaw"].noise_std
     )  # the observer ignores it, too
-    ungated = analyse(spiked, settings={"filter.gate": 1e6})
-    assert ungated.findings.residuals[0].gated == 0
-    assert ungated.findings.residuals[0].mean_nis > found.findings.residuals[0].mean_nis
+    unlimited = analyse(spiked, settings={"filter.gate": 1e6})
+    assert unlimited.findings.residuals[0].rejected == 0
+    assert unlimited.findings.residuals[0].mean_nis > found.findings.residuals[0].mean_nis
 
 
 def test_poles_slower_than_the_optimal_ones_are_used(zigzag_log: TrialLog) -> None:

@@ -92,4 +92,4 @@ def test_every_filter_replays_every_run_of_the_kvlcc2(run: Path, kind: str, smoo
     found = analyse(log, settings={"filter.kind": kind, "filter.smooth": smooth})
     assert np.isfinite(found.estimates.states).all()
     assert np.isfinite(found.estimates.stds).all()
-    assert found.estimates.gated.mean() < 0.01
+    assert found.estimates.rejected.mean() < 0.01

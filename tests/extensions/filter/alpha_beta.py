@@ -64,7 +64,7 @@ class AlphaBetaFilter:
             stds=np.tile(self._stds, (n, 1)),
             innovations=innovations,
             innovation_stds=np.tile(self._innovation_stds, (n, 1)),
-            gated=np.zeros((n, 2), bool),
+            rejected=np.zeros((n, 2), bool),
         )
 
 
