@@ -580,7 +580,8 @@ def kvlcc2_filters(runs: Sequence[Replays]) -> None:
         " of every minute. The model is a first model, fitted to the whole run. The table shows the"
         " rms deviation of the estimates from the withheld samples, in percent of the standard"
         " deviation of the channel; the normalised innovation squared (NIS), which is 1 for a"
-        " consistent filter; and the share of rejected samples. All values are medians over the runs."
+        " consistent filter; and the share of rejected samples. All values are medians over the"
+        " runs."
     )
     tests = [GapTest(run.log, run.plan({}).vessel) for run in runs]
     rows = []

@@ -1,8 +1,8 @@
-"""Compilation of the filter's and the observer's loops in a second process, on a first run.
+"""Compilation of the loops of filter, observer and windows in a second process, on a first run.
 
 Numba compiles in one thread. On the first run on a computer the loops of the plan are compiled in
-the process of the replay and those of the estimators in a second one, which takes half the time on
-two cores. Both keep the machine code in the same cache.
+the process of the replay, and those of the estimators and of the windows in a second one, so that
+both take about as long. Both keep the machine code in the same cache.
 """
 
 import subprocess
@@ -15,6 +15,8 @@ import numpy as np
 from analysis.disturbance.observer import observe_disturbance
 from analysis.filters.factory import filter_states
 from analysis.filters.noise_model import NoiseModel
+from analysis.regression.sliding import WindowedRegression
+from analysis.regression.weak_form import Equation, Rows
 from shiplog.compiled import is_compiled
 from shiplog.types import Signals
 from shiplog.vessel.settings import FilterSettings
@@ -70,6 +72,19 @@ def compile_estimators(settings: FilterSettings) -> None:
     observe_disturbance(signals, model, noise)
 
 
+def compile_windows() -> None:
+    """Compile the loops of the sliding windows with fewer rows than a window, so none is solved.
+
+    The plan compiles the solver.
+    """
+    equation = Equation(("a", "d"), 1.0, 20.0)
+    time_secs = np.arange(50.0)
+    X = np.column_stack((np.sin(time_secs / 25), np.cos(time_secs / 40)))
+    rows = Rows(equation, time_secs, X[:, 0], X, X[:, 0], 0.1)
+    WindowedRegression(equation, SAMPLES).step(rows)
+
+
 if __name__ == "__main__":
     kind, smooth = sys.argv[1:]
     compile_estimators(FilterSettings(kind=kind or None, smooth=bool(smooth)))
+    compile_windows()
