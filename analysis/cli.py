@@ -289,10 +289,9 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
 def _measured_logs(paths: Sequence[str], arguments: argparse.Namespace) -> "list[Log]":
     """Open the logs that are of trials; report the references and truths that are skipped."""
     from analysis.identification.runs import is_measured
-    from shiplog.mcap.stream import open_log
 
-    uncut = {path: open_log(path) for path in paths}
-    skipped = [path for path, log in uncut.items() if not is_measured(log)]
+    logs = {path: open_cut(path, arguments) for path in paths}
+    skipped = [path for path, log in logs.items() if not is_measured(log)]
     if skipped and len(skipped) == len(paths):
         raise UsageError(
             "references of `shiplog check` and simulated truths are no trials; give the logs "
@@ -301,7 +300,7 @@ def _measured_logs(paths: Sequence[str], arguments: argparse.Namespace) -> "list
     if skipped:
         names = ", ".join(Path(path).name for path in skipped)
         print(f"skipped, as references or simulated truths: {names}", file=sys.stderr)
-    return [open_cut(path, arguments) for path in paths if path not in skipped]
+    return [log for path, log in logs.items() if path not in skipped]
 
 
 # ---- check
