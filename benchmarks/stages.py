@@ -19,8 +19,7 @@ STAGES = {
     "read": ("shiplog.mcap",),
     "check": (
         "shiplog.checks.log_stats", "shiplog.checks.data_quality", "shiplog.checks.stuck",
-        "shiplog.checks.rudder_sign", "shiplog.checks.gyro_bias", "shiplog.checks.consistency",
-        "shiplog.checks.interpolate",
+        "shiplog.checks.consistency", "shiplog.checks.interpolate",
         "analysis.replay.channel_warnings",
     ),
     "resample": ("shiplog.resampling", "analysis.signals.hold"),

@@ -9,12 +9,12 @@ import numpy as np
 
 from analysis.identification.fit.segment import Segment, initial_level, split_into_segments
 from shiplog.checks.channel_stats import ChannelStats
-from shiplog.checks.consistency.consistency_check import ConsistencyCheck
-from shiplog.checks.consistency.findings import Finding, refuse_contradictions
+from shiplog.checks.consistency.consistency_check import consistency_findings
+from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.errors import LogError, UsageError
 from shiplog.geodesy import LocalFrame, positions_of
 from shiplog.resampling import choose_clock, resample_chunks, with_steering_gear
-from shiplog.screening import ScreenedLog, screen_log
+from shiplog.screening import screen_log
 from shiplog.types import (
     FloatArray,
     Log,
@@ -106,7 +106,7 @@ def run_from_log(
     segments = split_into_segments(signals, log.name)
     position = stats.get("position")
     fixes = _north_east(screened, position) if position is not None else None
-    findings = _consistency(screened)
+    findings = consistency_findings(screened, stats)
     if strict:
         refuse_contradictions(findings)
     warnings = [*screened.warnings, *(finding.text for finding in findings)]
@@ -180,13 +180,6 @@ def _numbered(name: str, number: int) -> str:
 
 def _renamed(run: Run, name: str) -> Run:
     return replace(run, name=name, segments=tuple(replace(t, name=name) for t in run.segments))
-
-
-def _consistency(log: ScreenedLog) -> list[Finding]:
-    check = ConsistencyCheck(log.screening.stats)
-    for chunk in log.chunks():
-        check.add(chunk)
-    return check.result()
 
 
 def _north_east(log: Log, stats: ChannelStats) -> tuple[TimeArray, FloatArray]:

@@ -5,7 +5,7 @@ decisions chunk by chunk. Replay and identification read every log through it. I
 `shiplog.tables`, `shiplog.resampling` or `shiplog.vessel`.
 """
 
-from .screen import screen_log
+from .screen import screen_log, screen_values
 from .screened_log import ScreenedLog, Screening
 
-__all__ = ["ScreenedLog", "Screening", "screen_log"]
+__all__ = ["ScreenedLog", "Screening", "screen_log", "screen_values"]

@@ -1,6 +1,7 @@
 """Decisions about what is used of a log, from statistics of the whole log."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from shiplog.checks.channel_stats import LogStats
 from shiplog.checks.data_quality import data_warnings
@@ -47,16 +48,42 @@ def screen_log(
     >>> screened.warnings
     ()
     """
+    screened = screen_values(log, (*required, *optional), sources=sources)
+    stats = screened.screening.stats
+    _require_channels(stats, required, purpose)
+    names = (*required, *(name for name in optional if name in stats))
+    warnings = (*screened.screening.warnings, *data_warnings(stats, names))
+    return ScreenedLog(log, replace(screened.screening, warnings=warnings))
+
+
+def screen_values(
+    log: Log, names: Sequence[str], *, sources: Mapping[str, str] | None = None
+) -> ScreenedLog:
+    """Return a log with one source of each quantity and no unusable value, whatever it lacks.
+
+    No channel is required, and defects of a single channel are neither refused nor reported.
+
+    Parameters
+    ----------
+    log
+        The log as recorded.
+    names
+        Names of the quantities that are used, where the log has them.
+    sources
+        As in `screen_log`.
+
+    Raises
+    ------
+    LogError
+        A source is missing.
+    """
     chosen = dict(sources or {})
     selected = log.select_sources(chosen) if chosen else log
     stats = compute_log_stats(selected, strict=True)
-    _require_channels(stats, required, purpose)
-    present = tuple(name for name in optional if name in stats)
-    found, source_warnings = choose_sources(selected, stats, (*required, *present), chosen)
+    present = tuple(name for name in names if name in stats)
+    found, warnings = choose_sources(selected, stats, present, chosen)
     chosen |= found
-    stats = stats.select_sources(chosen)
-    warnings = [*source_warnings, *data_warnings(stats, (*required, *present))]
-    return ScreenedLog(log, Screening(stats, chosen, tuple(warnings)))
+    return ScreenedLog(log, Screening(stats.select_sources(chosen), chosen, tuple(warnings)))
 
 
 def _require_channels(stats: LogStats, required: Sequence[str], purpose: str) -> None:

@@ -5,13 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from shiplog.checks.consistency.consistency_check import consistency_findings
+from shiplog.checks.consistency.consistency_check import COMPARED_CHANNELS, consistency_findings
 from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.checks.data_quality import times_in_words
 from shiplog.errors import LogError, UsageError
 from shiplog.mcap.clock_repair import refuse_mixed_times
 from shiplog.mcap.reader import read_unchecked
 from shiplog.mcap.writer import write
+from shiplog.screening import screen_values
 from shiplog.types import TrialLog
 
 from .csv_form import CSV_MARK, read_csv, write_csv
@@ -78,7 +79,8 @@ def convert(
         log, sort_warnings = sorted_by_time(log)
         warnings += sort_warnings
     if layout is not None:
-        findings = consistency_findings(log)
+        screened = screen_values(log, COMPARED_CHANNELS)
+        findings = consistency_findings(screened, screened.screening.stats)
         if strict:
             refuse_contradictions(findings)
         warnings += [finding.text for finding in findings]

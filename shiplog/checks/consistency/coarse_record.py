@@ -1,19 +1,66 @@
 """The channels of a log on one coarse clock, gathered chunk by chunk, for comparisons."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from shiplog.checks.channel_stats import ChannelStats, LogStats
 from shiplog.checks.interpolate import Interpolator
+from shiplog.geodesy.local_frame import LocalFrame
+from shiplog.geodesy.positions import positions_of
 from shiplog.types import Channel, FloatArray
-from shiplog.units import GEOGRAPHIC
 
 MIN_STEP_SECS = 0.1
 MIN_INSTANTS = 300  # of a log so short that its times may have a wrong unit
 MAX_INSTANTS = 50_000
-EARTH_RADIUS = 6_371_000.0  # m
+MIN_SAMPLES = 24  # of a channel that is compared with others
+COURSE_WINDOW_SECS = 10.0  # over which the course of the fixes is measured
 TURN = 2 * np.pi
+COMPARED_CHANNELS = ("yaw_rate", "heading", "position", "speed", "rudder", "rpm")
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseSignals:
+    """The channels of a log on one clock; NaN where a channel is not known.
+
+    Attributes
+    ----------
+    dt_secs
+        Step of the clock.
+    yaw
+        (n,) integrated yaw rate, rad, from an arbitrary zero.
+    heading
+        (n,) heading without jumps at full turns, rad.
+    north, east
+        (n,) position of the fixes, m.
+    course
+        (n,) course of the fixes without jumps, rad; NaN where the ship hardly moves.
+    speed, rudder, rpm
+        (n,) m/s, rad and rpm.
+    topics
+        The topic of each channel, by name.
+    datum
+        Latitude and longitude of the first fix as read, deg; None where positions are local.
+    """
+
+    dt_secs: float
+    yaw: FloatArray
+    heading: FloatArray
+    north: FloatArray
+    east: FloatArray
+    course: FloatArray
+    speed: FloatArray
+    rudder: FloatArray
+    rpm: FloatArray
+    topics: Mapping[str, str]
+    datum: tuple[float, float] | None
+
+    @property
+    def swing(self) -> float:
+        """How far the ship turned between its extreme headings, rad; 0 where it is not known."""
+        known = (x[np.isfinite(x)] for x in (self.yaw, self.heading))
+        return max((float(np.ptp(x)) for x in known if len(x)), default=0.0)
 
 
 class CoarseRecord:
@@ -39,12 +86,11 @@ class CoarseRecord:
         span = (end - start) * 1e-9
         step_secs = max(min(MIN_STEP_SECS, span / MIN_INSTANTS), span / MAX_INSTANTS)
         self.dt_secs = step_secs if span > 0 else 0.0
-        self._start = start
         at = np.arange(int(span / self.dt_secs) + 1) * self.dt_secs if span > 0 else np.zeros(1)
         self._count = len(at)
-        for name in ("yaw_rate", "heading", "position", "speed", "rudder", "rpm"):
+        for name in COMPARED_CHANNELS:
             channel = stats.get(name)
-            if channel is not None and channel.valid > 1:
+            if channel is not None and channel.valid >= (1 if channel.hold else MIN_SAMPLES):
                 self._series[name] = _Series(channel, at, start)
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
@@ -52,104 +98,110 @@ class CoarseRecord:
         for series in self._series.values():
             series.add(chunk)
 
-    def values(self, name: str) -> FloatArray:
-        """Return a channel at all instants, (n,); all NaN where the log does not have it.
+    def result(self) -> CoarseSignals:
+        """Return the channels at all instants, once all samples were added."""
+        values = {
+            name: self._series[name].result() if name in self._series else self._unknown(name)
+            for name in COMPARED_CHANNELS
+        }
+        frame = self._series["position"].frame if "position" in self._series else None
+        north, east = values["position"].T
+        return CoarseSignals(
+            dt_secs=self.dt_secs,
+            yaw=values["yaw_rate"][:, 0],
+            heading=values["heading"][:, 0],
+            north=north,
+            east=east,
+            course=_course(self.dt_secs, north, east),
+            speed=values["speed"][:, 0],
+            rudder=values["rudder"][:, 0],
+            rpm=values["rpm"][:, 0],
+            topics={name: series.stats.topic for name, series in self._series.items()},
+            datum=frame.datum if frame is not None and frame.geographic else None,
+        )
 
-        The yaw rate is integrated (rad) and the heading is continuous over full turns (rad).
-        """
-        series = self._series.get(name)
-        return series.results()[0] if series else np.full(self._count, np.nan)
-
-    @property
-    def first_heading(self) -> float:
-        """First valid heading, rad; 0 without one."""
-        series = self._series.get("heading")
-        return series.first if series else 0.0
-
-    @property
-    def is_geographic(self) -> bool:
-        """Whether the positions are latitude and longitude."""
-        series = self._series.get("position")
-        return series is not None and series.is_geographic
-
-    def track(self) -> tuple[FloatArray, FloatArray]:
-        """Return the position north and east, each (n,) m; all NaN without positions."""
-        series = self._series.get("position")
-        if series is None:
-            return self.values(""), self.values("")
-        north, east = series.results()
-        return north, east
+    def _unknown(self, name: str) -> FloatArray:
+        return np.full((self._count, 2 if name == "position" else 1), np.nan)
 
 
 class _Series:
     """One channel on the clock; a position has two components."""
 
     def __init__(self, stats: ChannelStats, at: FloatArray, start: int) -> None:
-        self._stats, self._start, self._at = stats, start, at
+        self.stats, self._start, self._at = stats, start, at
         columns = 2 if stats.fields else 1
-        gap = stats.gap_threshold_secs
+        self._hold = stats.hold is not None
+        self._gap_secs = stats.gap_threshold_secs  # infinite where it is held
         self._interpolators = [
-            Interpolator(at, gap, hold=stats.hold is not None) for _ in range(columns)
+            Interpolator(at, self._gap_secs, hold=self._hold) for _ in range(columns)
         ]
+        self._after_gap = np.zeros(len(at) + 1, bool)
+        self.frame: LocalFrame | None = None
         self._last: tuple[FloatArray, FloatArray] | None = None
-        self._sum, self._begun, self.first = np.zeros(columns), False, 0.0
+        self._accumulated = np.zeros(columns)
         self._changes = self._change_function()
 
-    @property
-    def is_geographic(self) -> bool:
-        return self._stats.fields == GEOGRAPHIC
-
     def add(self, chunk: tuple[Channel, ...]) -> None:
-        channel = self._stats.select(chunk)
+        """Add the next samples of the log."""
+        channel = self.stats.select(chunk)
         if channel is None or not len(channel):
             return
-        rows = channel.values.reshape(len(channel), -1)[:, : len(self._interpolators)]
+        rows = self._rows(channel)
         valid = np.isfinite(rows).all(axis=1)
-        if channel.fields == GEOGRAPHIC:
-            valid &= (np.abs(rows) <= (90.0, 180.0)).all(axis=1) & rows.any(axis=1)
         rows, times = rows[valid], (channel.measured_ns[valid] - self._start) * 1e-9
         if not len(rows):
             return
-        if not self._begun:
-            self.first, self._begun = float(rows[0, 0]), True
-        values = rows
+        if self._last is None and self.stats.name == "heading":
+            self._accumulated = rows[0]  # the heading keeps its zero
+        last_times, last_rows = self._last or (times[:1], rows[:1])
+        self._last = times[-1:], rows[-1:]
+        joined = np.concatenate((last_times, times))
+        in_gap = np.diff(joined) > self._gap_secs
+        self._after_gap[np.searchsorted(self._at, times[in_gap])] = True
         if self._changes:
-            last_times, last_rows = self._last or (times[:1], rows[:1])
-            joined = np.concatenate((last_rows, rows))
-            steps = self._changes(np.concatenate((last_times, times)), joined)
-            values = self._sum + np.cumsum(steps, axis=0)
-            self._sum, self._last = values[-1], (times[-1:], rows[-1:])
-        for interpolator, column in zip(self._interpolators, values.T, strict=True):
+            steps = self._changes(joined, np.concatenate((last_rows, rows)))
+            rows = self._accumulated + np.cumsum(steps, axis=0)
+            self._accumulated = rows[-1]
+        for interpolator, column in zip(self._interpolators, rows.T, strict=True):
             interpolator.add(times, column)
 
-    def results(self) -> tuple[FloatArray, ...]:
-        first, last = ((t - self._start) * 1e-9 for t in self._stats.valid_span_ns)
-        outside = (self._at < first - 1e-6) | (self._at > last + 1e-6)
-        return tuple(np.where(outside, np.nan, each.result()) for each in self._interpolators)
+    def result(self) -> FloatArray:
+        """Return the values at the instants, (n, k).
+
+        The instant after a gap is NaN even if the gap lies between two instants. A channel that is
+        held between its samples has no gaps, and no end before that of the log.
+        """
+        first, last = ((t - self._start) * 1e-9 for t in self.stats.valid_span_ns)
+        end = np.inf if self._hold else last + 1e-6
+        unknown = (self._at < first - 1e-6) | (self._at > end) | self._after_gap[:-1]
+        values = np.column_stack([each.result() for each in self._interpolators])
+        return np.where(unknown[:, None], np.nan, values)
+
+    def _rows(self, channel: Channel) -> FloatArray:
+        """Return the samples, (m, k); of a position north and east of the first fix."""
+        if not self.stats.fields:
+            return channel.values[:, None]
+        positions = positions_of(channel.fields, channel.values)
+        self.frame = self.frame or LocalFrame.at_first(positions)
+        if self.frame is None:
+            return np.full((len(channel), 2), np.nan)
+        return self.frame.north_east(positions)
 
     def _change_function(self) -> Callable[[FloatArray, FloatArray], FloatArray] | None:
         """Return the function that computes changes from sample to sample; None for values."""
-        if self._stats.name == "yaw_rate":
+        if self.stats.name == "yaw_rate":
             return _integrated
-        if self._stats.name == "heading":
-            full_turn = _full_turn(*self._stats.value_range)
-            return lambda _, values: (
-                (np.diff(values, axis=0) + full_turn / 2) % full_turn - (full_turn / 2)
-            )
-        return _local if self._stats.fields == GEOGRAPHIC else None
+        if self.stats.name != "heading":
+            return None
+        full_turn = _full_turn(*self.stats.value_range)
+        return lambda _, values: (
+            (np.diff(values, axis=0) + full_turn / 2) % full_turn - full_turn / 2
+        )
 
 
 def _integrated(times: FloatArray, rates: FloatArray) -> FloatArray:
     """Change of the heading between samples of the yaw rate, by the trapezoidal rule."""
     return np.asarray(np.diff(times)[:, None] * (rates[1:] + rates[:-1]) / 2)
-
-
-def _local(_: FloatArray, degrees: FloatArray) -> FloatArray:
-    """Displacement north and east between fixes in degrees, m."""
-    latitude, longitude = np.radians(degrees).T
-    north = np.diff(latitude)
-    east = (np.diff(longitude) + np.pi) % TURN - np.pi
-    return EARTH_RADIUS * np.column_stack((north, east * np.cos(latitude[1:])))
 
 
 def _full_turn(low: float, high: float) -> float:
@@ -162,3 +214,20 @@ def _full_turn(low: float, high: float) -> float:
     if high > 2 * TURN or low < -2 * TURN:
         return 360.0
     return float(np.radians(400.0)) if high > TURN + 0.02 and low >= 0 else TURN
+
+
+def _course(dt: float, north: FloatArray, east: FloatArray) -> FloatArray:
+    """Return the continuous course over ground, rad, (n,); NaN where the ship hardly moves."""
+    course = np.full_like(north, np.nan)
+    n = max(round(COURSE_WINDOW_SECS / dt / 2), 1) if dt else 1
+    if len(north) <= 4 * n:
+        return course
+    dn, de = north[2 * n :] - north[: -2 * n], east[2 * n :] - east[: -2 * n]
+    moved = np.hypot(dn, de)
+    if not np.isfinite(moved).any():
+        return course
+    known = moved > max(0.3 * float(np.nanmedian(moved)), 1e-3)
+    angle = np.full_like(dn, np.nan)
+    angle[known] = np.unwrap(np.arctan2(de[known], dn[known]))
+    course[n:-n] = angle
+    return course

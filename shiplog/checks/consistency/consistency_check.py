@@ -3,26 +3,41 @@
 import numpy as np
 
 from shiplog.checks.channel_stats import ChannelStats, LogStats
-from shiplog.checks.gyro_bias import GyroBiasCheck
 from shiplog.checks.log_stats import compute_log_stats
-from shiplog.checks.rudder_sign import SIGNIFICANT_ERRORS, RudderSignCheck
-from shiplog.types import Channel, FloatArray, Log
+from shiplog.types import Channel, Log
 
-from .coarse_record import CoarseRecord
+from .coarse_record import COMPARED_CHANNELS, CoarseRecord, CoarseSignals
 from .findings import Finding
-from .speed_findings import heading_zero_findings, range_findings, speed_findings
+from .ground_velocity import ground_velocity
+from .gyro_bias import bias_findings
+from .rudder_effect import rudder_significance
+from .speed_findings import (
+    heading_zero_findings,
+    range_findings,
+    speed_findings,
+    speed_lag_findings,
+)
 from .time_findings import time_findings
 from .turning_findings import Pair, sense_explanations, sense_findings, unit_findings
 from .turning_ratio import TurningRatio, turning_ratio
 
-COURSE_WINDOW_SECS = 10.0  # over which the course of the fixes is measured
-MIN_TURN = {"yaw_rate": 0.0, "heading": 0.0, "position": np.radians(5.0)}  # rad, of the changes
+__all__ = ["COMPARED_CHANNELS", "ConsistencyCheck", "consistency_findings"]
+
+MIN_COURSE_STD = np.radians(5.0)  # of the course, below which it is not compared with turns
+MIN_RUDDER_ERRORS = 3.0  # standard errors by which the rudder's effect must differ from zero
 MIN_LAG_SECS, LAG_ERRORS = 0.5, 6.0
 MIN_IMPOSSIBLE_SHARE = 0.2  # of the samples, from which the unit is the likely cause
 
 
-def consistency_findings(log: Log) -> list[Finding]:
+def consistency_findings(log: Log, stats: LogStats | None = None) -> list[Finding]:
     """Return what the channels of a log contradict each other in.
+
+    Parameters
+    ----------
+    log
+        The log.
+    stats
+        Its statistics, computed with `strict`; by default they are computed in a pass of their own.
 
     Examples
     --------
@@ -30,7 +45,7 @@ def consistency_findings(log: Log) -> list[Finding]:
     >>> consistency_findings(shiplog.read("sample_data/zigzag_20_20.mcap"))
     []
     """
-    check = ConsistencyCheck(compute_log_stats(log, strict=True))
+    check = ConsistencyCheck(stats or compute_log_stats(log, strict=True))
     for chunk in log.chunks():
         check.add(chunk)
     return check.result()
@@ -52,90 +67,71 @@ class ConsistencyCheck:
     def __init__(self, stats: LogStats) -> None:
         self._stats = stats
         self._record = CoarseRecord(stats)
-        self._rudder, self._bias = RudderSignCheck(stats), GyroBiasCheck(stats)
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
         """Add the next samples of the log."""
-        for check in (self._record, self._rudder, self._bias):
-            check.add(chunk)
+        self._record.add(chunk)
 
     def result(self) -> list[Finding]:
         """Return the findings, once all samples were added."""
         findings = _impossible_findings(self._stats)
         if self._record.dt_secs == 0:
             return findings
-        topics = {channel.name: channel.topic for channel in reversed(self._stats.channels)}
-        dt = self._record.dt_secs
-        yaw, heading, speed, rudder, rpm = (
-            self._record.values(name) for name in ("yaw_rate", "heading", "speed", "rudder", "rpm")
-        )
-        north, east = self._record.track()
-        course = _course(dt, north, east)
-        series = {"yaw_rate": yaw, "heading": heading, "position": course}
-        ratios = _ratios(dt, series)
-        explanations = sense_explanations(self._senses(ratios))
-        findings += sense_findings(explanations, topics)
-        wrong_times = list(time_findings(dt, yaw, heading, speed, (north, east)))
-        findings += wrong_times
-        if not wrong_times:
-            findings += unit_findings(ratios, topics)
-            geographic = self._record.is_geographic
-            findings += speed_findings(dt, speed, north, east, topics, geographic=geographic)
-        swing = max((float(np.ptp(x[np.isfinite(x)])) for x in (yaw, heading)
-                     if np.isfinite(x).any()), default=0.0)  # fmt: skip
-        findings += range_findings({"speed": speed, "rpm": rpm, "rudder": rudder}, swing, topics)
-        if not any(finding.kind == "unit" and "heading" in finding.text for finding in findings):
-            sense = -1 if explanations and "heading" in explanations[0] else 1
-            findings += heading_zero_findings(
-                dt, sense * self._absolute(heading), speed, course, topics
+        signals = self._record.result()
+        ratios = _ratios(signals)
+        explanations = sense_explanations(_senses(signals, ratios))
+        turning = sense_findings(explanations, signals.topics)
+        wrong_times = list(
+            time_findings(
+                signals.dt_secs,
+                signals.yaw,
+                signals.heading,
+                signals.speed,
+                (signals.north, signals.east),
             )
+        )
+        turning += wrong_times or unit_findings(ratios, signals.topics)
+        velocity = None if turning else ground_velocity(signals)
+        findings += turning
+        # exchanged latitudes and longitudes distort distances; the speed is compared once corrected
+        if not wrong_times and not (
+            signals.datum and explanations and "position" in explanations[0]
+        ):
+            findings += speed_findings(signals, velocity)
+        findings += range_findings(signals)
+        if not any(finding.kind == "unit" and "heading" in finding.text for finding in turning):
+            sense = -1 if explanations and "heading" in explanations[0] else 1
+            findings += heading_zero_findings(signals, sense, velocity)
+        findings += speed_lag_findings(signals, velocity, self._stats)
         pair = ratios.get(("yaw_rate", "heading"))
         if pair is None or 0.8 < pair.ratio < 1.25:
-            bias = self._bias.result()
-            findings += [Finding("bias", bias)] if bias else []
+            findings += bias_findings(signals)
             findings += _lag_findings(pair, self._stats)
         return findings
 
-    def _senses(self, ratios: dict[Pair, TurningRatio]) -> dict[Pair, int]:
-        senses = {pair: 1 if each.ratio > 0 else -1 for pair, each in ratios.items()}
-        significance = self._rudder.significance()
-        if abs(significance) > SIGNIFICANT_ERRORS:
-            senses["rudder", "yaw_rate"] = 1 if significance > 0 else -1
-        return senses
 
-    def _absolute(self, heading: FloatArray) -> FloatArray:
-        """Return the continuous heading with the zero of the channel's first valid sample."""
-        return heading + self._record.first_heading
+def _senses(signals: CoarseSignals, ratios: dict[Pair, TurningRatio]) -> dict[Pair, int]:
+    """Return for each pair of channels +1 where they agree and -1 where they contradict."""
+    senses = {pair: 1 if each.ratio > 0 else -1 for pair, each in ratios.items()}
+    significance = rudder_significance(signals)
+    if abs(significance) > MIN_RUDDER_ERRORS:
+        senses["rudder", "yaw_rate"] = 1 if significance > 0 else -1
+    return senses
 
 
-def _ratios(dt: float, series: dict[str, FloatArray]) -> dict[Pair, TurningRatio]:
+def _ratios(signals: CoarseSignals) -> dict[Pair, TurningRatio]:
     """Compare each pair of the channels that turn."""
-    ratios: dict[Pair, TurningRatio] = {}
-    for x, y in (("yaw_rate", "heading"), ("yaw_rate", "position"), ("heading", "position")):
-        ratio = turning_ratio(dt, series[x], series[y])
-        turned = np.nanstd(series["position"]) if np.isfinite(series["position"]).any() else 0.0
-        if ratio is None or ("position" in (x, y) and turned < MIN_TURN["position"]):
-            continue
-        if abs(ratio.ratio) > 4 * ratio.error:
-            ratios[x, y] = ratio
-    return ratios
-
-
-def _course(dt: float, north: FloatArray, east: FloatArray) -> FloatArray:
-    """Return the continuous course over ground, rad, (n,); NaN where the ship hardly moves."""
-    n = max(round(COURSE_WINDOW_SECS / dt / 2), 1)
-    course = np.full_like(north, np.nan)
-    if len(north) <= 4 * n:
-        return course
-    dn, de = north[2 * n :] - north[: -2 * n], east[2 * n :] - east[: -2 * n]
-    moved = np.hypot(dn, de)
-    if not np.isfinite(moved).any():
-        return course
-    known = moved > max(0.3 * float(np.nanmedian(moved)), 1e-3)
-    angle = np.full_like(dn, np.nan)
-    angle[known] = np.unwrap(np.arctan2(de[known], dn[known]))
-    course[n:-n] = angle
-    return course
+    series = {"yaw_rate": signals.yaw, "heading": signals.heading, "position": signals.course}
+    known = signals.course[np.isfinite(signals.course)]
+    course_turns = len(known) > 0 and float(np.std(known)) >= MIN_COURSE_STD
+    pairs = [("yaw_rate", "heading")]
+    pairs += [("yaw_rate", "position"), ("heading", "position")] if course_turns else []
+    ratios = {(x, y): turning_ratio(signals.dt_secs, series[x], series[y]) for x, y in pairs}
+    return {
+        pair: ratio
+        for pair, ratio in ratios.items()
+        if ratio is not None and abs(ratio.ratio) > 4 * ratio.error
+    }
 
 
 def _lag_findings(pair: TurningRatio | None, stats: LogStats) -> list[Finding]:
@@ -172,8 +168,8 @@ def _impossible_findings(stats: LogStats) -> list[Finding]:
     return [
         Finding(
             "unit",
-            f"{channel.topic}: {channel.impossible.count / channel.samples:.0%} of the samples are "
-            f"impossible, up to {channel.impossible.extent:.4g} {channel.unit}; likely "
+            f"{channel.topic}: {_impossible(channel)[0] / channel.samples:.0%} of the samples are "
+            f"impossible, {_impossible(channel)[1]}; likely "
             f"{causes[channel.name][0]}; change in the layout: [{channel.name}] "
             f"{causes[channel.name][1]}",
         )
@@ -183,4 +179,19 @@ def _impossible_findings(stats: LogStats) -> list[Finding]:
 
 
 def _mostly_impossible(channel: ChannelStats) -> bool:
-    return channel.impossible.count > MIN_IMPOSSIBLE_SHARE * max(channel.samples, 1)
+    return _impossible(channel)[0] > MIN_IMPOSSIBLE_SHARE * max(channel.samples, 1)
+
+
+def _impossible(channel: ChannelStats) -> tuple[int, str]:
+    """Return the number of impossible samples, and their size in words.
+
+    Positions without a fix, such as latitude 91, are not counted.
+    """
+    if channel.fixes is None:
+        return channel.impossible.count, f"up to {channel.impossible.extent:.4g} {channel.unit}"
+    values = {
+        value: count
+        for value, count in channel.fixes.impossible.items()
+        if "latitude 91" not in value
+    }
+    return sum(values.values()), f"such as {next(iter(values), '')}"

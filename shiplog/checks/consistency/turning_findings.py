@@ -11,7 +11,7 @@ from .unit_factors import HEADING_UNITS, YAW_RATE_UNITS, in_words, misread_units
 MIN_FACTOR = 1.07  # between yaw rate and heading
 MIN_COURSE_FACTOR = 1.6  # of the course, which differs from the heading by the drift
 # the cost of each channel's having the wrong sense; fixes are rarely mirrored
-COSTS = {"yaw_rate": 1.0, "heading": 1.0, "rudder": 1.01, "position": 1.6}
+COSTS = {"yaw_rate": 1.0, "heading": 1.0, "rudder": 0.95, "position": 1.6}
 AMBIGUITY = 1.1  # difference of the costs below which two explanations are stated
 
 Pair = tuple[str, str]
@@ -65,10 +65,11 @@ def sense_findings(explanations: list[tuple[str, ...]], topics: Mapping[str, str
     if first == ("position",):  # as well the ship's channels may all be mirrored
         others = [tuple(n for n in ("yaw_rate", "heading", "rudder") if n in topics), *others]
     alternative = " or ".join(" and ".join(each) for each in others)
-    doubt = f"; or else the sign is reversed of {alternative}" if others else ""
+    alternative = f", or else with {alternative} reversed instead" if others else ""
+    corrected = "this corrected" if len(first) == 1 else f"{' and '.join(first)} corrected"
     return [
-        Finding("sign", f"{topics[name]}: {texts[name]} (of the channels compared, this is the "
-                f"simplest explanation{doubt}); change in the layout: {remedies[name]}")
+        Finding("sign", f"{topics[name]}: {texts[name]} (with {corrected}, all channels "
+                f"agree{alternative}); change in the layout: {remedies[name]}")
         for name in first
     ]  # fmt: skip
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
+from .least_squares import fit_windows
+
 MIN_CORRELATION = 0.9
 MIN_WINDOWS = 12  # independent ones
 MAX_ROWS = 4000
@@ -34,9 +36,7 @@ class TurningRatio:
     lag_error_secs: float
 
 
-def turning_ratio(
-    dt: float, x: FloatArray, y: FloatArray, min_turn: float = 0.0
-) -> TurningRatio | None:
+def turning_ratio(dt: float, x: FloatArray, y: FloatArray) -> TurningRatio | None:
     """Fit y(t) - y(t - W) = k [x(t) - x(t - W)] + c - k T [x'(t) - x'(t - W)].
 
     Parameters
@@ -45,8 +45,6 @@ def turning_ratio(
         Step of the clock, s.
     x, y
         (n,) angles, rad; NaN where unknown.
-    min_turn
-        Standard deviation of both changes, rad, below which nothing is decided.
 
     Returns
     -------
@@ -57,15 +55,13 @@ def turning_ratio(
     best: TurningRatio | None = None
     for window_secs in (10.0, 30.0, 90.0):
         length = max(round(window_secs / dt), 2)
-        result = _over_windows(dt, x, y, length, min_turn)
+        result = _over_windows(dt, x, y, length)
         if result and (best is None or abs(result.correlation) > abs(best.correlation) + 0.02):
             best = result
     return best if best and abs(best.correlation) >= MIN_CORRELATION else None
 
 
-def _over_windows(
-    dt: float, x: FloatArray, y: FloatArray, length: int, min_turn: float
-) -> TurningRatio | None:
+def _over_windows(dt: float, x: FloatArray, y: FloatArray, length: int) -> TurningRatio | None:
     half = max(round(1.0 / dt), 1)
     if len(x) < MIN_WINDOWS * length // 2 + 2 * half:
         return None
@@ -77,19 +73,14 @@ def _over_windows(
         (each[length:] - each[:-length])[::step][complete[::step]] for each in (x, y, slope)
     )
     lags = -(-length // step)
-    if len(dx) < MIN_WINDOWS * lags / 2 or min(np.std(dx), np.std(dy)) <= max(min_turn, 1e-12):
+    if len(dx) < MIN_WINDOWS * lags / 2 or min(np.std(dx), np.std(dy)) <= 1e-12:
         return None
-    X = np.column_stack((dx - dx.mean(), ds - ds.mean()))
     dy = dy - dy.mean()
+    fit = fit_windows(np.column_stack((dx - dx.mean(), ds - ds.mean())), dy, lags)
+    if fit is None or fit[0][0] == 0:
+        return None
+    (ratio, product), errors = fit
     correlation = float(np.corrcoef(dx, dy)[0, 1])
-    scale = np.sqrt(np.mean(X**2, axis=0))
-    if np.any(scale == 0) or np.linalg.cond(X / scale) > 1e6:
-        return None
-    solution, *_ = np.linalg.lstsq(X / scale, dy, rcond=None)
-    errors = newey_west_errors(X / scale, dy - X / scale @ solution, lags) / scale
-    ratio, product = solution / scale
-    if ratio == 0:
-        return None
     return TurningRatio(
         float(ratio), float(errors[0]), correlation,
         float(-product / ratio), float(errors[1] / abs(ratio)),
@@ -100,14 +91,3 @@ def _complete(values: FloatArray, length: int) -> np.ndarray[tuple[int], np.dtyp
     """Return which windows of `length` steps have no NaN, (n - length,)."""
     missing = np.concatenate(([0], np.cumsum(np.isnan(values))))
     return np.asarray(missing[length + 1 :] == missing[: -length - 1])
-
-
-def newey_west_errors(X: FloatArray, residual: FloatArray, lags: int) -> FloatArray:
-    """Return standard errors of least squares, (k,), with residuals correlated over `lags`."""
-    moments = X * residual[:, None]
-    middle = moments.T @ moments
-    for lag in range(1, min(lags + 1, len(X) - 1)):
-        cross = moments[lag:].T @ moments[:-lag]
-        middle += (1 - lag / (lags + 1)) * (cross + cross.T)
-    inverse = np.linalg.inv(X.T @ X)
-    return np.asarray(np.sqrt(np.abs(np.diag(inverse @ middle @ inverse))))

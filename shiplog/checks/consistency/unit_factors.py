@@ -8,7 +8,13 @@ YAW_RATE_UNITS = {
 SPEED_UNITS = {"m/s": 1.0, "kn": 1852 / 3600, "km/h": 1 / 3.6, "ft/s": 0.3048, "cm/s": 0.01}
 HEADING_UNITS = {"rad": 1.0, "deg": pi / 180, "grad": pi / 200}
 LENGTH_UNITS = {"m": 1.0, "ft": 0.3048, "km": 1000.0, "nmi": 1852.0}
-USUAL = {"rad/s", "deg/s", "deg/min", "m/s", "kn", "km/h", "rad", "deg", "m"}  # a layout's units
+GEOGRAPHIC_UNITS = {
+    "deg": 1.0, "rad": 180 / pi, "minutes of arc, such as ddmm.mmmm,": 1 / 60,
+    "degrees and minutes printed as dd.mmmm": 1 / 0.6,
+}  # fmt: skip
+# units of which one is in each pair
+COMMON_UNITS = {"rad/s", "deg/s", "deg/min", "m/s", "kn", "km/h", "rad", "deg", "m"}
+READ_UNITS = COMMON_UNITS | set(SPEED_UNITS)  # that a layout may state wrongly
 
 
 def misread_units(
@@ -37,7 +43,8 @@ def misread_units(
     for actual, actual_si in units.items():
         for read, read_si in units.items():
             difference = abs(log(abs(factor) * actual_si / read_si))
-            if actual != read and read in USUAL and difference < tolerance:
+            possible = read in READ_UNITS and COMMON_UNITS & {actual, read}
+            if actual != read and possible and difference < tolerance:
                 matches.append((round(difference, 6), actual.startswith("rad/m"), actual, read))
     matches.sort()
     limit = matches[0][0] + tolerance / 4 if matches else 0.0

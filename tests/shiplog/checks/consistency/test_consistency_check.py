@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from trial_logs import as_log
+from trial_logs import InChunks, as_log
 
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
@@ -13,6 +13,7 @@ from shiplog import TrialLog, Vessel
 from shiplog.checks.consistency.consistency_check import consistency_findings
 from shiplog.checks.consistency.findings import Finding, refuse_contradictions
 from shiplog.errors import LogError
+from shiplog.geodesy import LocalFrame, LocalPositions
 
 DEG = np.pi / 180
 Values = np.ndarray
@@ -143,3 +144,84 @@ def test_strict_refuses_signs_and_units_only(trial: TrialLog) -> None:
     refuse_contradictions([Finding("bias", "b"), Finding("lag", "l"), Finding("zero", "z")])
     with pytest.raises(LogError, match="sign is reversed"):
         refuse_contradictions(consistency_findings(changed(trial, rudder=scaled(-1.0))))
+
+
+def geographic(log: TrialLog) -> TrialLog:
+    """Return the log with positions in latitude, longitude and altitude."""
+    frame = LocalFrame((60.2, 20.4), geographic=True)
+    (position,) = (c for c in log if c.name == "position")
+    fixes = frame.to_geographic(LocalPositions(*position.values.T))
+    values = np.column_stack((fixes.latitude, fixes.longitude, np.zeros(len(position))))
+    fields = ("latitude", "longitude", "altitude")
+    converted = replace(position, fields=fields, values=values)
+    return replace(log, channels=tuple(converted if c is position else c for c in log))
+
+
+def printed_as(function: Callable[[Values], Values]) -> Callable[[Values], Values]:
+    return lambda values: np.column_stack((function(values[:, :2]), values[:, 2]))
+
+
+@pytest.mark.parametrize(
+    ("function", "cause"),
+    [
+        (lambda x: x * DEG, "in rad read as deg"),
+        (lambda x: x // 1 * 100 + x % 1 * 60, "ddmm.mmmm read as degrees"),
+        (lambda x: x // 1 + x % 1 * 0.6, "printed as dd.mmmm"),
+        (lambda x: x[:, ::-1], "latitude and longitude, are swapped"),
+    ],
+)
+def test_misread_latitudes_and_longitudes_are_named(
+    trial: TrialLog, function: Callable[[Values], Values], cause: str
+) -> None:
+    log = geographic(trial)
+    assert contradictions(log) == []
+    findings = contradictions(changed(log, position=printed_as(function)))
+    assert any(cause in f.text for f in findings), findings
+
+
+@pytest.mark.parametrize("factor", [100.0, 0.01, 1 / 0.3048, 0.3048, 3.6, 1 / 3.6])
+def test_a_wrong_unit_of_the_speed_is_found_in_both_directions(
+    trial: TrialLog, factor: float
+) -> None:
+    findings = contradictions(changed(trial, speed=scaled(factor)))
+    assert next(f.text.split("/")[1] for f in findings if f.kind == "unit") == "speed"
+
+
+@pytest.mark.parametrize("current", [0.0, 1.5])
+@pytest.mark.parametrize("offset_deg", [-12.0, 0.0, 3.0, 8.0])
+def test_an_offset_of_the_heading_is_separated_from_a_current(
+    trial: TrialLog, offset_deg: float, current: float
+) -> None:
+    secs = np.linspace(0.0, 500.0, sum(len(c) for c in trial if c.name == "position"))
+    drift = current * np.column_stack((secs, -0.5 * secs))
+    log = changed(
+        trial, heading=lambda x: x + offset_deg * DEG, position=lambda values: values + drift
+    )
+    findings = contradictions(log)
+    if abs(offset_deg) < 5:
+        assert findings == []
+    else:
+        (finding,) = findings
+        assert finding.kind == "zero"
+        added = float(finding.text.split("differs from it by ")[1].split()[0])
+        assert added == pytest.approx(-offset_deg, abs=1.0)
+
+
+@pytest.mark.parametrize("secs", [8, -8])
+def test_a_lag_of_the_speed_against_the_fixes_is_reported(trial: TrialLog, secs: int) -> None:
+    shifted = [
+        replace(c, measured_ns=c.measured_ns + secs * 10**9) if c.name == "speed" else c
+        for c in trial
+    ]
+    (finding,) = contradictions(replace(trial, channels=tuple(shifted)))
+    assert finding.kind == "lag"
+    assert finding.text.startswith("/speed" if secs > 0 else "/position")
+
+
+def test_where_chunks_are_cut_changes_no_finding(trial: TrialLog) -> None:
+    log = changed(geographic(trial), heading=lambda x: x + 0.2, speed=scaled(3.6))
+    assert consistency_findings(InChunks(log, [33.3, 34.0, 250.7])) == consistency_findings(log)
+
+
+def test_a_log_of_half_a_minute_gives_no_finding(trial: TrialLog) -> None:
+    assert contradictions(trial.between(200.0, 230.0)) == []

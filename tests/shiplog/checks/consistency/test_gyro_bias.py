@@ -10,7 +10,7 @@ from trial_logs import as_log
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, Vessel
-from shiplog.checks.gyro_bias import gyro_bias_warning
+from shiplog.checks.consistency.consistency_check import consistency_findings
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
 
@@ -21,6 +21,12 @@ def simulated_log(vessel: Vessel, seed: int = 0, **settings: float) -> TrialLog:
     }
     sensors = suite("paper", noisy)
     return as_log(simulate(vessel, "zigzag-20-20", duration_secs=500.0, seed=seed, sensors=sensors))
+
+
+def gyro_bias_warning(log: TrialLog) -> str | None:
+    """Return the text of the finding about the bias."""
+    texts = [finding.text for finding in consistency_findings(log) if finding.kind == "bias"]
+    return texts[0] if texts else None
 
 
 @pytest.mark.parametrize("bias_deg", [-0.02, 0.01])

@@ -9,13 +9,10 @@ import pytest
 from channels import channel
 from places import KVLCC2, LAYOUTS
 
-from shiplog.checks.rudder_sign import rudder_sign_warning
+from shiplog.checks.consistency.consistency_check import consistency_findings
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
 from shiplog.types import TrialLog
-
-RNG = np.random.default_rng(20)
-
 
 Steering = Callable[[float, float, float], float]  # time, heading, yaw rate -> rudder, rad
 
@@ -36,6 +33,12 @@ def simulated_log(
         rates.append(rate + rng.normal(0, 1e-3))
         rudders.append(rudder + rng.normal(0, 1e-3))
     return TrialLog("t", (channel(np.array(rates)), channel(np.array(rudders), name="rudder")))
+
+
+def rudder_sign_warning(log: TrialLog) -> str | None:
+    """Return the text of the finding about the rudder's sign."""
+    texts = [finding.text for finding in consistency_findings(log) if finding.kind == "sign"]
+    return next((text for text in texts if text.startswith("/rudder")), None)
 
 
 def with_reversed_rudder(log: TrialLog) -> TrialLog:
