@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fitted_runs import identify_auto
-from places import KVLCC2, LAYOUTS, PROJECT
+from places import KVLCC2, LAYOUTS, PROJECT, SAMPLE_DATA
 
 from recorders.record import record
 from recorders.simulated.simulate import SimulatedTrial
@@ -681,3 +681,21 @@ def test_info_fits_eighty_columns_without_breaking_its_table(
     out = capsys.readouterr().out
     assert "(continued)" not in out
     assert max(map(len, out.splitlines())) <= 80
+
+
+def test_identify_skips_references_and_truths(
+    two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    zigzag, circle = two_runs
+    truth = "record simulate zigzag-10-10 --duration 20 -o t.mcap --truth true_motion.mcap"
+    assert main(truth.split()) == OK
+    reference = SAMPLE_DATA / "zigzag_20_20.ref.mcap"
+    capsys.readouterr()
+    arguments = [zigzag, str(reference), "--validate", circle, "true_motion.mcap"]
+    assert main(["identify", *arguments, "--length", "200", "--json", "f.json"]) == OK
+    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("skipped")]
+    assert [line.split(": ")[1] for line in lines] == [reference.name, "true_motion.mcap"]
+    result = json.loads(Path("f.json").read_text())
+    assert len(result["fit"]) == len(result["validation"]) == 1
+    assert result["scale"]["length_given"]
+    assert "give the logs themselves" in refusal(capsys, USAGE, "identify", reference)
