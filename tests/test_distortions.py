@@ -3,6 +3,8 @@
 import pytest
 
 from benchmarks.distortion_matrix import (
+    OTHER_REFUSAL,
+    OTHER_WARNING,
     SILENT,
     TRACEBACK,
     Outcome,
@@ -38,9 +40,13 @@ def test_the_undistorted_trial_is_right_without_a_warning() -> None:
     assert (outcome.kind, outcome.messages) == ("right", ())
 
 
-@pytest.mark.xfail(strict=True, reason="units, signs and lags are not checked by physics yet")
 def test_no_wrong_result_is_silent(outcomes: list[Outcome]) -> None:
     assert of_kind(outcomes, SILENT) == [], counts_by_family(outcomes)
+
+
+def test_every_wrong_result_has_a_warning_that_names_the_cause(outcomes: list[Outcome]) -> None:
+    for kind in (OTHER_WARNING, OTHER_REFUSAL):
+        assert of_kind(outcomes, kind) == [], counts_by_family(outcomes)
 
 
 def test_no_distortion_ends_in_a_traceback(outcomes: list[Outcome]) -> None:

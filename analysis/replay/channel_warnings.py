@@ -9,6 +9,8 @@ from shiplog.resampling import Clock
 
 MAX_ASTERN_SHARE = 0.01  # of the samples; a single one may be noise about zero
 MIN_TURN_RATE = np.radians(0.1)  # rad/s, range of the yaw rate beyond which the ship has turned
+MIN_COMPARED_CHANNELS = 4  # of which most start and end together
+MIN_SHIFT_SECS = 0.8  # of a whole channel against the others
 MIN_WAY = 1.0  # m/s, median speed beyond which the ship makes way
 
 
@@ -47,6 +49,41 @@ def _dead_sensor_warnings(log_stats: LogStats) -> Iterator[str]:
         yield (
             f"{log_stats['rpm'].topic}: 0 throughout the log although the ship makes way; "
             "the model needs the revolutions"
+        )
+
+
+def late_channel_warnings(log_stats: LogStats) -> Iterator[str]:
+    """Warn of channels that start and end later than the others by one time, or earlier.
+
+    The channels of a recorder start and end together; a channel that is shifted as a whole has
+    late or early time stamps.
+
+    Parameters
+    ----------
+    log_stats
+        Statistics of the log's channels.
+
+    Yields
+    ------
+    str
+        A warning, in a sentence.
+    """
+    channels = [channel for channel in log_stats if channel.valid > 1 and not channel.hold]
+    if len(channels) < MIN_COMPARED_CHANNELS:
+        return
+    spans = np.array([channel.valid_span_ns for channel in channels])
+    shifts = (spans - np.median(spans, axis=0).astype(np.int64)) * 1e-9
+    usual_interval = float(np.median([channel.interval_secs for channel in channels]))
+    for channel, (start, end) in zip(channels, shifts.tolist(), strict=True):
+        interval = max(channel.interval_secs, usual_interval)
+        shift = (start + end) / 2
+        if abs(end - start) > 1.5 * interval or abs(shift) < max(2.5 * interval, MIN_SHIFT_SECS):
+            continue
+        when, cause = ("after", "late") if shift > 0 else ("before", "early")
+        yield (
+            f"{channel.topic}: starts and ends {abs(shift):.1f} s {when} the others; likely "
+            f"its time stamps are {cause} by this delay; compare them with the other clocks, and "
+            "correct them in a table of the log"
         )
 
 

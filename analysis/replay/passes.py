@@ -26,7 +26,7 @@ from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
 from shiplog.types import FloatArray, Log
 from shiplog.vessel.settings import MIN_WINDOW_SECS
 
-from .channel_warnings import channel_warnings, end_warnings
+from .channel_warnings import channel_warnings, end_warnings, late_channel_warnings
 
 REQUIRED_CHANNELS = (*PAPER_OUTPUTS, *PAPER_INPUTS)
 OPTIONAL_CHANNELS = ("heading", "position")
@@ -163,6 +163,7 @@ def second_pass(
     warnings = [
         *channel_warnings(log_stats),
         *(finding.text for finding in findings),
+        *late_channel_warnings(log_stats),
         *end_warnings(log_stats, clock, REQUIRED_CHANNELS),
         *hold.warnings(),
         *equations.window_warnings(),

@@ -15,6 +15,7 @@ TIME_UNITS = {
 }  # fmt: skip
 MIN_SWING = np.radians(3.0)  # of the heading
 MIN_DISTANCE = 50.0  # m, of the fixes
+MIN_TIME_FACTOR = 500.0  # of the yaw rate, from which its units do not explain it
 TRACK_LEGS = 40  # on which the distance is measured, so that the noise of the fixes is small in it
 FACTOR_TOLERANCE, DISTANCE_TOLERANCE = 0.25, 0.4  # of the logarithms of the factors
 
@@ -52,13 +53,16 @@ def time_findings(
     distances = _distances(dt, speed, *track)
     if unit is None:
         return
+    # deg/s and deg/min explain smaller factors as well
+    by_units = 1 / MIN_TIME_FACTOR < factor < MIN_TIME_FACTOR
+    by_units = by_units or 3000 < max(factor, 1 / factor) < 4000
+    by_speed = ""
     if distances is None:
-        if 1 / 500 < factor < 500:
-            return  # deg/s and deg/min explain it as well
-        by_speed = ""
+        if by_units:
+            return
     else:
         logged, fixed = distances
-        if abs(log(logged / fixed / factor)) > DISTANCE_TOLERANCE:
+        if by_units and abs(log(logged / fixed / factor)) > DISTANCE_TOLERANCE:
             return
         by_speed = f", and the speed makes {logged:.3g} m where the fixes are {fixed:.3g} m apart"
     yield Finding(
