@@ -49,7 +49,8 @@ def unit_distortions() -> list[Distortion]:
     )
     return [
         Distortion(
-            "unit", f"{name} in {written} read as {taken}", (f"{name} {written}",),
+            "unit", f"{name} in {written} read as {taken}",
+            (f"{name} {written}", f"{name} constant unit"),
             scaled(name, by=factor),
         )
         for name, written, taken, factor in cases

@@ -43,7 +43,8 @@ def _dead_sensor_warnings(log_stats: LogStats) -> Iterator[str]:
         if value_range == 0 and (turned or name in {"yaw_rate", "speed"}):
             yield (
                 f"{log_stats[name].topic}: constant throughout the log; "
-                "if the sensor was dead, choose another source"
+                "if the sensor was dead, choose another source; if the values are too small for "
+                "their digits, correct their unit"
             )
     if log_stats["speed"].median > MIN_WAY and log_stats["rpm"].value_range == (0.0, 0.0):
         yield (

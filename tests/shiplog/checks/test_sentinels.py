@@ -116,3 +116,19 @@ def test_a_heading_that_counts_its_turns_is_used_and_one_that_jumps_beyond_two_i
     wild[100:400:50] = [13.0, -40.0, 700.0, 200.0, -300.0, 88.0]
     assert heading_stats(wild).valid == COUNT - 6
     assert heading_stats(wild).impossible.count == 6
+
+
+def test_zeros_that_interrupt_steady_revolutions_are_no_measurement() -> None:
+    revolutions = np.full(300, 80.0)
+    revolutions[::3] = 0.0
+    assert sentinel_values(revolutions, "rpm") == (0.0,)
+
+
+def test_a_propeller_that_is_stopped_for_a_while_is_measured() -> None:
+    revolutions = np.full(300, 80.0)
+    revolutions[50:80] = revolutions[150:180] = revolutions[200:240] = 0.0
+    assert sentinel_values(revolutions, "rpm") == ()
+
+
+def test_revolutions_written_when_they_change_are_measured() -> None:
+    assert sentinel_values(np.array([80.0, 0.0] * 50), "rpm") == ()

@@ -1,0 +1,45 @@
+"""Tests of the detection of times in a wrong unit."""
+
+import numpy as np
+import pytest
+
+from shiplog.checks.consistency.time_findings import time_findings
+from shiplog.types import FloatArray
+
+DT = 0.1
+TIMES = np.arange(0.0, 300.0, DT)
+HEADING = 0.3 * np.sin(TIMES / 30)
+TRACK = 9.0 * TIMES, 0.0 * TIMES
+NO_TRACK = np.full_like(TIMES, np.nan), np.full_like(TIMES, np.nan)
+SPEED = np.full_like(TIMES, 9.0)
+
+
+def texts(factor: float, track: tuple[FloatArray, FloatArray], speed: FloatArray) -> list[str]:
+    """Return the findings of a log whose times are wrong by a factor."""
+    found = time_findings(DT * factor, factor * HEADING, HEADING, speed, track)
+    return [finding.text for finding in found]
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"),
+    [(1e3, "ms read as s"), (1e-3, "s read as ms"), (1 / 60, "min read as s"), (3600.0, "as h")],
+)
+def test_times_in_a_wrong_unit_are_reported(factor: float, unit: str) -> None:
+    (text,) = texts(factor, TRACK, SPEED)
+    assert unit in text
+    assert "\n" not in text
+
+
+def test_right_times_are_not_reported() -> None:
+    assert texts(1.0, TRACK, SPEED) == texts(1.0, NO_TRACK, SPEED) == []
+
+
+def test_a_yaw_rate_in_deg_min_is_not_taken_for_wrong_times() -> None:
+    found = time_findings(DT, 60 * HEADING, HEADING, SPEED, TRACK)
+    assert list(found) == []
+    assert list(time_findings(DT, 60 * HEADING, HEADING, SPEED, NO_TRACK)) == []
+
+
+def test_without_fixes_a_factor_that_no_unit_of_the_yaw_rate_explains_is_reported() -> None:
+    (text,) = texts(1e3, NO_TRACK, SPEED)
+    assert "ms read as s" in text
