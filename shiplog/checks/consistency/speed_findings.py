@@ -68,7 +68,7 @@ def _speed_causes(signals: CoarseSignals, ratio: float) -> tuple[str, str]:
     causes += [f"[position] {in_words(position_pairs)}"] if position_pairs else []
     remedies = [f'[speed] unit = "{speed_pairs[0][0]}"'] if speed_pairs else []
     remedies += ["unit or form of [position]"] if position_pairs or not speed_pairs else []
-    return " or ".join(causes) or "a wrong unit of speed or position", " or ".join(remedies)
+    return " or ".join(causes) or "a wrong unit of speed, position or times", " or ".join(remedies)
 
 
 def speed_lag_findings(
