@@ -66,7 +66,8 @@ def sign_distortions() -> list[Distortion]:
     """Return the signs and senses that are contrary to the conventions."""
     signs = [
         Distortion("sign", f"{' and '.join(names)} reversed",
-                   tuple(f"{name} {word}" for name in names for word in ("sign", "sense", "reversed")),
+                   tuple(f"{name} {word}" for name in names
+                         for word in ("sign", "sense", "reversed")),
                    scaled(*names, by=-1.0))
         for names in (
             ("yaw_rate",), ("rudder",), ("heading",), ("speed",), ("rpm",),
