@@ -5,7 +5,7 @@ import numpy as np
 from shiplog.types import FloatArray
 
 from .coarse_record import CoarseSignals
-from .least_squares import fit_windows
+from .window_fit import fit_windows
 
 WINDOW_SECS = 10.0  # over which the rudder's effect on the yaw rate is measured
 MIN_WINDOWS = 12  # that a record must have room for

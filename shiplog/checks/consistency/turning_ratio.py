@@ -6,7 +6,7 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
-from .least_squares import fit_windows
+from .window_fit import fit_windows
 
 MIN_CORRELATION = 0.9
 MIN_WINDOWS = 12  # independent ones
