@@ -138,16 +138,15 @@ def predicted_indices(
     Returns
     -------
     indices
-        Empty for a run that is neither a turning circle nor a zig-zag, and where the simulation
-        diverges.
+        Empty for a run that is neither a turning circle nor a zig-zag. Where the simulation
+        diverges, its values are NaN.
     """
+    rudder, dt = segment.signals["rudder"], segment.dt_secs
+    motion = manoeuvre_motion(measured, measured_track)
     if not np.isfinite(simulated).all():
-        return ()
-    motions = (
-        manoeuvre_motion(measured, measured_track),
-        manoeuvre_motion(simulated, track),
-    )
-    return tuple(manoeuvre_indices(segment.signals["rudder"], *motions, segment.dt_secs))
+        indices = manoeuvre_indices(rudder, motion, motion, dt)
+        return tuple(replace(index, simulated=np.nan) for index in indices)
+    return tuple(manoeuvre_indices(rudder, motion, manoeuvre_motion(simulated, track), dt))
 
 
 def zigzag_overshoots(

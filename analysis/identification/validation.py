@@ -102,16 +102,14 @@ def _validate_segment(fit: OutputError, segment: Segment, fixes: FloatArray | No
     }
     rms["track"] = nan_rms(np.hypot(*(track - measured_track).T))
     indices = predicted_indices(segment, measured, measured_track, simulated, track)
-    reason = "" if indices else _reason(segment, measured, simulated)
-    return Validation(segment, simulated, track, measured_track, rms, indices, reason)
-
-
-def _reason(segment: Segment, measured: FloatArray, simulated: FloatArray) -> str:
-    """Explain why a segment has no indices."""
-    if not np.isfinite(simulated).all():
-        return "the simulation diverges"
-    heading = measured[:, HEADING]
-    return reason_without_indices(segment.signals["rudder"], heading, segment.dt_secs)
+    no_indices = (
+        ""
+        if indices
+        else reason_without_indices(
+            segment.signals["rudder"], measured[:, HEADING], segment.dt_secs
+        )
+    )
+    return Validation(segment, simulated, track, measured_track, rms, indices, no_indices)
 
 
 def filled_measurements(segment: Segment, heading: float = 0.0) -> FloatArray:

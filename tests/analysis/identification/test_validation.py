@@ -134,7 +134,9 @@ def test_a_diverging_simulation_is_reported() -> None:
     fast = replace(fit.problem, values=fit.problem.values * -40.0)
     (validation,) = validate(replace(fit, problem=fast), run_from_log(circle()))
     assert validation.diverged
-    assert validation.indices == ()
+    indices = {index.name: index for index in validation.indices}
+    assert indices["advance"].measured == pytest.approx(ADVANCE, rel=0.02)
+    assert np.isnan(indices["advance"].simulated)
     assert np.isfinite(validation.measured_track).all()
 
 

@@ -352,7 +352,7 @@ def test_impossible_positions_are_counted_whatever_the_chunks(zigzag_log: TrialL
         fixes = Channel("position", "gps", "deg", at, at, values, GEOGRAPHIC)
         log = with_channel(zigzag_log, fixes)
         for cut in (log, InChunks(log, [150.0])):
-            expected = f"{300 - nans} impossible positions"
+            expected = f"{300 - nans} fixes at an impossible position"
             assert any(expected in warning for warning in analyse(cut).findings.warnings)
 
 
