@@ -1,9 +1,9 @@
 """Conclusions about speed and heading zero from fixes, and about ranges of rudder and rpm."""
 
 from collections.abc import Iterator
-from math import isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shiplog.checks.channel_stats import LogStats
 from shiplog.types import FloatArray
@@ -18,6 +18,9 @@ MAX_CURRENT = 2.5  # m/s
 MIN_SPEED_RATIO, MAX_SPEED_RATIO = 0.62, 1.6  # of speed and fixes, beyond which a unit is wrong
 RADIANS_RATIOS = 15.0, 70.0  # of speed and fixes, with degrees of longitude up to latitude 75
 MAX_ADVANCE, MIN_ADVANCE = 30.0, 0.15  # m per revolution
+MIN_RPM_SHARE = 0.2  # of the largest rpm: below it the propeller counts as stopped
+MIN_DIRECTION_SHARE = 0.8  # of the samples: otherwise the propeller turns to either side
+STEADY_SECS, MAX_SPEED_CHANGE = 60.0, 0.1  # a speed is steady if it changes less, relative
 MAX_RUDDER, RADIANS_READ_AS_DEGREES = np.radians(50.0), np.radians(0.7)
 MIN_OFFSET_DEG = 30.0  # of heading against course: less may be drift or current
 MIN_FITTED_OFFSET_DEG = 5.0  # of heading against velocity, drift and current eliminated
@@ -185,21 +188,27 @@ def _rudder_range_findings(signals: CoarseSignals) -> Iterator[Finding]:
 
 
 def _advance_findings(signals: CoarseSignals) -> Iterator[Finding]:
-    both = np.isfinite(signals.speed + signals.rpm) & (np.abs(signals.rpm) > 0)
-    if not both.any():
+    turning = _propeller_turns(signals.rpm)
+    driven = turning & _speed_is_steady(signals)
+    if not driven.any():
         return
-    topic, speeds, revolutions = signals.topics["rpm"], signals.speed[both], signals.rpm[both]
+    topic, speeds, revolutions = signals.topics["rpm"], signals.speed[driven], signals.rpm[driven]
+    ahead_share = float(np.mean(revolutions > 0))
+    if max(ahead_share, 1 - ahead_share) < MIN_DIRECTION_SHARE:
+        return
     speed, rpm = float(np.median(speeds)), float(np.median(revolutions))
-    advance = abs(60 * speed / rpm) if rpm else 0.0
+    advance = abs(60 * speed / rpm)
     reversed_share = float(np.mean(speeds * revolutions < 0))
-    if reversed_share > 0.9:
+    # a ship that stops by its propeller moves against it for a while
+    one_direction = len(np.unique(np.sign(signals.rpm[turning]))) == 1
+    if reversed_share > 0.9 and one_direction:
         yield Finding(
             "sign",
             f"{topic}: {rpm:.3g} rpm while the speed is {speed:.3g} m/s in "
-            f"{reversed_share:.0%} of the log; likely the sign of one is reversed; change in the "
-            "layout: sign = -1 of [rpm] or of [speed]",
+            f"{reversed_share:.0%} of the samples at steady speed; likely the sign of one is "
+            "reversed; change in the layout: sign = -1 of [rpm] or of [speed]",
         )
-    if isfinite(advance) and abs(speed) > 1.0 and advance > MAX_ADVANCE:
+    if abs(speed) > 1.0 and MAX_ADVANCE < advance < 60 * MAX_ADVANCE:
         yield Finding(
             "unit",
             f"{topic}: {rpm:.3g} rpm at {speed:.3g} m/s is an advance of {advance:.0f} m "
@@ -213,3 +222,19 @@ def _advance_findings(signals: CoarseSignals) -> Iterator[Finding]:
             "per revolution; likely rpm read as rev/s; change in the layout: "
             '[rpm] unit = "rpm"',
         )
+
+
+def _propeller_turns(rpm: FloatArray) -> NDArray[np.bool_]:
+    """Return where the propeller turns by more than the noise of a stopped shaft, (n,)."""
+    largest = float(np.max(np.abs(rpm), where=np.isfinite(rpm), initial=0.0))
+    return np.asarray(np.abs(rpm) > MIN_RPM_SHARE * largest)
+
+
+def _speed_is_steady(signals: CoarseSignals) -> NDArray[np.bool_]:
+    """Return where the speed hardly changes within `STEADY_SECS` around an instant, (n,)."""
+    speed, half = signals.speed, max(round(STEADY_SECS / 2 / signals.dt_secs), 1)
+    steady = np.zeros(len(speed), bool)
+    if len(speed) > 2 * half:
+        change = np.abs(speed[2 * half :] - speed[: -2 * half])
+        steady[half:-half] = change < MAX_SPEED_CHANGE * np.abs(speed[half:-half])
+    return steady
