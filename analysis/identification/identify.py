@@ -13,6 +13,7 @@ from analysis.identification.comparison.parameter_ekf import parameter_ekf
 from analysis.identification.comparison.windows import window_estimates
 from analysis.identification.fit.output_error import OutputError, make_problem, output_error
 from analysis.identification.fit.uncertainty import Uncertainty, uncertainty
+from shiplog.checks.consistency.findings import naming_contradictions
 from shiplog.errors import LogError, UsageError
 from shiplog.mcap.stream import open_log
 from shiplog.progress import ProgressCallback, no_progress
@@ -105,7 +106,8 @@ def identify(
     runs, held_out = distinct_runs(to_fit, to_predict, sources, vessel, strict=strict)
     ship = with_length(common_vessel([*runs, *held_out], vessel), length)
     steps.begin("fit")
-    candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)
+    with naming_contradictions([text for run in runs for text in run.contradictions]):
+        candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)
     steps.begin("uncertainty")
     estimates = uncertainty(fit)
     steps.begin("prior sensitivity")

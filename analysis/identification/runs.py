@@ -8,9 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from analysis.identification.fit.segment import Segment, initial_level, split_into_segments
-from shiplog.checks.channel_stats import ChannelStats
+from analysis.replay.channel_warnings import (
+    channel_warnings,
+    end_warnings,
+    late_channel_warnings,
+)
+from shiplog.checks.channel_stats import ChannelStats, gap_threshold_secs
 from shiplog.checks.consistency.consistency_check import consistency_findings
-from shiplog.checks.consistency.findings import refuse_contradictions
+from shiplog.checks.consistency.findings import (
+    CONTRADICTIONS,
+    naming_contradictions,
+    refuse_contradictions,
+)
 from shiplog.errors import LogError, UsageError
 from shiplog.geodesy import LocalFrame, positions_of
 from shiplog.resampling import choose_clock, resample_chunks, with_steering_gear
@@ -49,6 +58,8 @@ class Run:
         What is unusual about the data; each names the log.
     data_lost
         Whether parts of the log could not be read.
+    contradictions
+        Those of the warnings that state a wrong unit or sign.
     """
 
     name: str
@@ -57,6 +68,7 @@ class Run:
     vessel: Vessel | None
     warnings: tuple[str, ...]
     data_lost: bool
+    contradictions: tuple[str, ...] = ()
 
 
 def run_from_log(
@@ -92,7 +104,7 @@ def run_from_log(
     screened = screen_log(
         log,
         REQUIRED_CHANNELS,
-        ("heading", "position"),
+        (*OPTIONAL_CHANNELS, "position"),
         purpose="an identification",
         sources=sources,
     )
@@ -102,14 +114,22 @@ def run_from_log(
     gear = given or vessel or Vessel("", None)
     clock = choose_clock(screened, stats, None, REQUIRED_CHANNELS, OPTIONAL_CHANNELS)
     clock = with_steering_gear(clock, gear.rudder_rate)
-    signals = concatenate_signals(resample_chunks(screened.chunks(), clock))
-    segments = split_into_segments(signals, log.name)
-    position = stats.get("position")
-    fixes = _north_east(screened, position) if position is not None else None
     findings = consistency_findings(screened, stats)
     if strict:
         refuse_contradictions(findings)
-    warnings = [*screened.warnings, *(finding.text for finding in findings)]
+    contradictions = tuple(f.text for f in findings if f.kind in CONTRADICTIONS)
+    signals = concatenate_signals(resample_chunks(screened.chunks(), clock))
+    with naming_contradictions(contradictions):
+        segments = split_into_segments(signals, log.name)
+    position = stats.get("position")
+    fixes = _north_east(screened, position) if position is not None else None
+    warnings = [
+        *screened.warnings,
+        *channel_warnings(stats),
+        *late_channel_warnings(stats),
+        *(finding.text for finding in findings),
+        *end_warnings(stats, clock, REQUIRED_CHANNELS),
+    ]
     return Run(
         name=log.name,
         segments=segments,
@@ -117,6 +137,7 @@ def run_from_log(
         vessel=vessel,
         warnings=tuple(text if log.name in text else f"{log.name}: {text}" for text in warnings),
         data_lost=log.data_lost,
+        contradictions=contradictions,
     )
 
 
@@ -202,14 +223,20 @@ def _north_east(log: Log, stats: ChannelStats) -> tuple[TimeArray, FloatArray]:
 def _interpolated(
     measured_ns: TimeArray, north_east: FloatArray, segment: Segment
 ) -> FloatArray | None:
-    """Interpolate fixes at a segment's samples, (n, 2) m; None with fewer than two fixes."""
+    """Interpolate fixes at a segment's samples, (n, 2) m; None with fewer than two fixes.
+
+    Inside a gap they are NaN, as beyond the ends.
+    """
     secs = (measured_ns - segment.signals.start_ns) * 1e-9
     if len(secs) < 2:
         return None
     time = segment.signals.time_secs
-    return np.column_stack(
-        [np.interp(time, secs, column, np.nan, np.nan) for column in north_east.T]
-    )
+    intervals = np.diff(secs)
+    longest = gap_threshold_secs(float(np.median(intervals)))
+    after = np.clip(np.searchsorted(secs, time), 1, len(intervals))
+    in_gap = (intervals[after - 1] > longest) & (secs[after] != time)
+    columns = [np.interp(time, secs, column, np.nan, np.nan) for column in north_east.T]
+    return np.where(in_gap[:, None], np.nan, np.column_stack(columns))
 
 
 def common_vessel(runs: Sequence[Run], given: Vessel | None) -> Vessel | None:

@@ -89,16 +89,16 @@ def late_channel_warnings(log_stats: LogStats) -> Iterator[str]:
 
 
 def end_warnings(log_stats: LogStats, clock: Clock, names: tuple[str, ...]) -> Iterator[str]:
-    """Warn of parts of the log that are not replayed, or only predicted, as a channel is missing.
+    """Warn of parts of the log that are not used, or only predicted, as a channel is missing.
 
     Parameters
     ----------
     log_stats
         Statistics of the log's channels.
     clock
-        The clock of the replay.
+        The clock of the resampled log.
     names
-        The channels that a replay needs.
+        The channels that are needed.
 
     Yields
     ------
@@ -115,19 +115,16 @@ def end_warnings(log_stats: LogStats, clock: Clock, names: tuple[str, ...]) -> I
     if delay > (GAP_SECS if latest.hold else latest.gap_threshold_secs):
         yield (
             f"{last_to_start}: starts {delay:.1f} s after the other channels; "
-            "the replay starts there"
+            "what precedes is not used"
         )
     remainder = (max(ends.values(), default=clock_end) - clock_end) * 1e-9
     if remainder > max((log_stats[name].gap_threshold_secs for name in names), default=0.0):
         first_to_end = min(names, key=lambda name: abs(ends[name] - clock_end))
         yield (
             f"{first_to_end}: ends {remainder:.1f} s before the other channels; "
-            "the replay ends there"
+            "what follows is not used"
         )
     for name in names:
         missing = (clock_end - ends[name]) * 1e-9
         if missing > log_stats[name].gap_threshold_secs:
-            yield (
-                f"{name}: no samples in the last {missing:.1f} s; "
-                "the states there are only predicted"
-            )
+            yield (f"{name}: no samples in the last {missing:.1f} s; there it is only predicted")

@@ -8,9 +8,12 @@ from shiplog.units import UNITS
 
 MIN_OTHER_SAMPLES = 20  # and as many different values, to compare a suspected sentinel with
 MIN_RUNS = 3  # returns to a value that is on no list, before it is one
+MAX_RUN_SAMPLES = 3  # of such a value at a time, and
+MAX_SHARE = 0.5  # of all samples: more is a level
 MIN_JUMP_STEPS = 10.0  # jump to such a value over the ordinary step between samples
 MIN_CODE_STEPS = 10.0  # the distance of a value on the list from all others over the median step
 MIN_CODE_GAP = 0.02  # its distance from them, as a share of their range
+MIN_CONTINUOUS_SHARE = 0.95  # of the steps of an angle that counts full turns
 MAX_WRAPPED = 4 * np.pi  # rad
 MAX_SENTINELS = 4  # of one channel
 CODE_TOLERANCE = 1e-5  # relative, of a code that was converted and printed
@@ -92,9 +95,12 @@ def unwrapped_limit(values: FloatArray) -> float:
     inf
     """
     beyond = np.abs(values) > MAX_WRAPPED
-    entries = np.flatnonzero(beyond[1:] & ~beyond[:-1])
-    by_steps = np.abs(values[entries + 1] - values[entries]) < np.pi / 2
-    return float("inf") if len(entries) and bool(by_steps.all()) else MAX_WRAPPED
+    steps = np.abs(np.diff(values))[beyond[1:] & beyond[:-1]]
+    jumps = np.count_nonzero(np.abs(np.diff(values))[beyond[1:] != beyond[:-1]] > np.pi / 2)
+    rare = jumps <= max(2, (1 - MIN_CONTINUOUS_SHARE) * len(steps))  # such as after a gap
+    is_continuous = len(steps) > 0 and float(np.mean(steps < np.pi / 2)) > MIN_CONTINUOUS_SHARE
+    varies = len(steps) > 0 and float(steps.max()) > 0
+    return float("inf") if is_continuous and rare and varies else MAX_WRAPPED
 
 
 def _codes(unit: str) -> FloatArray:
@@ -128,12 +134,10 @@ def _is_sentinel(values: FloatArray, suspect: float, codes: FloatArray, unit: st
     median_step, ordinary_step = np.percentile(np.abs(np.diff(rest)), [50, 95])
     if listed and beyond > max(MIN_CODE_STEPS * median_step, MIN_CODE_GAP * (high - low)):
         return True
-    return _is_left_and_rejoined(values, at, float(ordinary_step), unit)
+    return _jumps_and_returns(values, at, float(ordinary_step), unit)
 
 
-def _is_left_and_rejoined(
-    values: FloatArray, at: NDArray[np.bool_], step: float, unit: str
-) -> bool:
+def _jumps_and_returns(values: FloatArray, at: NDArray[np.bool_], step: float, unit: str) -> bool:
     """Whether the channel jumps to one value and back to its course, several times.
 
     Parameters
@@ -149,6 +153,8 @@ def _is_left_and_rejoined(
     """
     edges = np.flatnonzero(np.diff(at.astype(np.int8), prepend=0, append=0))
     starts, ends = edges[::2], edges[1::2]
+    if np.median(ends - starts) > MAX_RUN_SAMPLES or at.mean() > MAX_SHARE:
+        return False  # a level that is held, such as an order
     inner = (starts > 0) & (ends < len(values))
     before, after = values[starts[inner] - 1], values[ends[inner]]
     if len(before) < MIN_RUNS:

@@ -1,7 +1,8 @@
 """Choice among several sources of one quantity, by comparing them over the whole log."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,12 +16,16 @@ MAX_INSTANTS = 20_000  # of the clock on which sources are compared
 MIN_INSTANTS = 20  # at which two sources are known, to compare them
 MIN_COVERAGE_SHARE = 0.5  # of the most complete source; one that has less is not used
 DECISIVE_RATIO = 1.5  # between two sources' errors, or their rates, for one to be better
+MAX_CURRENT = 2.5  # m/s, by which speeds through the water and over the ground may differ
+GROUND_SOURCES = re.compile("sog|gps|gnss|ground|vtg|rmc|bottom")  # names of such sources
+MIN_CORRELATION = 0.9  # of two sources, for one to be described as a multiple of the other
 MIN_ZERO_DIFFERENCE = 0.5  # deg of rudder on a straight course
 NOISE_ERRORS = 3.0  # standard deviations of noise that are no disagreement
 # A smaller difference (rms) is no disagreement, in display units; of any other quantity 1 %.
 MIN_DISAGREEMENT = {
     "yaw_rate": 0.02, "speed": 0.3, "rudder": 0.5, "heading": 1.0, "position": 30.0, "sway": 0.3,
 }  # fmt: skip
+_ORDER = ("heading", "position", "yaw_rate")  # quantities with which others are compared
 SMOOTHING_SECS = 10.0  # a heading is differentiated over this time
 
 
@@ -95,23 +100,25 @@ def choose_sources(
     }
     if not several:
         return {}, []
-    references = [
-        next((c for c in stats if c.name == name and c.valid > 1 and _is_comparable(c)), None)
-        for name in ("heading", "position", "yaw_rate")
-    ]
-    used = [c for channels in several.values() for c in channels]
-    used += [c for c in references if c is not None and c not in used]
+    # yaw rate and speed are compared with heading and position, the rudder with the yaw rate
+    order = sorted(several, key=lambda name: _ORDER.index(name) if name in _ORDER else len(_ORDER))
+    compared = dict.fromkeys((*order, *_ORDER))
+    used = [c for c in stats if c.name in compared and _is_comparable(c)]
     clock, sources = _on_one_clock(log, used)
     by_name: dict[str, list[_Source]] = {}
     for source in sources:
         by_name.setdefault(source.stats.name, []).append(source)
+    references: dict[str, _Source] = {}
     result, warnings = {}, []
-    for name in several:
-        if name in chosen:
-            continue
-        best, reason = _best(name, by_name, clock)
-        result[name] = best.stats.source
-        warnings.append(_warning(name, best, reason, by_name[name]))
+    for name in dict.fromkeys((*_ORDER, *order)):
+        candidates = by_name.get(name, [])
+        if name in several and name not in chosen:
+            best, reason = _best(_Comparison(name, candidates, references, clock))
+            result[name] = best.stats.source
+            warnings.append(_warning(name, best, reason, candidates))
+            references[name] = best
+        elif candidates and not candidates[0].is_dead:
+            references[name] = candidates[0]
     return result, warnings
 
 
@@ -138,7 +145,8 @@ def _on_one_clock(log: Log, channels: Sequence[ChannelStats]) -> tuple[FloatArra
     intervals = [c.interval_secs for c in alive if c.interval_secs > 0]
     dt = max(min(intervals, default=1.0), span / MAX_INSTANTS, 1e-3)
     clock = np.arange(int(span / dt) + 1) * dt
-    gathered = [_Gathered(channel, clock, start) for channel in channels]
+    frames: dict[tuple[str, ...], LocalFrame] = {}
+    gathered = [_Gathered(channel, clock, start, frames) for channel in channels]
     for chunk in log.chunks():
         for each in gathered:
             part = each.channel.select(chunk)
@@ -148,28 +156,38 @@ def _on_one_clock(log: Log, channels: Sequence[ChannelStats]) -> tuple[FloatArra
 
 
 class _Gathered:
-    """One channel on the clock, interpolated chunk by chunk; NaN beyond its ends."""
+    """One channel on the clock, interpolated chunk by chunk; NaN beyond its ends.
 
-    def __init__(self, channel: ChannelStats, clock: FloatArray, start_ns: int) -> None:
+    All positions of one kind, by their fields, share a local frame.
+    """
+
+    def __init__(
+        self,
+        channel: ChannelStats,
+        clock: FloatArray,
+        start_ns: int,
+        frames: dict[tuple[str, ...], LocalFrame],
+    ) -> None:
         self.channel, self._clock, self._start_ns = channel, clock, start_ns
         count = 2 if channel.fields else 1
         gap_secs = max(channel.gap_threshold_secs, 5.0 * channel.interval_secs)
         self._components = [
             Interpolator(clock, gap_secs, hold=channel.hold is not None) for _ in range(count)
         ]
-        self._frame: LocalFrame | None = None
+        self._frames = frames
         self._angle: float | None = None
 
     def add(self, part: Channel) -> None:
         """Add the next samples, which are screened."""
         if part.fields:
             positions = positions_of(part.fields, part.values)
-            self._frame = self._frame or LocalFrame.at_first(positions)
             known = positions.measured
-            if self._frame is None or not known.any():
+            frame = self._frames.get(part.fields) or LocalFrame.at_first(positions)
+            if frame is None or not known.any():
                 return
+            self._frames[part.fields] = frame
             times = (part.measured_ns[known] - self._start_ns) * 1e-9
-            values = self._frame.north_east(positions)[known]
+            values = frame.north_east(positions)[known]
         else:
             times, column = valid_samples(part, self._start_ns)
             values = self._unwrapped(column)[:, None]
@@ -200,46 +218,83 @@ class _Gathered:
 # ---- the choice
 
 
-def _best(
-    name: str, by_name: Mapping[str, list[_Source]], clock: FloatArray
-) -> tuple[_Source, str]:
+@dataclass(frozen=True, eq=False)
+class _Comparison:
+    """Sources of one quantity to choose from, with the sources chosen of other quantities."""
+
+    name: str
+    sources: Sequence[_Source]
+    references: Mapping[str, _Source]
+    clock: FloatArray
+
+
+# the sources that are kept, and why, in words; None where the rule does not apply
+_Kept = tuple[list[_Source], str] | None
+
+
+def _best(comparison: _Comparison) -> tuple[_Source, str]:
     """Return the source of a quantity to use, and why, in words."""
-    sources = by_name[name]
-    alive = [source for source in sources if not source.is_dead]
-    if len(alive) == 1:
-        return alive[0], "the others are constant or not measured"
-    candidates = alive or sources
-    most = max(source.coverage for source in candidates)
-    complete = [s for s in candidates if s.coverage >= MIN_COVERAGE_SHARE * most]
-    if len(complete) == 1:
-        return complete[0], f"measured for {complete[0].coverage:.0%} of the time, the others less"
-    for rule in (_by_other_quantity, _by_median, _by_zero, _by_rate):
-        chosen = rule(name, complete, by_name, clock)
-        if chosen is not None:
-            return chosen
-    return complete[0], "the first in the log"
+    sources, reason = comparison.sources, ""
+    for rule in (
+        _alive, _complete, _by_range, _by_other_quantity, _through_water, _by_median, _by_zero,
+        _by_rate,
+    ):  # fmt: skip
+        kept = rule(replace(comparison, sources=sources))
+        if kept is not None and 0 < len(kept[0]) < len(sources):
+            sources, reason = kept[0], reason or kept[1]
+        if len(sources) == 1:
+            return sources[0], reason
+    return sources[0], reason or "the first in the log"
 
 
-def _by_other_quantity(
-    name: str, sources: Sequence[_Source], by_name: Mapping[str, list[_Source]], clock: FloatArray
-) -> tuple[_Source, str] | None:
-    """Choose by the heading's derivative, or by the speed of the fixes."""
-    reference, words = None, ""
-    if name == "yaw_rate" and "heading" in by_name:
-        reference, words = _derivative(by_name["heading"][0].values, clock), "the heading"
-    elif name == "speed" and "position" in by_name:
-        velocity = _derivative(by_name["position"][0].values, clock)
-        reference, words = np.hypot(*velocity.T), "the fixes"
+def _alive(comparison: _Comparison) -> _Kept:
+    alive = [source for source in comparison.sources if not source.is_dead]
+    return alive, "the others are constant or not measured"
+
+
+def _complete(comparison: _Comparison) -> _Kept:
+    most = max(source.coverage for source in comparison.sources)
+    kept = [s for s in comparison.sources if s.coverage >= MIN_COVERAGE_SHARE * most]
+    return kept, f"measured for {most:.0%} of the time, the others less"
+
+
+def _by_range(comparison: _Comparison) -> _Kept:
+    """Keep the headings that turn with the ship; a stuck one may be noisy."""
+    if comparison.name != "heading":
+        return None
+    ranges = [float(np.nanmax(s.values) - np.nanmin(s.values)) for s in comparison.sources]
+    return _smallest(comparison, [-each for each in ranges], "the others hardly vary", ratio=0.2)
+
+
+def _by_other_quantity(comparison: _Comparison) -> _Kept:
+    """Keep the sources close to the heading's derivative, or to the speed of the fixes."""
+    reference = comparison.references.get(
+        {"yaw_rate": "heading", "speed": "position"}.get(comparison.name, "")
+    )
     if reference is None:
         return None
-    errors = [_rms(_smooth(source.values, clock) - reference) for source in sources]
-    return _decisive(name, sources, errors, f"the closest to {words}")
+    derivative = _derivative(reference.values, comparison.clock)
+    if comparison.name == "speed":
+        derivative = np.hypot(*derivative.T)
+    smooth = [_smooth(source.values, comparison.clock) for source in comparison.sources]
+    errors = [_rms(each - derivative) for each in smooth]
+    if comparison.name == "speed":  # the fixes move over the ground: a current is no error
+        words, least = "the others differ from the fixes by more than a current", MAX_CURRENT
+        return _smallest(comparison, errors, words, ratio=1.0, margin=least)
+    return _smallest(comparison, errors, "the closest to the heading")
 
 
-def _by_median(
-    name: str, sources: Sequence[_Source], _: Mapping[str, list[_Source]], __: FloatArray
-) -> tuple[_Source, str] | None:
-    """Choose the source closest to the median of three or more."""
+def _through_water(comparison: _Comparison) -> _Kept:
+    """Keep the speeds that are not over the ground by the name of their source."""
+    if comparison.name != "speed":
+        return None
+    kept = [s for s in comparison.sources if not GROUND_SOURCES.search(s.stats.source.lower())]
+    return kept, "through the water; the others are over the ground by their names"
+
+
+def _by_median(comparison: _Comparison) -> _Kept:
+    """Keep the sources close to the median of three or more."""
+    sources = comparison.sources
     if len(sources) < 3 or sources[0].values.ndim > 1:
         return None
     values = np.column_stack([source.values for source in sources])
@@ -248,21 +303,21 @@ def _by_median(
         return None
     middle = np.median(values[known], axis=1)
     errors = [_rms(source.values[known] - middle) for source in sources]
-    return _decisive(name, sources, errors, "the closest to the median of all")
+    return _smallest(comparison, errors, "the closest to the median of all")
 
 
-def _by_zero(
-    name: str, sources: Sequence[_Source], by_name: Mapping[str, list[_Source]], clock: FloatArray
-) -> tuple[_Source, str] | None:
-    """Choose the rudder that is nearest to zero where it does not turn the ship."""
-    rates = [s.values for s in by_name.get("yaw_rate", ()) if not s.is_dead]
-    if name != "rudder" or not rates:
+def _by_zero(comparison: _Comparison) -> _Kept:
+    """Keep the rudder that is nearest to zero where it does not turn the ship."""
+    rate = comparison.references.get("yaw_rate")
+    if comparison.name != "rudder" or rate is None:
         return None
-    zeros_deg = np.degrees([_rudder_zero(s.values, rates[0], clock) for s in sources])
+    zeros = [_rudder_zero(s.values, rate.values, comparison.clock) for s in comparison.sources]
+    zeros_deg = np.degrees(zeros)
     if not np.isfinite(zeros_deg).all() or np.ptp(np.abs(zeros_deg)) < MIN_ZERO_DIFFERENCE:
         return None
     best = int(np.argmin(np.abs(zeros_deg)))
-    return sources[best], f"without effect at {zeros_deg[best]:+.1f} deg, the nearest to zero"
+    words = f"without effect at {zeros_deg[best]:+.1f} deg, the nearest to zero"
+    return [comparison.sources[best]], words
 
 
 def _rudder_zero(rudder: FloatArray, rate: FloatArray, clock: FloatArray) -> float:
@@ -286,33 +341,53 @@ def _rudder_zero(rudder: FloatArray, rate: FloatArray, clock: FloatArray) -> flo
     return float(-constant / effect) if rank == 3 and effect != 0 else np.nan
 
 
-def _by_rate(
-    _: str, sources: Sequence[_Source], __: Mapping[str, list[_Source]], ___: FloatArray
-) -> tuple[_Source, str] | None:
-    """Choose the source with the highest sampling rate."""
-    intervals = [source.stats.interval_secs for source in sources]
-    best = int(np.argmin(intervals))
-    others = min(interval for i, interval in enumerate(intervals) if i != best)
-    if intervals[best] <= 0 or others < DECISIVE_RATIO * intervals[best]:
-        return None
-    return sources[best], f"the fastest: {1 / intervals[best]:.3g} Hz"
+def _by_rate(comparison: _Comparison) -> _Kept:
+    """Keep the sources with the highest sampling rate."""
+    intervals = [source.stats.interval_secs for source in comparison.sources]
+    fastest = min(intervals)
+    kept = [
+        source
+        for source, interval in zip(comparison.sources, intervals, strict=True)
+        if interval < DECISIVE_RATIO * fastest
+    ]
+    return kept, f"the fastest: {1 / fastest:.3g} Hz" if fastest > 0 else ""
 
 
-def _decisive(
-    name: str, sources: Sequence[_Source], errors: Sequence[float], words: str
-) -> tuple[_Source, str] | None:
-    """Return the source with the smallest error, if the next is clearly larger."""
+def _smallest(
+    comparison: _Comparison,
+    errors: Sequence[float],
+    words: str,
+    *,
+    ratio: float = DECISIVE_RATIO,
+    margin: float | None = None,
+) -> _Kept:
+    """Keep the sources whose error is about the smallest.
+
+    Parameters
+    ----------
+    comparison
+        The k sources.
+    errors
+        (k,) errors; NaN where unknown.
+    words
+        Why the sources that are kept are kept.
+    ratio
+        A source is kept whose error is at most so many times the smallest,
+    margin
+        or exceeds it by no more than this; by default as much as sources of the quantity may
+        differ.
+    """
     known = [error for error in errors if np.isfinite(error)]
     if len(known) < 2:
         return None
-    best = int(np.nanargmin(errors))
-    least, others = errors[best], max(known)
-    if others <= max(DECISIVE_RATIO * least, _min_disagreement(name, sources)):
-        return None
-    unit, factor = _display(sources[0].stats)
-    return sources[best], (
-        f"{words}: {least * factor:.2g} {unit} rms against {others * factor:.2g} {unit}"
-    )
+    allowed = _min_disagreement(comparison.name, comparison.sources) if margin is None else margin
+    limit = max(ratio * min(known), min(known) + allowed)
+    kept = [s for s, error in zip(comparison.sources, errors, strict=True) if error <= limit]
+    worst = max(known)
+    if min(known) >= 0 and len(kept) < len(errors):
+        unit, factor = _display(comparison.sources[0].stats)
+        words += f": {min(known) * factor:.2g} {unit} rms against {worst * factor:.2g} {unit}"
+    return kept, words
 
 
 # ---- the disagreement
@@ -350,9 +425,11 @@ def _difference(best: _Source, other: _Source, sources: Sequence[_Source]) -> st
     if rms <= max(_min_disagreement(best.stats.name, sources), NOISE_ERRORS * noise):
         return ""
     text = f"{other.stats.source} differs by {rms * factor:.2g} {unit} rms"
-    if a.ndim == 1 and np.ptp(a) > 0:
+    if a.ndim == 1 and min(np.ptp(a), np.ptp(b)) > 0:
         scale, offset = np.polyfit(a, b, 1)
-        text += f" (about {scale:.2f} x {best.stats.source} {offset * factor:+.2g} {unit})"
+        if abs(np.corrcoef(a, b)[0, 1]) > MIN_CORRELATION:
+            multiple = f"{scale:.2f} x {best.stats.source} {offset * factor:+.2g} {unit}"
+            text += f" ({other.stats.source} = {multiple})"
     return text
 
 

@@ -83,6 +83,15 @@ def test_measured_values_are_no_sentinels(values: np.ndarray) -> None:
     assert sentinel_values(values, "rad") == ()
 
 
+@pytest.mark.parametrize("period", [100, 240, 400])
+@pytest.mark.parametrize("hold", [30, 50])
+def test_orders_after_a_noisy_approach_are_no_sentinels(period: int, hold: int) -> None:
+    order = np.radians(np.random.default_rng(3).normal(0.0, 0.3, 2400))
+    for k in range(600, 2400, period):
+        order[k : k + hold] = np.radians(10.0)
+    assert sentinel_values(order, "rad") == ()
+
+
 @pytest.mark.parametrize("manoeuvre", ["zigzag-10-10", "turning-circle-35", "pseudo-random"])
 def test_no_simulated_channel_has_a_sentinel(vessel: Vessel, manoeuvre: str) -> None:
     for seed in range(5):
@@ -112,6 +121,9 @@ def heading_stats(values: np.ndarray) -> ChannelStats:
 def test_a_heading_that_counts_its_turns_is_used_and_one_that_jumps_beyond_two_is_not() -> None:
     circles = np.linspace(0.0, -20.0, COUNT)
     assert heading_stats(circles).valid == COUNT
+    assert heading_stats(heading() + 14.0).valid == COUNT
+    with_gap = np.concatenate((np.linspace(0.0, 12.0, 200), np.linspace(16.0, 25.0, 400)))
+    assert heading_stats(with_gap).valid == COUNT
     wild = heading()
     wild[100:400:50] = [13.0, -40.0, 700.0, 200.0, -300.0, 88.0]
     assert heading_stats(wild).valid == COUNT - 6

@@ -120,6 +120,42 @@ def test_a_second_position_source_with_a_single_fix_is_not_used(trial: TrialLog)
     assert result.screening.stats["position"].source == trial["position"].source
 
 
+def test_two_receivers_at_one_place_agree_although_one_starts_later(trial: TrialLog) -> None:
+    fixes = trial["position"]
+    late = replace(fixes.take(slice(len(fixes) // 3, None)), source="late")
+    result = screened(replace(trial, channels=(*trial.channels, late)))
+    (warning,) = [text for text in result.warnings if text.startswith("position: 2 sources")]
+    assert "disagree" not in warning
+
+
+def test_a_stuck_heading_with_noise_does_not_choose_the_yaw_rate(trial: TrialLog) -> None:
+    rng = np.random.default_rng(4)
+    log = with_source(trial, "yaw_rate", lambda x: x / 57.3, source="TI")
+    log = with_source(log, "heading", lambda x: 1.0 + 1e-3 * rng.standard_normal(len(x)))
+    stats = screened(log).screening.stats
+    assert (stats["heading"].source, stats["yaw_rate"].source) == ("simulated", "simulated")
+
+
+def test_the_speed_through_the_water_is_preferred_to_that_of_the_fixes(trial: TrialLog) -> None:
+    secs = (trial["position"].measured_ns - trial["position"].measured_ns[0]) * 1e-9
+    drifting = replace(
+        trial["position"], values=trial["position"].values + np.outer(secs, [1.0, 0.0])
+    )
+    log = replace(
+        trial, channels=tuple(drifting if c.name == "position" else c for c in trial.channels)
+    )
+    source, warning = used(with_source(log, "speed", lambda x: x + 1.0, source="gps"), "speed")
+    assert source == "simulated"
+    assert "through the water" in warning
+
+
+def test_the_fastest_of_the_good_sources_is_used_beside_a_bad_one(trial: TrialLog) -> None:
+    slow = replace(trial["yaw_rate"].take(slice(None, None, 10)), source="slow")
+    bad = replace(trial["yaw_rate"], source="bad", values=3.0 * trial["yaw_rate"].values)
+    log = replace(trial, channels=(slow, bad, *trial.channels))
+    assert screened(log).screening.stats["yaw_rate"].source == "simulated"
+
+
 def test_the_user_can_choose_any_source(trial: TrialLog) -> None:
     log = with_source(trial, "yaw_rate", lambda x: -x)
     result = screened(log, {"yaw_rate": "other"})

@@ -1,0 +1,57 @@
+"""A log is prepared for a fit with the same care as for a replay."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from faults import dropout
+from trial_logs import as_log
+
+from analysis.identification.runs import run_from_log
+from analysis.replay.plan import plan_replay
+from recorders.simulated.simulate import simulate
+from shiplog import TrialLog, Vessel
+
+
+@pytest.fixture(scope="module")
+def trial(vessel: Vessel) -> TrialLog:
+    return as_log(simulate(vessel, "zigzag-20-20", duration_secs=300.0, seed=2), "trial.mcap")
+
+
+def test_good_data_give_no_warning(trial: TrialLog) -> None:
+    assert run_from_log(trial).warnings == ()
+
+
+def test_positions_inside_a_gap_are_not_interpolated(trial: TrialLog) -> None:
+    run = run_from_log(dropout("position", 100.0, 80.0)(trial))
+    (positions,) = run.positions
+    assert positions is not None
+    (segment,) = run.segments
+    time = segment.signals.time_secs
+    missing = np.isnan(positions).all(axis=1)
+    assert missing[(time > 101.5) & (time < 178.5)].all()
+    assert not missing[(time > 1.5) & (time < 98.5)].any()
+
+
+def test_two_sources_of_sway_are_compared(trial: TrialLog) -> None:
+    speed = trial["speed"]
+    rng = np.random.default_rng(1)
+    right = replace(speed, name="sway", source="dvl", values=0.1 * rng.standard_normal(len(speed)))
+    wrong = replace(right, source="old", values=9.0 + right.values)
+    run = run_from_log(replace(trial, channels=(*trial.channels, right, wrong)))
+    assert any("sway: 2 sources" in warning for warning in run.warnings)
+
+
+def test_what_a_replay_reports_about_channels_is_reported_here_too(trial: TrialLog) -> None:
+    rpm = trial["rpm"]
+    late = rpm.take(np.flatnonzero(rpm.measured_ns - rpm.measured_ns[0] > 60e9))
+    log = replace(trial, channels=tuple(late if c.name == "rpm" else c for c in trial.channels))
+    (of_replay,) = [w for w in plan_replay(log).warnings if w.startswith("rpm: starts")]
+    assert any(of_replay in warning for warning in run_from_log(log).warnings)
+
+
+def test_contradictions_are_kept_to_explain_an_error_of_the_fit(trial: TrialLog) -> None:
+    reversed_rate = replace(trial["yaw_rate"], values=-trial["yaw_rate"].values)
+    channels = tuple(reversed_rate if c.name == "yaw_rate" else c for c in trial.channels)
+    (contradiction, *_) = run_from_log(replace(trial, channels=channels)).contradictions
+    assert "yaw_rate" in contradiction
