@@ -160,21 +160,20 @@ def _parsed_time(text: str) -> datetime | time:
 
 
 def _day_time_ns(when: time, text: str, span_ns: tuple[int, int], name: str) -> int:
-    """Return the instant of a time of day in the log; that of its first day where it has none."""
+    """Return the instant of a time of day in the log, or the one nearest to the log."""
     first_day = (_EPOCH + timedelta(microseconds=span_ns[0] // 1000)).astimezone(when.tzinfo).date()
     first = _ns_of(datetime.combine(first_day, when))
     days = (span_ns[1] - span_ns[0]) // _DAY_NS + 2
-    inside = [
-        at
-        for at in (first + day * _DAY_NS for day in range(days))
-        if span_ns[0] <= at <= span_ns[1]
-    ]
+    instants = [first + day * _DAY_NS for day in range(-1, days)]
+    inside = [at for at in instants if span_ns[0] <= at <= span_ns[1]]
     if len(inside) > 1:
         raise UsageError(
             f"{text} occurs on {len(inside)} days of the log; add the date, such as "
             f"{_utc(inside[0])}; {name} has {_span_text(span_ns)}"
         )
-    return inside[0] if inside else first
+    if inside:
+        return inside[0]
+    return min(instants, key=lambda at: max(span_ns[0] - at, at - span_ns[1]))
 
 
 def _ns_of(when: datetime) -> int:

@@ -20,6 +20,8 @@ from shiplog.units import CATALOGUE, UNITS, channel_kind, conversion_factor, did
         (1.0, "h", "min", 60.0),
         (1e9, "ns", "s", 1.0),
         (1.0, "ms", "us", 1000.0),
+        (2.0, "kN·m", "Nm", 2000.0),
+        (2.0, "MN.m", "kNm", 2000.0),
     ],
 )
 def test_units_convert_by_their_definitions(

@@ -90,6 +90,21 @@ def test_a_time_of_day_after_midnight_is_of_the_next_day(opened: Opener) -> None
     assert seconds(opened(MIDNIGHT - 60, 600).between("23:59:30", "00:01:00")) == [30, 119]
 
 
+@pytest.mark.parametrize(
+    ("start_secs", "start", "end", "expected"),
+    [
+        (-600, "23:55", "00:30", [300, 900]),
+        (-600, "23:30", "00:02", [0, 719]),
+        (300, "23:55", "00:10", [0, 299]),
+        (-1200, "23:45", "00:30", [300, 900]),
+    ],
+)
+def test_a_time_of_day_outside_of_the_log_is_that_nearest_to_it(
+    opened: Opener, start_secs: int, start: str, end: str, expected: list[int]
+) -> None:
+    assert seconds(opened(MIDNIGHT + start_secs, 900).between(start, end)) == expected
+
+
 def test_a_time_of_day_that_occurs_twice_needs_its_date(opened: Opener) -> None:
     with pytest.raises(UsageError, match=r"on 2 days of the log; add the date, such as 2026-05-01"):
         opened(MIDNIGHT - 60, 86_400 + 120).between("00:00:30")
