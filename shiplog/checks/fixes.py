@@ -18,6 +18,7 @@ MAX_ZERO_SECS = 60.0  # between a fix at 0, 0 and one that shows that the ship w
 BLOCK_SECS, BLOCK_STEP, BLOCK_SPEED = 10.0, 50.0, 10.0  # s, m, m/s: smaller steps join a block
 LOOKBACK = 1024  # blocks
 MAX_REJECTED_SHARE = 0.2  # of the fixes; beyond it the datum may have changed
+MAX_IMPOSSIBLE_VALUES = 1000  # different ones of a channel that are counted by value
 MAX_LISTED = 3  # kinds of impossible positions in a warning
 
 
@@ -34,7 +35,10 @@ class FixScreening:
     start_ns
         The first instant of the channel.
     impossible
-        Number of fixes by impossible value, such as ``{"latitude 91, longitude 181": 30}``.
+        Number of fixes by impossible value, such as ``{"latitude 91, longitude 181": 30}``, of the
+        first `MAX_IMPOSSIBLE_VALUES` different ones.
+    impossible_count
+        Number of fixes at all impossible values.
     first_impossible_secs
         Time of the first of these, s after `start_ns`.
     rejected_ns
@@ -53,6 +57,7 @@ class FixScreening:
     usable_span_ns: tuple[int, int]
     start_ns: int
     impossible: dict[str, int]
+    impossible_count: int
     first_impossible_secs: float
     rejected_ns: TimeArray
     zero: NDArray[np.bool_]
@@ -90,10 +95,9 @@ class FixScreening:
     def _impossible_warning(self) -> str:
         listed = sorted(self.impossible.items(), key=lambda item: -item[1])
         values = [f"{count} at {value}" for value, count in listed[:MAX_LISTED]]
-        others = sum(count for _, count in listed[MAX_LISTED:])
-        total = sum(self.impossible.values())
+        others = self.impossible_count - sum(count for _, count in listed[:MAX_LISTED])
         return (
-            f"{_fixes(total)} at an impossible position ({', '.join(values)}"
+            f"{_fixes(self.impossible_count)} at an impossible position ({', '.join(values)}"
             f"{f', {others} at others' if others else ''}), the first "
             f"{self.first_impossible_secs:.1f} s after its start; latitudes are within 90 deg and "
             "longitudes within 360 deg, and AIS prints 91, 181 without a position: they are not "
@@ -186,7 +190,8 @@ class FixScreen:
     def __init__(self) -> None:
         self._fields: tuple[str, ...] = ()
         self._start_ns: int | None = None
-        self._impossible: Counter[str] = Counter()
+        self._impossible: Counter[tuple[float, ...]] = Counter()  # by value
+        self._impossible_count = 0
         self._first_impossible_ns = 0
         # of the last fix: since when its position is repeated, and its values
         self._last: tuple[TimeArray, FloatArray] | None = None
@@ -245,10 +250,22 @@ class FixScreen:
             return
         if not self._impossible:
             self._first_impossible_ns = int(channel.measured_ns[rows[0]])
-        values, counts = np.unique(channel.values[rows, :2], axis=0, return_counts=True)
-        for (one, other), count in zip(values.tolist(), counts.tolist(), strict=True):
-            first, second = channel.fields[:2]
-            self._impossible[f"{first} {one:.10g}, {second} {other:.10g}"] += count
+        self._impossible_count += len(rows)
+        values, first, counts = np.unique(
+            channel.values[rows, :2], axis=0, return_index=True, return_counts=True
+        )
+        order = np.argsort(first)  # so that the ends of chunks do not change which are counted
+        for value, count in zip(values[order].tolist(), counts[order].tolist(), strict=True):
+            if tuple(value) in self._impossible or len(self._impossible) < MAX_IMPOSSIBLE_VALUES:
+                self._impossible[tuple(value)] += count
+
+    def _impossible_by_text(self) -> dict[str, int]:
+        """Return the number of fixes by the text of their impossible value."""
+        by_text: Counter[str] = Counter()
+        for value, count in self._impossible.items():
+            named = zip(self._fields, value, strict=False)
+            by_text[", ".join(f"{field} {each:.10g}" for field, each in named)] += count
+        return dict(by_text)
 
     def result(self, max_speed: float) -> FixScreening:
         """Return which fixes are used.
@@ -264,8 +281,9 @@ class FixScreen:
         if not self._pieces:
             none = np.zeros(0)
             return FixScreening(
-                0, (0, 0), start_ns, dict(self._impossible), first_impossible,
-                np.zeros((0, 2), np.int64), none > 0, none.astype(np.int64), none, reach,
+                0, (0, 0), start_ns, self._impossible_by_text(), self._impossible_count,
+                first_impossible, np.zeros((0, 2), np.int64), none > 0, none.astype(np.int64),
+                none, reach,
             )  # fmt: skip
         columns = zip(*(vars(piece).values() for piece in self._pieces), strict=True)
         blocks = _Blocks(*(np.concatenate(column) for column in columns)).merged()
@@ -282,7 +300,8 @@ class FixScreen:
             usable=int(blocks.counts[used].sum()),
             usable_span_ns=(int(kept.min()), int(kept.max())) if len(kept) else (0, 0),
             start_ns=start_ns,
-            impossible=dict(self._impossible),
+            impossible=self._impossible_by_text(),
+            impossible_count=self._impossible_count,
             first_impossible_secs=first_impossible,
             rejected_ns=np.column_stack(
                 (blocks.times[rejected[first], 0], blocks.times[rejected[last], 1])

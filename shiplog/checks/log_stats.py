@@ -22,7 +22,7 @@ from .channel_stats import (
     possible_range,
     without_unusable,
 )
-from .fixes import FixScreen
+from .fixes import MAX_IMPOSSIBLE_VALUES, FixScreen
 from .on_change import HoldStats, is_order, is_written_on_change, stated_interpolation
 from .quantiles import Quantiles
 from .sentinels import MAX_WRAPPED, sentinel_values, unwrapped_limit
@@ -33,7 +33,6 @@ ChannelKey = tuple[str, tuple[str, ...]]  # topic and fields
 
 MIN_INTERVALS = 10  # fewer do not show whether a channel is irregular
 LAST_INSTANT_NS = np.iinfo(np.int64).max
-MAX_IMPOSSIBLE_VALUES = 1000  # different ones that are counted
 
 
 def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:

@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from shiplog.checks.fixes import FixScreen, FixScreening
+from shiplog.checks.fixes import MAX_IMPOSSIBLE_VALUES, FixScreen, FixScreening
 from shiplog.geodesy import LocalFrame, LocalPositions
 from shiplog.types import Channel
 
@@ -145,6 +145,22 @@ def test_impossible_positions_are_counted_by_value(
     (warning,) = result.warnings()
     assert text in warning
     assert f"the first {first:.1f} s" in warning
+
+
+@pytest.mark.parametrize("cuts", [(), (700, 1600)])
+def test_impossible_positions_that_all_differ_are_counted_in_bounded_memory(
+    cuts: tuple[int, ...],
+) -> None:
+    wild = np.column_stack((100.0 + np.arange(2000)[::-1], np.full(2000, 20.0)))
+    channel = with_rows(geographic(straight(2300)), slice(100, 2100), wild)
+    channel = with_rows(channel, slice(2100, 2200), wild[0])  # one of the first again
+    result, unused = screened(channel, cuts)
+    assert unused == list(range(100, 2200))
+    assert len(result.impossible) == MAX_IMPOSSIBLE_VALUES
+    assert result.impossible["latitude 2099, longitude 20"] == 101
+    (warning,) = result.warnings()
+    assert warning.startswith("2100 fixes at an impossible position (101 at latitude 2099")
+    assert ", 1997 at others)" in warning
 
 
 @pytest.mark.parametrize("row", [(np.nan, np.nan), (np.nan, 20.0), (60.0, np.nan)])
