@@ -3,17 +3,19 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from shiplog.checks.channel_stats import LogStats
 from shiplog.types import FloatArray
 
-from .coarse_record import CoarseSignals
+from .coarse_record import COURSE_WINDOW_SECS, CoarseSignals
 from .findings import Finding
 from .ground_velocity import GroundVelocity
 from .unit_factors import GEOGRAPHIC_UNITS, LENGTH_UNITS, SPEED_UNITS, in_words, misread_units
 
 WINDOW_SECS = 20.0  # over which the speed over ground is measured
+MAX_WINDOW_TURN = np.radians(60.0)  # of the course; up to it the chord is 5 % below the distance
 MAX_CURRENT = 2.5  # m/s
 MIN_SPEED_RATIO, MAX_SPEED_RATIO = 0.62, 1.6  # of speed and fixes, beyond which a unit is wrong
 RADIANS_RATIOS = 15.0, 70.0  # of speed and fixes, with degrees of longitude up to latitude 75
@@ -44,7 +46,7 @@ def speed_findings(signals: CoarseSignals, velocity: GroundVelocity | None) -> I
     if speeds is None:
         return
     ground, water = (float(np.median(each)) for each in speeds)
-    ratio, allowance = water / ground, min(MAX_CURRENT, water)
+    ratio, allowance = water / ground, MAX_CURRENT
     if velocity and velocity.scale_error < MAX_SCALE_ERROR * velocity.scale:
         ratio, allowance = 1 / velocity.scale, 0.0
     if MIN_SPEED_RATIO < ratio < MAX_SPEED_RATIO or abs(water - ground) < allowance:
@@ -138,19 +140,27 @@ def range_findings(signals: CoarseSignals) -> Iterator[Finding]:
 
 
 def _ground_and_water_speed(signals: CoarseSignals) -> tuple[FloatArray, FloatArray] | None:
-    """Return speed over ground and through the water where both are known, each (m,) m/s."""
+    """Return speed over ground and through the water where both are known, each (m,) m/s.
+
+    In a tight turn the fixes are nearer to each other than the distance covered, so that windows
+    with a larger turn than `MAX_WINDOW_TURN` are not used.
+    """
     dt, north, east, speed = signals.dt_secs, signals.north, signals.east, signals.speed
     n = max(round(WINDOW_SECS / dt), 1)
     if len(speed) <= 2 * n:
         return None
     ground = np.hypot(north[n:] - north[:-n], east[n:] - east[:-n]) / (n * dt)
     water = np.abs(speed[n // 2 : n // 2 + len(ground)])
-    known = np.isfinite(ground) & np.isfinite(water) & (ground > 0) & (water > 0)
+    turns = np.ptp(sliding_window_view(signals.course, n + 1)[:, :: max(n // 10, 1)], axis=1)
+    known = np.isfinite(ground + water) & (turns < MAX_WINDOW_TURN) & (ground > 0) & (water > 0)
     return (ground[known], water[known]) if np.count_nonzero(known) >= 3 * n else None
 
 
 def _straight_offset_deg(signals: CoarseSignals, sense: int) -> float:
-    """Return course minus heading while the ship goes straight ahead, deg; 0 if undetermined."""
+    """Return course minus heading while the ship goes straight ahead, deg; 0 if undetermined.
+
+    It is undetermined for a ship so slow that a current changes its course by `MIN_OFFSET_DEG`.
+    """
     heading, speed = sense * signals.heading, signals.speed
     n = max(round(WINDOW_SECS / signals.dt_secs), 1)
     if len(heading) <= 2 * n:
@@ -159,10 +169,20 @@ def _straight_offset_deg(signals: CoarseSignals, sense: int) -> float:
     turn[n:-n] = np.abs(heading[2 * n :] - heading[: -2 * n])
     ahead = ~(speed <= 0.2 * np.nanmedian(np.abs(speed))) if np.isfinite(speed).any() else True
     known = np.isfinite(signals.course + turn) & ahead & (turn < np.radians(20.0))
-    if np.count_nonzero(known) < 3 * n:
+    if np.count_nonzero(known) < 3 * n or _typical_speed(signals, known) < 2 * MAX_CURRENT:
         return 0.0
     mean = np.mean(np.exp(1j * (signals.course - heading)[known]))
     return float(np.degrees(np.angle(mean))) if abs(mean) >= 0.8 else 0.0
+
+
+def _typical_speed(signals: CoarseSignals, known: NDArray[np.bool_]) -> float:
+    """Return the median speed at some instants, m/s; that of the fixes without a speed."""
+    speeds = np.abs(signals.speed[known])
+    if not np.isfinite(speeds).any():
+        half = max(round(COURSE_WINDOW_SECS / signals.dt_secs / 2), 1)
+        at, track = np.flatnonzero(known), signals.north + 1j * signals.east
+        speeds = np.abs(track[at + half] - track[at - half]) / (2 * half * signals.dt_secs)
+    return float(np.nanmedian(speeds))
 
 
 def _rudder_range_findings(signals: CoarseSignals) -> Iterator[Finding]:
