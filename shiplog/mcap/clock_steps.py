@@ -334,6 +334,8 @@ def _rows_with_repeated_times(times: TimeArray, rows: list[int], interval: float
         interval = float(np.median(np.diff(ordered)[outside]))
     elif _is_even(np.diff(ordered), ordered_interval):
         interval = ordered_interval
+    if interval <= 0:
+        return []  # most samples have one time: nothing to compare with
     repeated = []
     for row, (first, last) in zip(rows, spans, strict=True):
         count = np.searchsorted(ordered, last, "right") - np.searchsorted(ordered, first)

@@ -236,7 +236,7 @@ def test_a_new_warning_and_a_moved_position_fail_the_check(
 ) -> None:
     position = zigzag_log["position"]
     values = position.values.copy()
-    values[301, 0] += 500.0
+    values[301, 0] += 60.0
     moved = tuple(replace(c, values=values) if c.name == "position" else c for c in zigzag_log)
     found = compare(replace(zigzag_log, channels=moved), reference)
     assert [d.topic for d in found.changed] == ["/north/track"]

@@ -231,9 +231,9 @@ def test_values_that_are_not_identifiable_are_marked_with_their_origin() -> None
     own, _, _ = text.partition("[yaw]")
     lines = {line.split(" = ")[0]: line for line in own.split("\n")}
     remark = "NOT IDENTIFIABLE from these logs"
-    assert lines["yv"].endswith(f"{remark}: mostly its prior")
+    assert f"{remark}: mostly its prior" in lines["yv"]
     for name in set(estimates.unidentifiable) - {"yv"}:
-        assert lines[name].endswith(f"{remark}: one of many values that fit them")
+        assert f"{remark}: one of many values that fit them" in lines[name]
 
 
 @pytest.mark.xdist_group("identified nomoto")
