@@ -9,6 +9,7 @@ from typing import IO
 from mcap import records
 
 from shiplog.types import Channel, TrialLog
+from shiplog.types.inputs_in_force import inputs_in_force, with_inputs_in_force
 from shiplog.types.time_cut import TimeCut, empty_cut_error, resolve_cut
 
 from .clock_repair import MixedTimes, refuse_mixed_times
@@ -102,7 +103,7 @@ class LogFile:
     ) -> "LogFile":
         """Return the part of the log that was measured between two times.
 
-        One pass over the file computes its span.
+        One pass over the file computes its span, another one the inputs in force at the start.
 
         Parameters
         ----------
@@ -115,7 +116,8 @@ class LogFile:
         Returns
         -------
         log
-            The part. Its name and its metadata ``cut`` state the bounds.
+            The part. Its name and its metadata ``cut`` state the bounds. A rudder angle or rpm
+            that is in force at `start` is repeated there if it has no sample within a second.
 
         Raises
         ------
@@ -135,7 +137,10 @@ class LogFile:
         part = replace(self, cuts=(*self.cuts, cut))
         if not any(len(channel) for chunk in part.chunks() for channel in chunk):
             raise empty_cut_error(start, end, span_ns, self.name)
-        return part
+        if cut.start_ns == span_ns[0]:
+            return part
+        samples = inputs_in_force((c for c, _ in self._unchecked_chunks()), cut.start_ns)
+        return replace(self, cuts=(*self.cuts, replace(cut, in_force=samples)))
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """Iterate over the samples in the order of the file, about a million at a time.
@@ -164,21 +169,25 @@ class LogFile:
         contents = McapContents(
             dict(self.schemas), dict(self.channel_records), keep_undescribed=False
         )
+        is_first = True
         with open_mcap(self.path) as stream:
             for _ in scan(stream, contents):
                 if contents.pending_samples >= FILE_CHUNK_SAMPLES:
                     chunk = build_trial_log(self.path, contents)
-                    yield self._selected(chunk), contents.mixed_times
+                    yield self._selected(chunk, is_first=is_first), contents.mixed_times
+                    is_first = False
         rest = build_trial_log(self.path, contents)
-        yield self._selected(rest), contents.mixed_times
+        yield self._selected(rest, is_first=is_first), contents.mixed_times
         self.outline = replace(rest, channels=self.outline.channels)
 
-    def _selected(self, chunk: TrialLog) -> tuple[Channel, ...]:
+    def _selected(self, chunk: TrialLog, *, is_first: bool) -> tuple[Channel, ...]:
         """Return the channels of a chunk in the order of the log, within its cuts."""
         by_key = {channel.key: channel for channel in chunk}
         channels = tuple(by_key.get(channel.key, channel) for channel in self.outline)
         for cut in self.cuts:
             channels = tuple(map(cut.apply, channels))
+            if is_first:
+                channels = with_inputs_in_force(channels, cut.in_force)
         return channels
 
 

@@ -12,6 +12,7 @@ from shiplog.units import did_you_mean
 
 from .arrays import ReadOnlyMapping, is_sorted
 from .channel import Channel
+from .inputs_in_force import inputs_in_force, with_inputs_in_force
 from .time_cut import empty_cut_error, resolve_cut
 
 if TYPE_CHECKING:
@@ -226,7 +227,8 @@ class TrialLog(ChannelsByName[Channel]):
         Returns
         -------
         log
-            The part. Its name and its metadata ``cut`` state the bounds.
+            The part. Its name and its metadata ``cut`` state the bounds. A rudder angle or rpm
+            that is in force at `start` is repeated there if it has no sample within a second.
 
         Raises
         ------
@@ -246,6 +248,8 @@ class TrialLog(ChannelsByName[Channel]):
         channels = tuple(map(cut.apply, self.channels))
         if not any(map(len, channels)):
             raise empty_cut_error(start, end, self.span_ns, self.name)
+        samples = inputs_in_force([self.channels], cut.start_ns)
+        channels = with_inputs_in_force(channels, samples)
         metadata = {**self.metadata, "cut": cut.text(self.name)}
         name = cut.name_of_part(self.name)
         return replace(self, name=name, channels=channels, metadata=metadata)

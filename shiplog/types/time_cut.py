@@ -1,6 +1,7 @@
 """Cut of a log by measured time: its bounds as people write them, and its samples."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import UTC, date, datetime, time, timedelta
 from math import isfinite
 
@@ -24,11 +25,14 @@ class TimeCut:
         The bounds, ns since 1970-01-01 UTC, within the span of the log.
     log_span_ns
         The first and the last time of measurement of the whole log, ns.
+    in_force
+        Samples of the inputs in force at the start, by topic and fields, for a log in its file.
     """
 
     start_ns: int
     end_ns: int
     log_span_ns: tuple[int, int]
+    in_force: Mapping[tuple[str, tuple[str, ...]], Channel] = field(default_factory=dict)
 
     def apply(self, channel: Channel) -> Channel:
         """Return the samples of a channel that are within the cut, in their order."""

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from shiplog import Channel, LogFile, TrialLog, UsageError, open_log, write
+from shiplog.types import concatenate_channels, is_sorted
 
 SEC = 10**9
 MIDNIGHT = 1_777_593_600  # s of 2026-05-01T00:00:00Z
@@ -135,3 +136,79 @@ def test_samples_out_of_order_are_cut_by_their_measured_time() -> None:
     channel = Channel("speed", "log", "m/s", measured, received, measured / SEC)
     part = TrialLog("run.mcap", (channel,)).between(1, 4)
     assert part["speed"].values.tolist() == [3, 1, 2]
+
+
+def _inputs(log: TrialLog | LogFile) -> dict[str, list[tuple[int, float]]]:
+    """Return the seconds and the values of the inputs; their times of reception are in order."""
+    parts: dict[str, list[Channel]] = {}
+    for chunk in log.chunks():
+        for channel in chunk:
+            parts.setdefault(channel.name, []).append(channel)
+    whole = {name: concatenate_channels(channels) for name, channels in parts.items()}
+    assert all(is_sorted(channel.received_ns) for channel in whole.values())
+    return {
+        name: list(zip((c.measured_ns // SEC).tolist(), c.values.tolist(), strict=True))
+        for name, c in whole.items()
+        if name != "speed"
+    }
+
+
+@pytest.fixture(params=["memory", "file"])
+def on_change(
+    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> TrialLog | LogFile:
+    """Return a log whose inputs are written on change; one value is impossible."""
+
+    def channel(name: str, secs: list[int], values: list[float], unit: str) -> Channel:
+        times = np.array(secs) * SEC
+        return Channel(name, "bridge", unit, times, times + SEC // 10, np.array(values))
+
+    every = list(range(301))
+    log = TrialLog(
+        "run.mcap",
+        (
+            channel("speed", every, [1.0] * 301, "m/s"),
+            channel("rudder", [0, 70, 100, 150, 250], [0.1, 0.2, np.nan, -0.2, 99.0], "rad"),
+            channel("rpm", [0, 300], [80.0, 80.0], "rpm"),
+            channel("rudder_order", [0, 90], [0.0, 0.1], "rad"),
+        ),
+    )
+    if request.param == "memory":
+        return log
+    write(log, tmp_path / "run.mcap")
+    monkeypatch.setattr("shiplog.mcap.stream.MAX_SAMPLES_IN_MEMORY", 5)
+    monkeypatch.setattr("shiplog.mcap.stream.FILE_CHUNK_SAMPLES", 7)
+    return open_log(tmp_path / "run.mcap")
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "rudder", "rpm"),
+    [
+        (120, None, [(120, 0.2), (150, -0.2), (250, 99.0)], [(120, 80.0), (300, 80.0)]),
+        (120, 140, [(120, 0.2)], [(120, 80.0)]),
+        (149, 200, [(150, -0.2)], [(149, 80.0)]),
+        (148, 200, [(148, 0.2), (150, -0.2)], [(148, 80.0)]),
+        (70, 80, [(70, 0.2)], [(70, 80.0)]),
+        (270, None, [(270, -0.2)], [(270, 80.0), (300, 80.0)]),
+        (None, 60, [(0, 0.1)], [(0, 80.0)]),
+    ],
+)
+def test_an_input_written_on_change_keeps_its_value_at_the_start_of_a_cut(
+    on_change: TrialLog | LogFile,
+    start: float | None,
+    end: float | None,
+    rudder: list[tuple[int, float]],
+    rpm: list[tuple[int, float]],
+) -> None:
+    inputs = _inputs(on_change.between(start, end))
+    assert inputs["rudder"] == rudder
+    assert inputs["rpm"] == rpm
+    assert all(at < 100 for at, _ in inputs["rudder_order"])  # a measured value is not repeated
+
+
+def test_an_input_keeps_its_value_in_a_part_that_is_cut_again(
+    on_change: TrialLog | LogFile,
+) -> None:
+    inputs = _inputs(on_change.between(80, 290).between(20, 40))
+    assert inputs["rudder"][0] == (100, 0.2)
+    assert inputs["rpm"] == [(100, 80.0)]
