@@ -18,6 +18,7 @@ from .reader import contents_described_by, open_mcap, read_unchecked
 from .scan import scan
 from .summary import are_in_order, read_summary
 from .trial_log import build_trial_log
+from .unset_times import are_set
 
 MAX_SAMPLES_IN_MEMORY = 16_000_000  # 400 MB of samples; a filter of them needs more
 FILE_CHUNK_SAMPLES = 1 << 20  # of all channels together, about
@@ -199,7 +200,9 @@ def open_log(
     """Open a log: in memory if it has at most 16 million samples, else in its file.
 
     A file without a valid summary is scanned once to learn its content. A file whose MCAP chunks
-    are not in the order of reception is read into memory whatever its size.
+    are not in the order of reception, or with times that were not set or are impossible, is read
+    into memory whatever its size: which times are replaced depends on all of them. One pass over a
+    file that is not read into memory computes the span of its times.
 
     Parameters
     ----------
@@ -249,11 +252,30 @@ def _open_unchecked(path: Path) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
     contents = contents_described_by(summary)
     contents.finished = True
     contents.metadata, contents.vessel_toml = dict(summary.metadata), summary.vessel_toml
-    return _log_file(path, contents), []
+    return _log_file(path, contents)
 
 
-def _log_file(path: Path, contents: McapContents) -> LogFile:
-    return LogFile(path, build_trial_log(path, contents), contents.schemas, contents.channels)
+def _log_file(path: Path, contents: McapContents) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
+    """Return a log in its file, or in memory where some times were not set or are impossible."""
+    outline = build_trial_log(path, contents)
+    if not _are_all_set(path, contents):
+        return read_unchecked(path)
+    return LogFile(path, outline, contents.schemas, contents.channels), []
+
+
+def _are_all_set(path: Path, described: McapContents) -> bool:
+    """Whether no time of a file is to be replaced, shifted or dropped, by one pass over it."""
+    contents = McapContents(
+        dict(described.schemas), dict(described.channels), keep_undescribed=False
+    )
+    first_ns, last_ns = 2**63 - 1, -(2**63)
+    with open_mcap(path) as stream:
+        for _ in scan(stream, contents):
+            for blocks in contents.drain().values():
+                for times in (t for b in blocks for t in (b.received, b.measured)):
+                    first_ns = min(first_ns, int(times.min(initial=first_ns)))
+                    last_ns = max(last_ns, int(times.max(initial=last_ns)))
+    return first_ns > last_ns or are_set(first_ns, last_ns)
 
 
 def _open_by_scan(path: Path, stream: IO[bytes]) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
@@ -268,5 +290,5 @@ def _open_by_scan(path: Path, stream: IO[bytes]) -> tuple[TrialLog | LogFile, li
     if contents.keep_undescribed:
         return build_trial_log(path, contents), contents.mixed_times
     if contents.in_order:
-        return _log_file(path, contents), []
+        return _log_file(path, contents)
     return read_unchecked(path)

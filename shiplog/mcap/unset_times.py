@@ -15,6 +15,21 @@ from .clock_repair import (
 )
 
 
+def are_set(first_ns: int, last_ns: int) -> bool:
+    """Whether a log with times within these bounds has none to replace, to shift or to drop.
+
+    Whether times are replaced or dropped depends on their share in the whole log and its median.
+    Where this is true, no part of the log has such times either.
+
+    Examples
+    --------
+    >>> are_set(0, 600 * 10**9), are_set(-30 * 10**9, 570 * 10**9)
+    (True, False)
+    """
+    start = 0 if last_ns <= MAX_DISTANCE_NS else 1  # in a log with dates, zero is an unset time
+    return first_ns >= start and last_ns - first_ns < MAX_DISTANCE_NS
+
+
 def replace_unset_times(
     columns: Mapping[int, MessageColumns],
 ) -> tuple[dict[int, MessageColumns], list[str]]:

@@ -243,6 +243,59 @@ def test_a_file_with_mcap_chunks_out_of_order_is_read_into_memory(
     assert np.all(np.diff(log["speed"].received_ns) > 0)
 
 
+def _unset(case: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return (600,) times of reception and measurement, of which some were not set."""
+    clock = np.arange(600) * 1_000_000_000
+    measured = START + clock
+    if case == "all before zero":
+        return clock + 1, clock - 30_000_000_000
+    if case == "few in all, many in one chunk":
+        measured[200:220] = 0
+    elif case == "many in all, few in each chunk":
+        measured[::25] = 0
+    elif case == "a clock of its own in one chunk":
+        measured[300:] -= 1024 * 7 * 86_400 * 1_000_000_000
+    return START + clock, measured
+
+
+@pytest.mark.parametrize("unfinished", [False, True])
+@pytest.mark.parametrize(
+    "case",
+    [
+        "all before zero",
+        "few in all, many in one chunk",
+        "many in all, few in each chunk",
+        "a clock of its own in one chunk",
+    ],
+)
+def test_whether_times_are_replaced_is_decided_once_for_the_whole_file(
+    path: Path, monkeypatch: pytest.MonkeyPatch, case: str, *, unfinished: bool
+) -> None:
+    received, measured = _unset(case)
+    with LogWriter(path) as writer:
+        for at in range(0, 600, 50):
+            rows = slice(at, at + 50)
+            writer.write(
+                Channel("speed", "log", "m/s", measured[rows], received[rows], np.ones(50))
+            )
+            writer.flush()
+    if unfinished:
+        path.write_bytes(path.read_bytes()[:-10])
+    monkeypatch.setattr(shiplog.mcap.stream, "FILE_CHUNK_SAMPLES", 50)
+    log, expected = open_log(path), read(path)
+    (speed,) = joined_chunks(log.chunks()).values()
+    np.testing.assert_array_equal(speed.measured_ns, expected["speed"].measured_ns)
+    np.testing.assert_array_equal(speed.received_ns, expected["speed"].received_ns)
+    assert log.warnings == expected.warnings
+    assert any(word in " ".join(log.warnings) for word in ("not set", "median"))
+
+
+def test_a_long_log_of_a_clock_that_begins_at_zero_is_read_by_chunks(path: Path) -> None:
+    at = np.arange(1000) * 1_000_000
+    write(TrialLog("t", (Channel("speed", "log", "m/s", at, at, np.ones(1000)),)), path)
+    assert_same_log(open_as_file(path), read(path))
+
+
 def test_messages_outside_of_mcap_chunks_are_read_into_memory(path: Path) -> None:
     write_by_mcap(path, *trial(), use_chunking=False)
     log = open_log(path)
