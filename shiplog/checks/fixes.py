@@ -34,9 +34,11 @@ class FixScreening:
         First and last instant of a fix that is used; (0, 0) without any.
     start_ns
         The first instant of the channel.
+    fields
+        Names of the components, such as ``("latitude", "longitude")``.
     impossible
-        Number of fixes by impossible value, such as ``{"latitude 91, longitude 181": 30}``, of the
-        first `MAX_IMPOSSIBLE_VALUES` different ones.
+        Number of fixes by impossible value, such as ``{(91.0, 181.0): 30}``, of the first
+        `MAX_IMPOSSIBLE_VALUES` different ones.
     impossible_count
         Number of fixes at all impossible values.
     first_impossible_secs
@@ -56,7 +58,8 @@ class FixScreening:
     usable: int
     usable_span_ns: tuple[int, int]
     start_ns: int
-    impossible: dict[str, int]
+    fields: tuple[str, ...]
+    impossible: dict[tuple[float, ...], int]
     impossible_count: int
     first_impossible_secs: float
     rejected_ns: TimeArray
@@ -92,9 +95,14 @@ class FixScreening:
         if not self.zero.all():
             yield self._unreachable_warning()
 
+    def in_words(self, position: tuple[float, ...]) -> str:
+        """Return a position with the names of its components."""
+        pairs = zip(self.fields, position, strict=False)
+        return ", ".join(f"{field} {value:.10g}" for field, value in pairs)
+
     def _impossible_warning(self) -> str:
         listed = sorted(self.impossible.items(), key=lambda item: -item[1])
-        values = [f"{count} at {value}" for value, count in listed[:MAX_LISTED]]
+        values = [f"{count} at {self.in_words(value)}" for value, count in listed[:MAX_LISTED]]
         others = self.impossible_count - sum(count for _, count in listed[:MAX_LISTED])
         return (
             f"{_fixes(self.impossible_count)} at an impossible position ({', '.join(values)}"
@@ -259,14 +267,6 @@ class FixScreen:
             if tuple(value) in self._impossible or len(self._impossible) < MAX_IMPOSSIBLE_VALUES:
                 self._impossible[tuple(value)] += count
 
-    def _impossible_by_text(self) -> dict[str, int]:
-        """Return the number of fixes by the text of their impossible value."""
-        by_text: Counter[str] = Counter()
-        for value, count in self._impossible.items():
-            named = zip(self._fields, value, strict=False)
-            by_text[", ".join(f"{field} {each:.10g}" for field, each in named)] += count
-        return dict(by_text)
-
     def result(self, max_speed: float) -> FixScreening:
         """Return which fixes are used.
 
@@ -281,7 +281,7 @@ class FixScreen:
         if not self._pieces:
             none = np.zeros(0)
             return FixScreening(
-                0, (0, 0), start_ns, self._impossible_by_text(), self._impossible_count,
+                0, (0, 0), start_ns, self._fields, dict(self._impossible), self._impossible_count,
                 first_impossible, np.zeros((0, 2), np.int64), none > 0, none.astype(np.int64),
                 none, reach,
             )  # fmt: skip
@@ -300,7 +300,8 @@ class FixScreen:
             usable=int(blocks.counts[used].sum()),
             usable_span_ns=(int(kept.min()), int(kept.max())) if len(kept) else (0, 0),
             start_ns=start_ns,
-            impossible=self._impossible_by_text(),
+            fields=self._fields,
+            impossible=dict(self._impossible),
             impossible_count=self._impossible_count,
             first_impossible_secs=first_impossible,
             rejected_ns=np.column_stack(

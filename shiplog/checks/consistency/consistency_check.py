@@ -26,6 +26,7 @@ __all__ = ["COMPARED_CHANNELS", "ConsistencyCheck", "consistency_findings"]
 MIN_COURSE_STD = np.radians(5.0)  # of the course, below which it is not compared with turns
 MIN_RUDDER_ERRORS = 3.0  # standard errors by which the rudder's effect must differ from zero
 MIN_LAG_SECS, LAG_ERRORS = 0.5, 6.0
+NO_FIX = "latitude", 91.0  # deg, which AIS prints
 MIN_IMPOSSIBLE_SHARE = 0.2  # of the samples, from which the unit is the likely cause
 
 
@@ -99,7 +100,8 @@ class ConsistencyCheck:
         ):
             findings += speed_findings(signals, velocity)
         findings += range_findings(signals)
-        if not any(finding.kind == "unit" and "heading" in finding.text for finding in turning):
+        wrong_units = {finding.channel for finding in turning if finding.kind == "unit"}
+        if not wrong_units & {"heading", "time"}:
             sense = -1 if explanations and "heading" in explanations[0] else 1
             findings += heading_zero_findings(signals, sense, velocity)
         findings += speed_lag_findings(signals, velocity, self._stats)
@@ -147,6 +149,7 @@ def _lag_findings(pair: TurningRatio | None, stats: LogStats) -> list[Finding]:
     return [
         Finding(
             "lag",
+            late.name,
             f"{late.topic}: lags {early.topic} by {abs(lag):.2f} ± {2 * error:.2f} s; likely a "
             "filter or a late time stamp in the recorder; correct its times by that delay",
         )
@@ -168,6 +171,7 @@ def _impossible_findings(stats: LogStats) -> list[Finding]:
     return [
         Finding(
             "unit",
+            channel.name,
             f"{channel.topic}: {_impossible(channel)[0] / channel.samples:.0%} of the samples are "
             f"impossible, {_impossible(channel)[1]}; likely "
             f"{causes[channel.name][0]}; change in the layout: [{channel.name}] "
@@ -189,9 +193,12 @@ def _impossible(channel: ChannelStats) -> tuple[int, str]:
     """
     if channel.fixes is None:
         return channel.impossible.count, f"up to {channel.impossible.extent:.4g} {channel.unit}"
-    values = {
-        value: count
-        for value, count in channel.fixes.impossible.items()
-        if "latitude 91" not in value
-    }
-    return sum(values.values()), f"such as {next(iter(values), '')}"
+    fixes = channel.fixes
+    without_fix, others = 0, []
+    for value, count in fixes.impossible.items():
+        if NO_FIX in zip(fixes.fields, value, strict=False):
+            without_fix += count
+        else:
+            others.append(value)
+    example = fixes.in_words(others[0]) if others else ""
+    return fixes.impossible_count - without_fix, f"such as {example}"

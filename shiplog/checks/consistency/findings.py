@@ -17,11 +17,14 @@ class Finding:
     ----------
     kind
         "unit", "sign", "zero", "bias" or "lag".
+    channel
+        The name of the channel that is likely wrong; "time" for the times of all.
     text
         One line with topic, figures, likely cause and remedy.
     """
 
     kind: str
+    channel: str
     text: str
 
 

@@ -52,6 +52,7 @@ def bias_findings(signals: CoarseSignals) -> Iterator[Finding]:
     bias_deg, error_deg = (x * conversion_factor("rad/s", "deg/s") for x in (bias, error))
     yield Finding(
         "bias",
+        "yaw_rate",
         f"{signals.topics['yaw_rate']}: bias of {bias_deg:+.4f} ± {2 * error_deg:.4f} deg/s "
         "against the heading; a bias acts like a yaw moment and distorts b1, b2, b3 and e: "
         "calibrate the gyro or subtract the bias",

@@ -55,6 +55,7 @@ def speed_findings(signals: CoarseSignals, velocity: GroundVelocity | None) -> I
     causes, remedy = _speed_causes(signals, ratio)
     yield Finding(
         "unit",
+        "speed",
         f"{signals.topics['speed']}: {water:.3g} m/s where the fixes move by {ground:.3g} m/s "
         f"(ratio {ratio:.3g}, quartiles {low:.3g} to {high:.3g}); likely "
         f"{causes}; change in the layout: {remedy}",
@@ -90,6 +91,7 @@ def speed_lag_findings(
     late, early = ("speed", "position") if lag > 0 else ("position", "speed")
     yield Finding(
         "lag",
+        late,
         f"{signals.topics[late]}: lags {signals.topics[early]} by {abs(lag):.1f} ± {2 * error:.1f}"
         " s; likely a filter or a late time stamp in the recorder; correct its times by that delay",
     )
@@ -128,6 +130,7 @@ def heading_zero_findings(
         cause = "counted from south, or a ship that goes astern with a positive speed"
     yield Finding(
         "zero",
+        "heading",
         f"{signals.topics['heading']}: the course of the fixes differs from it by {figure} deg "
         f"{basis}; likely {cause}; add {offset:.0f} deg to the heading",
     )
@@ -194,6 +197,7 @@ def _rudder_range_findings(signals: CoarseSignals) -> Iterator[Finding]:
     if largest > MAX_RUDDER:
         yield Finding(
             "unit",
+            "rudder",
             f"{topic}: up to {degrees:.0f} deg, beyond what a rudder reaches; likely per cent of "
             "its maximum or tenths of a degree read as deg, or deg read as rad; change in the "
             'layout: [rudder] unit = "deg"',
@@ -201,6 +205,7 @@ def _rudder_range_findings(signals: CoarseSignals) -> Iterator[Finding]:
     elif 0 < largest < RADIANS_READ_AS_DEGREES and signals.swing > np.radians(15.0):
         yield Finding(
             "unit",
+            "rudder",
             f"{topic}: never beyond {degrees:.2g} deg while the heading swings by "
             f"{np.degrees(signals.swing):.0f} deg; likely rad read as deg; change in the layout: "
             '[rudder] unit = "rad"',
@@ -224,6 +229,7 @@ def _advance_findings(signals: CoarseSignals) -> Iterator[Finding]:
     if reversed_share > 0.9 and one_direction:
         yield Finding(
             "sign",
+            "rpm",
             f"{topic}: {rpm:.3g} rpm while the speed is {speed:.3g} m/s in "
             f"{reversed_share:.0%} of the samples at steady speed; likely the sign of one is "
             "reversed; change in the layout: sign = -1 of [rpm] or of [speed]",
@@ -231,6 +237,7 @@ def _advance_findings(signals: CoarseSignals) -> Iterator[Finding]:
     if abs(speed) > 1.0 and MAX_ADVANCE < advance < 60 * MAX_ADVANCE:
         yield Finding(
             "unit",
+            "rpm",
             f"{topic}: {rpm:.3g} rpm at {speed:.3g} m/s is an advance of {advance:.0f} m "
             f"per revolution; likely rev/s read as rpm ({advance / 60:.2g} m), or rad/s; change in "
             'the layout: [rpm] unit = "rev/s"',
@@ -238,6 +245,7 @@ def _advance_findings(signals: CoarseSignals) -> Iterator[Finding]:
     elif abs(speed) > 3.0 and 0 < advance < MIN_ADVANCE:
         yield Finding(
             "unit",
+            "rpm",
             f"{topic}: {rpm:.4g} rpm at {speed:.3g} m/s is an advance of {advance:.2g} m "
             "per revolution; likely rpm read as rev/s; change in the layout: "
             '[rpm] unit = "rpm"',

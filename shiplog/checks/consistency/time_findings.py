@@ -16,6 +16,8 @@ TIME_UNITS = {
 MIN_SWING = np.radians(3.0)  # of the heading
 MIN_DISTANCE = 50.0  # m, of the fixes
 MIN_TIME_FACTOR = 500.0  # of the yaw rate, from which its units do not explain it
+RAD_PER_DEG_MIN_FACTORS = 3000.0, 4000.0  # about 3438 of deg/min read as rad/s, and 3600 of hours
+MIN_CORRELATION = 0.9  # of the turns by yaw rate and heading
 TRACK_LEGS = 40  # on which the distance is measured, so that the noise of the fixes is small in it
 FACTOR_TOLERANCE, DISTANCE_TOLERANCE = 0.25, 0.4  # of the logarithms of the factors
 
@@ -30,8 +32,10 @@ def time_findings(
     """Report a wrong unit of the times.
 
     A wrong unit of the times makes the integral of the yaw rate wrong by the same factor as the
-    integral of the speed, compared with the heading and with the fixes. Without fixes, only factors
-    that no units of the yaw rate explain are reported.
+    integral of the speed, compared with the heading and with the fixes. Nothing is reported where
+    the distances contradict the factor. Without fixes, only factors that no units of the yaw rate
+    explain are reported, and only where yaw rate and heading turn alike: the integral of a biased
+    yaw rate grows beyond all changes of the heading.
 
     Parameters
     ----------
@@ -49,24 +53,20 @@ def time_findings(
         return
     swing = float(np.ptp(heading[known]))
     factor = float(np.ptp(turned[known])) / swing
-    unit = _unit_of(factor)
-    distances = _distances(dt, speed, *track)
+    unit, distances = _unit_of(factor), _distances(dt, speed, *track)
     if unit is None:
         return
-    # deg/s and deg/min explain smaller factors as well
-    by_units = 1 / MIN_TIME_FACTOR < factor < MIN_TIME_FACTOR
-    by_units = by_units or 3000 < max(factor, 1 / factor) < 4000
     by_speed = ""
-    if distances is None:
-        if by_units:
-            return
-    else:
+    if distances is not None:
         logged, fixed = distances
-        if by_units and abs(log(logged / fixed / factor)) > DISTANCE_TOLERANCE:
+        if abs(log(logged / fixed / factor)) > DISTANCE_TOLERANCE:
             return
         by_speed = f", and the speed makes {logged:.3g} m where the fixes are {fixed:.3g} m apart"
+    elif _explained_by_rate_units(factor) or not _turn_alike(turned, heading):
+        return
     yield Finding(
         "unit",
+        "time",
         f"times: the integrated yaw rate is {factor:.3g} times the change of the heading{by_speed};"
         f" likely times in {unit}; change in the layout: unit of [time]",
     )
@@ -78,6 +78,23 @@ def _unit_of(factor: float) -> str | None:
         return None
     best = min(TIME_UNITS, key=lambda each: abs(log(factor / each)))
     return TIME_UNITS[best] if abs(log(factor / best)) < FACTOR_TOLERANCE else None
+
+
+def _explained_by_rate_units(factor: float) -> bool:
+    """Whether a wrong unit of the yaw rate, such as deg/s or deg/min, explains the factor."""
+    low, high = RAD_PER_DEG_MIN_FACTORS
+    larger = max(factor, 1 / factor)
+    return larger < MIN_TIME_FACTOR or low < larger < high
+
+
+def _turn_alike(turned: FloatArray, heading: FloatArray) -> bool:
+    """Whether the turns by yaw rate and heading on the legs are correlated."""
+    legs = np.linspace(0, len(heading) - 1, TRACK_LEGS + 1).astype(int)
+    turns = np.diff(np.stack((turned, heading))[:, legs])
+    turns = turns[:, np.isfinite(turns).all(axis=0)]
+    if turns.shape[1] < TRACK_LEGS / 2 or np.any(np.std(turns, axis=1) == 0):
+        return False
+    return float(np.corrcoef(turns)[0, 1]) > MIN_CORRELATION
 
 
 def _distances(

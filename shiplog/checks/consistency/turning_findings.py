@@ -68,7 +68,7 @@ def sense_findings(explanations: list[tuple[str, ...]], topics: Mapping[str, str
     alternative = f", or else with {alternative} reversed instead" if others else ""
     corrected = "this corrected" if len(first) == 1 else f"{' and '.join(first)} corrected"
     return [
-        Finding("sign", f"{topics[name]}: {texts[name]} (with {corrected}, all channels "
+        Finding("sign", name, f"{topics[name]}: {texts[name]} (with {corrected}, all channels "
                 f"agree{alternative}); change in the layout: {remedies[name]}")
         for name in first
     ]  # fmt: skip
@@ -105,6 +105,7 @@ def unit_findings(
         )
         yield Finding(
             "unit",
+            likely,
             f"{topics[likely]}: the integrated yaw rate is {factor:.3g} "
             f"(± {2 * error:.2g}) times the change of the heading; likely {cause}{alternative}; "
             f"change in the layout: {remedy}",
@@ -119,6 +120,7 @@ def unit_findings(
             remedy = f'[{name}] unit = "{matches[0][0]}"' if matches else "its unit"
             yield Finding(
                 "unit",
+                name,
                 f"{topics[name]}: turns {abs(1 / ratio.ratio):.3g} times as much as the course of "
                 f"the fixes; likely {in_words(matches) or 'a wrong unit'}; change in the layout: "
                 f"{remedy}",

@@ -157,7 +157,7 @@ def test_impossible_positions_that_all_differ_are_counted_in_bounded_memory(
     result, unused = screened(channel, cuts)
     assert unused == list(range(100, 2200))
     assert len(result.impossible) == MAX_IMPOSSIBLE_VALUES
-    assert result.impossible["latitude 2099, longitude 20"] == 101
+    assert result.impossible[2099.0, 20.0] == 101
     (warning,) = result.warnings()
     assert warning.startswith("2100 fixes at an impossible position (101 at latitude 2099")
     assert ", 1997 at others)" in warning

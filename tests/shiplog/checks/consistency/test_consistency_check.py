@@ -101,6 +101,24 @@ def test_a_heading_from_east_is_found(trial: TrialLog) -> None:
     assert "from east" in findings[0].text
 
 
+def test_a_wrong_unit_of_the_yaw_rate_does_not_hide_a_heading_from_east(trial: TrialLog) -> None:
+    log = changed(trial, yaw_rate=scaled(60.0), heading=lambda values: values - np.pi / 2)
+    findings = {(f.kind, f.channel) for f in contradictions(log)}
+    assert findings == {("unit", "yaw_rate"), ("zero", "heading")}
+
+
+def test_fixes_without_a_position_are_no_wrong_unit(trial: TrialLog) -> None:
+    def interrupted(latitude: float) -> list[Finding]:
+        log = changed(geographic(trial), position=lambda x: np.where(
+            np.arange(len(x))[:, None] % 3 == 0, (latitude, 181.0, 0.0), x))  # fmt: skip
+        return contradictions(log)
+
+    assert interrupted(91.0) == []
+    (finding,) = interrupted(91.5)
+    assert (finding.kind, finding.channel) == ("unit", "position")
+    assert "latitude 91.5, longitude 181" in finding.text
+
+
 def test_a_mathematical_heading_is_found(trial: TrialLog) -> None:
     findings = contradictions(changed(trial, heading=lambda values: np.pi / 2 - values))
     assert any(f.kind == "sign" and f.text.startswith("/heading") for f in findings), findings
@@ -141,7 +159,7 @@ def test_no_advice_about_the_rudder_from_going_astern(trial: TrialLog) -> None:
 
 
 def test_strict_refuses_signs_and_units_only(trial: TrialLog) -> None:
-    refuse_contradictions([Finding("bias", "b"), Finding("lag", "l"), Finding("zero", "z")])
+    refuse_contradictions([Finding(kind, "heading", kind) for kind in ("bias", "lag", "zero")])
     with pytest.raises(LogError, match="sign is reversed"):
         refuse_contradictions(consistency_findings(changed(trial, rudder=scaled(-1.0))))
 

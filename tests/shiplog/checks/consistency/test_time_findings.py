@@ -43,3 +43,23 @@ def test_a_yaw_rate_in_deg_min_is_not_taken_for_wrong_times() -> None:
 def test_without_fixes_a_factor_that_no_unit_of_the_yaw_rate_explains_is_reported() -> None:
     (text,) = texts(1e3, NO_TRACK, SPEED)
     assert "ms read as s" in text
+
+
+DAY = np.arange(0.0, 86400.0, 2.0)
+BIASED = np.radians(0.05) * DAY
+
+
+@pytest.mark.parametrize("great_circle_deg", [0.0, 4.0])
+def test_a_biased_yaw_rate_on_a_straight_passage_is_not_taken_for_wrong_times(
+    great_circle_deg: float,
+) -> None:
+    rng = np.random.default_rng(0)
+    heading = np.radians(4.0) * rng.uniform(-0.5, 0.5, len(DAY))
+    heading += np.radians(great_circle_deg) * DAY / DAY[-1]
+    speed, unknown = np.full_like(DAY, 9.0), np.full_like(DAY, np.nan)
+    for track in ((9.0 * DAY, 0 * DAY), (unknown, unknown)):
+        assert list(time_findings(2.0, BIASED, heading, speed, track)) == []
+
+
+def test_fixes_that_contradict_wrong_times_are_not_ignored() -> None:
+    assert list(time_findings(DT, 1e3 * HEADING, HEADING, SPEED, TRACK)) == []
