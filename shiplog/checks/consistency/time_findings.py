@@ -34,8 +34,8 @@ def time_findings(
     A wrong unit of the times makes the integral of the yaw rate wrong by the same factor as the
     integral of the speed, compared with the heading and with the fixes. Nothing is reported where
     the distances contradict the factor. Without fixes, only factors that no units of the yaw rate
-    explain are reported, and only where yaw rate and heading turn alike: the integral of a biased
-    yaw rate grows beyond all changes of the heading.
+    explain are reported, those above 1 only where yaw rate and heading turn alike: the integral of
+    a biased yaw rate grows beyond all changes of the heading.
 
     Parameters
     ----------
@@ -62,8 +62,8 @@ def time_findings(
         if abs(log(logged / fixed / factor)) > DISTANCE_TOLERANCE:
             return
         by_speed = f", and the speed makes {logged:.3g} m where the fixes are {fixed:.3g} m apart"
-    elif _explained_by_rate_units(factor) or not _turn_alike(turned, heading):
-        return
+    elif _explained_by_rate_units(factor) or (factor > 1 and not _turn_alike(turned, heading)):
+        return  # a bias makes the integral of the yaw rate too large, never too small
     yield Finding(
         "unit",
         "time",
