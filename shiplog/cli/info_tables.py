@@ -32,19 +32,20 @@ def info_tables(info: LogInfo) -> list[TextTable]:
 
 
 def info_overview(infos: Sequence[LogInfo]) -> TextTable:
-    """Return a table of several logs, one row each."""
+    """Return a table of several logs, one row each; what is unusual stands below it."""
     rows = []
     for info in infos:
         start = (info.start_utc or "no samples").replace("T", " ").rstrip("Z")
         samples = sum(channel.samples for channel in info.channels)
-        foreign = str(len(info.foreign)) if info.foreign else ""
-        duration = f"{info.duration_secs:.1f}"
-        counts = (str(len(info.channels)), str(samples), foreign)
-        rows.append((info.name, start, duration, *counts, info.state))
-    columns = (
-        "log", "start (UTC)", "duration\n[s]", "channels", "samples", "foreign\ntopics", "state"
-    )  # fmt: skip
-    return TextTable(f"{len(infos)} logs", columns, tuple(rows))
+        rows.append((info.name, start, f"{info.duration_secs:.0f}", str(samples)))
+    columns = ("log", "start (UTC)", "duration\n[s]", "samples")
+    remarks = [f"{info.name}: {info.state}." for info in infos if info.state != "finished"]
+    remarks += [
+        f"{info.name}: {len(info.foreign)} topics of other programs."
+        for info in infos
+        if info.foreign
+    ]
+    return TextTable(f"{len(infos)} logs", columns, tuple(rows), tuple(remarks))
 
 
 def _channel_rows(channel: ChannelInfo) -> list[tuple[str, ...]]:
