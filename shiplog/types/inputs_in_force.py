@@ -53,8 +53,7 @@ def inputs_in_force(
         for channel in chunk:
             kind = CATALOGUE.get(channel.name)
             if kind is not None and kind.commanded and not channel.fields:
-                values = channel.values  # NaN is not within the limits
-                valid = np.flatnonzero((values >= kind.lowest) & (values <= kind.highest))
+                valid = np.flatnonzero(np.isfinite(channel.values))
                 _add(around.setdefault(channel.key, _AroundStart()), channel.take(valid), start_ns)
     return {
         key: _at_start(each.before, each.following, start_ns)

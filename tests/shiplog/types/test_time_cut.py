@@ -157,7 +157,7 @@ def _inputs(log: TrialLog | LogFile) -> dict[str, list[tuple[int, float]]]:
 def on_change(
     request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> TrialLog | LogFile:
-    """Return a log whose inputs are written on change; one value is impossible."""
+    """Return a log whose inputs are written on change; one value is missing."""
 
     def channel(name: str, secs: list[int], values: list[float], unit: str) -> Channel:
         times = np.array(secs) * SEC
@@ -168,7 +168,7 @@ def on_change(
         "run.mcap",
         (
             channel("speed", every, [1.0] * 301, "m/s"),
-            channel("rudder", [0, 70, 100, 150, 250], [0.1, 0.2, np.nan, -0.2, 99.0], "rad"),
+            channel("rudder", [0, 70, 100, 150, 250], [0.1, 0.2, np.nan, -0.2, -0.1], "rad"),
             channel("rpm", [0, 300], [80.0, 80.0], "rpm"),
             channel("rudder_order", [0, 90], [0.0, 0.1], "rad"),
         ),
@@ -184,12 +184,12 @@ def on_change(
 @pytest.mark.parametrize(
     ("start", "end", "rudder", "rpm"),
     [
-        (120, None, [(120, 0.2), (150, -0.2), (250, 99.0)], [(120, 80.0), (300, 80.0)]),
+        (120, None, [(120, 0.2), (150, -0.2), (250, -0.1)], [(120, 80.0), (300, 80.0)]),
         (120, 140, [(120, 0.2)], [(120, 80.0)]),
         (149, 200, [(150, -0.2)], [(149, 80.0)]),
         (148, 200, [(148, 0.2), (150, -0.2)], [(148, 80.0)]),
         (70, 80, [(70, 0.2)], [(70, 80.0)]),
-        (270, None, [(270, -0.2)], [(270, 80.0), (300, 80.0)]),
+        (270, None, [(270, -0.1)], [(270, 80.0), (300, 80.0)]),
         (None, 60, [(0, 0.1)], [(0, 80.0)]),
     ],
 )
