@@ -54,8 +54,8 @@ def _large_residuals(fit: OutputError) -> Iterator[str]:
             if rms > MAX_RESIDUAL_SHARE * size and rms**2 > white:
                 yield (
                     f"{segment.name}: the residual of the {output.replace('_', ' ')} is "
-                    f"{100 * rms / size:.0f} % of its standard deviation; check the sign of the "
-                    "rudder, the units, that it is the same ship, and the choice of model"
+                    f"{100 * rms / size:.0f} % of its standard deviation; check that the ship goes "
+                    "ahead throughout, that it is the same ship, the units, and the choice of model"
                 )
 
 

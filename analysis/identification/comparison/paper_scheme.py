@@ -141,8 +141,10 @@ def regression_rows(
     delta, n = signals["rudder"], signals["rpm"]
     ks = rudder_effects(prior, v, n)
     rate = np.diff(delta, append=delta[-1]) / signals.dt_secs
-    yield np.column_stack((w_dot, w, w * abs(w), w**3, ks * delta, ks * rate, w_ddot))
-    yield np.column_stack((w * w, v * v, n, v_dot))
+    with np.errstate(over="ignore", invalid="ignore"):  # of a filter that diverged
+        yaw = np.column_stack((w_dot, w, w * abs(w), w**3, ks * delta, ks * rate, w_ddot))
+        surge = np.column_stack((w * w, v * v, n, v_dot))
+    yield from (yaw, surge)
 
 
 def solve_window(rows: FloatArray) -> FloatArray:
