@@ -205,6 +205,11 @@ def pause_warnings(channels: Collection[MessageColumns]) -> list[str]:
     ]
 
 
+def max_faulty_times(count: int) -> float:
+    """Return how many of a channel's times may be faulty one by one; more are another clock."""
+    return max(MAX_DROPPED_SHARE * count, MAX_DROPPED_SAMPLES)
+
+
 def _possible_rows(
     channel: MessageColumns, median: int
 ) -> tuple[NDArray[np.bool_] | None, list[str]]:
@@ -217,7 +222,6 @@ def _possible_rows(
     limits = median - MAX_DISTANCE_NS, median + MAX_DISTANCE_NS
     outside = (received < 0) | (measured < 0)
     far = ~outside & (_beyond(received, limits) | _beyond(measured, limits))
-    few = max(MAX_DROPPED_SHARE * len(received), MAX_DROPPED_SAMPLES)
     warnings = []
     if outside.any():
         warnings.append(
@@ -225,7 +229,7 @@ def _possible_rows(
             "or after 2262 and were dropped; the clock had rolled over or was not set: check the "
             "program that wrote the file"
         )
-    if 0 < far.sum() <= few:
+    if 0 < far.sum() <= max_faulty_times(len(received)):
         times = np.where(_beyond(received, limits), received, measured)[far]
         warnings.append(
             f"{channel.topic}: {far.sum()} of {len(far)} samples have a time more than a year from "

@@ -7,12 +7,7 @@ import numpy as np
 
 from shiplog.types import TimeArray
 
-from .clock_repair import (
-    MAX_DISTANCE_NS,
-    MAX_DROPPED_SAMPLES,
-    MAX_DROPPED_SHARE,
-    MessageColumns,
-)
+from .clock_repair import MAX_DISTANCE_NS, MessageColumns, max_faulty_times
 
 
 def are_set(first_ns: int, last_ns: int) -> bool:
@@ -87,7 +82,7 @@ def _shifted_to_zero(
     """Shift a log whose times are not dates, and many below zero, to begin at zero."""
     filled = [c for c in columns.values() if len(c.received_ns)]
     times = [t for c in filled for t in (c.received_ns, c.measured_ns)]
-    if not any(int((t < 0).sum()) > _few(t) for t in times):
+    if not any(int((t < 0).sum()) > max_faulty_times(len(t)) for t in times):
         return dict(columns), []
     start = min(int(t[t > -MAX_DISTANCE_NS].min(initial=0)) for t in times)
     warning = (
@@ -109,8 +104,4 @@ def _shift(times: TimeArray, start: int) -> TimeArray:
 
 
 def _are_many_unset(times: TimeArray) -> bool:
-    return int((times <= 0).sum()) > _few(times)
-
-
-def _few(times: TimeArray) -> float:
-    return max(MAX_DROPPED_SHARE * len(times), MAX_DROPPED_SAMPLES)
+    return int((times <= 0).sum()) > max_faulty_times(len(times))
