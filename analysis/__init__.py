@@ -27,16 +27,17 @@ if TYPE_CHECKING:
     from analysis.identification.identified_ship import IdentifiedShip
     from analysis.identification.identify import identify
     from analysis.replay.plan import Plan, plan_replay
-    from analysis.replay.replay import Analysis, Findings, Replay, ReplayChunk, analyse
+    from analysis.replay.replay import Replay, analyse
+    from analysis.replay.replay_results import Analysis, Findings, ReplayChunk
 
 _MODULES = {
-    "Analysis": "replay.replay",
+    "Analysis": "replay.replay_results",
     "Comparison": "check.compare",
-    "Findings": "replay.replay",
+    "Findings": "replay.replay_results",
     "IdentifiedShip": "identification.identified_ship",
     "Plan": "replay.plan",
     "Replay": "replay.replay",
-    "ReplayChunk": "replay.replay",
+    "ReplayChunk": "replay.replay_results",
     "analyse": "replay.replay",
     "compare": "check.compare",
     "identify": "identification.identify",

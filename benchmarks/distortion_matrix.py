@@ -17,7 +17,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from analysis.filters.base import OUTPUT_STATES
-from analysis.replay.replay import Analysis, analyse
+from analysis.replay.replay import analyse
+from analysis.replay.replay_results import Analysis
 from recorders.simulated.sensors import DEG, suite
 from recorders.simulated.simulate import START_NS, SimulatedTrial, simulate
 from shiplog import Channel, LogWriter, ShiplogError, TrialLog, Vessel, load_vessel, open_log

@@ -22,7 +22,8 @@ from analysis.design.shaping import wave_filter
 from analysis.filters.base import STATES
 from analysis.filters.noise_model import Wave
 from analysis.replay.plan import Plan, plan_replay
-from analysis.replay.replay import Findings, Replay, ReplayChunk
+from analysis.replay.replay import Replay
+from analysis.replay.replay_results import Findings, ReplayChunk
 from analysis.signals.concat import concatenate
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate

@@ -9,7 +9,8 @@ import pytest
 from places import RECORDINGS, SAMPLE_DATA
 from trial_logs import as_log
 
-from analysis.replay.replay import Analysis, analyse
+from analysis.replay.replay import analyse
+from analysis.replay.replay_results import Analysis
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
 from shiplog import TrialLog, Vessel, load_vessel

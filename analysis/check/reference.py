@@ -10,7 +10,7 @@ import numpy as np
 from analysis.filters.base import STATES
 from analysis.regression.coefficients import CoefficientFit
 from analysis.regression.sliding import CoefficientHistory
-from analysis.replay.replay import Analysis
+from analysis.replay.replay_results import Analysis
 from shiplog import Channel, TrialLog
 from shiplog.ships.paper import COEFFICIENT_UNITS, PAPER_OUTPUTS
 from shiplog.types import FloatArray, TimeArray

@@ -11,7 +11,7 @@ from analysis.disturbance.observer import DisturbanceSummary
 from analysis.filters.noise_model import Wave
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit
-from analysis.replay.replay import Findings
+from analysis.replay.replay_results import Findings
 from shiplog import __version__
 from shiplog.checks.channel_stats import ChannelStats
 from shiplog.ships.paper import COEFFICIENT_UNITS

@@ -5,7 +5,7 @@ from math import degrees, isfinite, pi
 
 import numpy as np
 
-from analysis.replay.replay import Findings
+from analysis.replay.replay_results import Findings
 from analysis.replay.residuals import ResidualSummary
 from shiplog.text_table import TextTable
 from shiplog.units import CATALOGUE, conversion_factor

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import Coefficient
-from analysis.replay.replay import Findings
+from analysis.replay.replay_results import Findings
 from analysis.report.display import BAND_STDS, DISTURBANCES
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
 from shiplog.types import FloatArray

@@ -11,7 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from analysis.replay.plan import Plan
-from analysis.replay.replay import Analysis, Findings, ReplayChunk
+from analysis.replay.replay_results import Analysis, Findings, ReplayChunk
 
 from .panels import Panel
 from .replay_panels import equation_panels, history_panels

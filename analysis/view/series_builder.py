@@ -3,7 +3,7 @@
 import numpy as np
 
 from analysis.filters.base import OUTPUT_STATES
-from analysis.replay.replay import ReplayChunk
+from analysis.replay.replay_results import ReplayChunk
 from analysis.report.display import BAND_STDS, DISTURBANCES
 from analysis.signals.signal_stats import SignalStats
 from shiplog.resampling import Clock

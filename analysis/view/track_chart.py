@@ -9,7 +9,7 @@ from math import floor, log10
 
 import numpy as np
 
-from analysis.replay.replay import Findings
+from analysis.replay.replay_results import Findings
 from shiplog.types import FloatArray
 
 from .series import Series

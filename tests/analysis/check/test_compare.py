@@ -15,7 +15,8 @@ from analysis.check.compare import (
     update_reference,
 )
 from analysis.check.reference import make_reference
-from analysis.replay.replay import Analysis, analyse
+from analysis.replay.replay import analyse
+from analysis.replay.replay_results import Analysis
 from recorders.record import record
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import ShiplogError, TrialLog, Vessel, read, write

@@ -18,7 +18,8 @@ from analysis.regression.weak_form import (
     weak_form,
     with_constant,
 )
-from analysis.replay.replay import Analysis, analyse
+from analysis.replay.replay import analyse
+from analysis.replay.replay_results import Analysis
 from analysis.report.replay_json import replay_json
 from analysis.report.replay_tables import replay_markdown, replay_tables
 from analysis.view.replay_panels import history_panels

@@ -13,7 +13,8 @@ from trial_logs import InChunks, as_log
 from analysis.regression.weak_form import weak_form
 from analysis.replay.passes import REQUIRED_CHANNELS
 from analysis.replay.plan import FITTED_MODEL, Plan, plan_replay
-from analysis.replay.replay import PROGRESS_STEPS, Analysis, Replay, analyse
+from analysis.replay.replay import PROGRESS_STEPS, Replay, analyse
+from analysis.replay.replay_results import Analysis
 from analysis.report.replay_tables import replay_markdown
 from analysis.signals.concat import concatenate
 from recorders.simulated.sensors import suite

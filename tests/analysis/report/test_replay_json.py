@@ -4,7 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.replay.replay import Analysis, analyse
+from analysis.replay.replay import analyse
+from analysis.replay.replay_results import Analysis
 from analysis.report.replay_json import replay_json
 from shiplog import TrialLog
 

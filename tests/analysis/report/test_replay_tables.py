@@ -2,7 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.replay.replay import Analysis, analyse
+from analysis.replay.replay import analyse
+from analysis.replay.replay_results import Analysis
 from analysis.report.replay_tables import replay_markdown, replay_tables
 from shiplog import TrialLog
 

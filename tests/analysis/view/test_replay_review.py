@@ -16,7 +16,8 @@ import shiplog
 from analysis.disturbance.observer import Disturbance
 from analysis.filters.base import Estimates
 from analysis.regression.sliding import CoefficientHistory
-from analysis.replay.replay import Analysis, ReplayChunk, analyse
+from analysis.replay.replay import analyse
+from analysis.replay.replay_results import Analysis, ReplayChunk
 from analysis.replay.track import EMPTY_TRACK
 from analysis.view.decimation import Decimator
 from analysis.view.panels import limits
