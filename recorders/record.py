@@ -8,6 +8,7 @@ from pathlib import Path
 from shiplog.errors import ShiplogError
 from shiplog.files import is_device, write_error
 from shiplog.mcap.writer import LogWriter
+from shiplog.types import Channel
 
 from .source import Source
 
@@ -73,9 +74,10 @@ def record(
     try:
         with writer:
             for chunk in source.chunks():
-                writer.write(*chunk)
+                channels = [item for item in chunk if isinstance(item, Channel)]
+                writer.write(*channels)
                 writer.flush()
-                topics.update(channel.topic for channel in chunk)
+                topics.update(channel.topic for channel in channels)
                 on_chunk(writer.samples)
     except KeyboardInterrupt:
         interrupted = True

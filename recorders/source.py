@@ -6,6 +6,10 @@ from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 from shiplog import Channel
+from shiplog.types import Event, RawPackets
+
+Recordable = Channel | RawPackets | Event
+"""What a source yields and a log holds: samples, raw packets, and events."""
 
 
 class Source(Protocol):
@@ -16,7 +20,10 @@ class Source(Protocol):
 
     @property
     def metadata(self) -> Mapping[str, str]:
-        """Where the samples come from, as texts by key, to be kept in the log."""
+        """Where the samples come from, as texts by key, to be kept in the log.
+
+        Read when the recording begins and again when it ends, so that counts can be part of it.
+        """
         ...
 
     @property
@@ -24,7 +31,7 @@ class Source(Protocol):
         """The text of the vessel file to keep in the log; None where the source has none."""
         ...
 
-    def chunks(self) -> Iterator[tuple[Channel, ...]]:
+    def chunks(self) -> Iterator[tuple[Recordable, ...]]:
         """Yield what was received, chunk by chunk, in the order of reception.
 
         Each chunk is written to the file before the next one is asked for. A crash of the process
@@ -32,9 +39,9 @@ class Source(Protocol):
 
         Yields
         ------
-        tuple of Channel
+        tuple
             Samples of one or more channels in SI units, received later than those of the chunk
-            before.
+            before; and, where the source has them, raw packets and events.
         """
         ...
 

@@ -1,0 +1,29 @@
+"""Packets: what a transport receives, with the time of reception."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+NO_TIME = -1  # `received_ns` of a packet whose time is not known (a file without stamps)
+
+
+class Packet(NamedTuple):
+    """A line without its end, a datagram, or a frame.
+
+    Attributes
+    ----------
+    data
+        The bytes.
+    received_ns
+        The time of reception, ns since 1970-01-01 UTC, or `NO_TIME`.
+    origin
+        The address of the sender, where there are several; else empty.
+    """
+
+    data: bytes
+    received_ns: int
+    origin: str = ""
+
+
+Batches = Iterator[list[Packet]]
+"""Batches of packets in the order of reception. A live transport yields an empty batch when nothing
+was received for a while, so that what follows can act on time; a file ends the iteration."""

@@ -1,0 +1,69 @@
+"""Source of samples made of one stream: batches of packets, decoded, and kept raw beside it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from recorders.source import Recordable
+from shiplog.types import RawPackets
+
+from .decoder import Decoder
+from .packets import Batches, Packet
+from .sample_buffer import SampleBuffer
+
+
+@dataclass
+class StreamSource:
+    """A stream of packets as a `recorders.source.Source`.
+
+    Attributes
+    ----------
+    name
+        The name of the stream, as its raw topic has it.
+    format
+        The format of the packets, such as ``nmea0183``.
+    batches
+        The packets with their times of reception.
+    decoder
+        Decodes the packets.
+    keep_raw
+        Whether to record the packets beside the samples.
+    origin
+        Where the packets come from, for the metadata: a file name or an address.
+    vessel_toml
+        The text of the vessel file to keep in the log, or None.
+    """
+
+    name: str
+    format: str
+    batches: Batches
+    decoder: Decoder
+    keep_raw: bool = False
+    origin: str = ""
+    vessel_toml: str | None = None
+    _samples: SampleBuffer = field(default_factory=SampleBuffer, init=False, repr=False)
+
+    @property
+    def metadata(self) -> Mapping[str, str]:
+        """The origin and format of the stream, and the packets rejected so far by reason."""
+        rejected = {
+            f"rejected.{reason}": str(count)
+            for reason, count in self.decoder.counts.rejected.items()
+        }
+        return {"source": self.format, "origin": self.origin} | rejected
+
+    def chunks(self) -> Iterator[tuple[Recordable, ...]]:
+        """Yield the samples, events and raw packets of each batch."""
+        for batch in self.batches:
+            self.decoder.decode(batch, self._samples)
+            raw = [self._raw(batch)] if self.keep_raw and batch else []
+            if items := (*self._samples.take(), *raw):
+                yield items
+        self.decoder.finish(self._samples)
+        if items := self._samples.take():
+            yield items
+
+    def _raw(self, batch: Sequence[Packet]) -> RawPackets:
+        times = np.array([packet.received_ns for packet in batch], np.int64)
+        return RawPackets(self.name, self.format, times, tuple(p.data for p in batch))

@@ -1,0 +1,60 @@
+"""Tests of recorders.streams.stream_source, with a decoder of numbers."""
+
+from collections.abc import Iterator, Sequence
+
+from recorders.streams.counts import StreamCounts
+from recorders.streams.packets import Packet
+from recorders.streams.sample_buffer import SampleBuffer
+from recorders.streams.stream_source import StreamSource
+from shiplog.types import Channel, RawPackets
+
+
+class _Numbers:
+    """Decodes packets that are a number as a heading, and adds a last one at the end."""
+
+    def __init__(self) -> None:
+        self.counts = StreamCounts()
+
+    def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
+        for packet in batch:
+            try:
+                samples.add("heading", "HE", float(packet.data), packet.received_ns)
+            except ValueError:
+                self.counts.reject("not a number")
+
+    def finish(self, samples: SampleBuffer) -> None:
+        samples.add("heading", "HE", 9.0, 9)
+
+
+def _source(*, keep_raw: bool = False) -> StreamSource:
+    def batches() -> Iterator[list[Packet]]:
+        yield [Packet(b"1.5", 1), Packet(b"x", 2)]
+        yield []
+        yield [Packet(b"2.5", 3)]
+
+    return StreamSource("gyro", "numbers", batches(), _Numbers(), keep_raw, "numbers.txt")
+
+
+def test_each_batch_with_content_is_a_chunk_and_the_end_is_flushed() -> None:
+    chunks = list(_source().chunks())
+    values = [c.values.tolist() for chunk in chunks for c in chunk if isinstance(c, Channel)]
+    assert values == [[1.5], [2.5], [9.0]]
+
+
+def test_raw_packets_are_kept_on_request_rejected_ones_included() -> None:
+    raw = [
+        p for chunk in _source(keep_raw=True).chunks() for p in chunk if isinstance(p, RawPackets)
+    ]
+    assert [p.data for p in raw] == [(b"1.5", b"x"), (b"2.5",)]
+    assert raw[0].received_ns.tolist() == [1, 2]
+    assert raw[0].topic == "/raw/gyro"
+
+
+def test_metadata_at_the_end_count_the_rejected_packets() -> None:
+    source = _source()
+    list(source.chunks())
+    assert source.metadata == {
+        "source": "numbers",
+        "origin": "numbers.txt",
+        "rejected.not a number": "1",
+    }
