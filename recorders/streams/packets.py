@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 NO_TIME = -1  # `received_ns` of a packet whose time is not known (a file without stamps)
+MAX_PACKET_BYTES = 4096  # a longer line is cut there, and rejected by its decoder
 
 
 class Packet(NamedTuple):
@@ -12,7 +13,7 @@ class Packet(NamedTuple):
     Attributes
     ----------
     data
-        The bytes.
+        The bytes, at most `MAX_PACKET_BYTES` of a line; a line of that length was cut.
     received_ns
         The time of reception, ns since 1970-01-01 UTC, or `NO_TIME`.
     origin

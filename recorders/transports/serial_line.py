@@ -1,0 +1,60 @@
+"""Lines over a serial port, by pyserial."""
+
+from typing import TYPE_CHECKING
+
+from recorders.streams.line_splitter import LineSplitter
+from recorders.streams.packets import Packet
+from recorders.streams.reception_clock import ReceptionClock
+
+if TYPE_CHECKING:
+    import serial
+
+DEFAULT_BAUD = 4800  # of NMEA 0183; 38400 at high speed
+
+
+class SerialTransport:
+    """A serial port with 8 data bits, no parity, and 1 stop bit.
+
+    Parameters
+    ----------
+    address
+        The address as the user wrote it.
+    device
+        The port, such as ``/dev/ttyUSB0``.
+    baud
+        The rate, bit/s.
+    clock
+        The clock of reception.
+    """
+
+    def __init__(self, address: str, device: str, baud: int, clock: ReceptionClock) -> None:
+        self.address = address
+        self._device, self._baud = device, baud
+        self._clock = clock
+        self._port: serial.Serial | None = None
+        self._splitter = LineSplitter()
+
+    def open(self) -> None:
+        """Open the port, for this process alone; the first line, which may be cut, is forgotten."""
+        import serial  # noqa: PLC0415 - only where a serial port is used
+
+        self._splitter = LineSplitter()
+        self._port = serial.Serial(self._device, self._baud, exclusive=True)
+
+    def receive(self, timeout_secs: float) -> list[Packet]:
+        """Return the lines that have arrived, stamped when their ends arrived."""
+        if self._port is None:
+            raise OSError("not open")
+        self._port.timeout = timeout_secs
+        data = self._port.read(1)
+        if not data:
+            return []
+        data += self._port.read(self._port.in_waiting)
+        now_ns = self._clock.now_ns()
+        return [Packet(line, now_ns) for line in self._splitter.lines(data)]
+
+    def close(self) -> None:
+        """Close the port."""
+        if self._port is not None:
+            self._port.close()
+            self._port = None

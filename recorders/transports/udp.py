@@ -1,0 +1,82 @@
+"""Datagrams over UDP: from one sender, a broadcast, or a multicast group (IEC 61162-450)."""
+
+import select
+import socket
+from ipaddress import IPv4Address
+
+from recorders.streams.packets import Packet
+from recorders.streams.reception_clock import ReceptionClock
+
+RECEIVE_BUFFER_BYTES = 8 << 20  # asked of the system, which may grant less
+MAX_AT_ONCE = 2048  # datagrams of one call, so that a flood cannot hold the loop
+MAX_DATAGRAM_BYTES = 65_535
+
+
+class UdpTransport:
+    """A socket that listens at one address, and at no other.
+
+    Parameters
+    ----------
+    address
+        The address as the user wrote it.
+    host, port
+        The local address to listen at, or a multicast group to join.
+    interface
+        The local address of the network interface on which a group is joined; by default the
+        system chooses it.
+    clock
+        The clock of reception.
+    """
+
+    def __init__(
+        self, address: str, host: str, port: int, interface: str, clock: ReceptionClock
+    ) -> None:
+        self.address = address
+        self._host, self._port, self._interface = host, port, interface
+        self._clock = clock
+        self._socket: socket.socket | None = None
+
+    def open(self) -> None:
+        """Listen; a group is joined on its interface only, and only its datagrams are received."""
+        listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+            if IPv4Address(socket.gethostbyname(self._host)).is_multicast:
+                listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                listener.bind((self._host, self._port))
+                self._join(listener)
+            else:
+                listener.bind((self._host, self._port))
+            listener.setblocking(False)
+        except BaseException:
+            listener.close()
+            raise
+        self._socket = listener
+
+    def receive(self, timeout_secs: float) -> list[Packet]:
+        """Return the datagrams that have arrived."""
+        if self._socket is None:
+            raise OSError("not open")
+        if not select.select([self._socket], [], [], timeout_secs)[0]:
+            return []
+        packets: list[Packet] = []
+        try:
+            while len(packets) < MAX_AT_ONCE:
+                data, sender = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
+                packets.append(Packet(data, self._clock.now_ns(), sender[0]))
+        except BlockingIOError:
+            pass
+        return packets
+
+    def close(self) -> None:
+        """Close the socket, which also leaves the group."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def _join(self, listener: socket.socket) -> None:
+        any_group = getattr(socket, "IP_MULTICAST_ALL", 49)  # Linux; 49 where Python lacks the name
+        listener.setsockopt(socket.IPPROTO_IP, any_group, 0)
+        interface = socket.inet_aton(self._interface) if self._interface else bytes(4)  # any one
+        group = socket.inet_aton(self._host) + interface
+        listener.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
