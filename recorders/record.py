@@ -1,7 +1,8 @@
 """The loop that writes a source of samples to a log, safe against crashes and Ctrl-C."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,12 +39,13 @@ def record(
     *,
     on_chunk: Callable[[int], None] = lambda _: None,
 ) -> Recording:
-    """Write everything that a source yields to a log.
+    """Write everything that a source yields to a log: samples, raw packets and events.
 
     While recording, the log grows beside its final name with ``.part`` appended, readable up to the
     last chunk even if the process is killed. Ctrl-C ends the recording and keeps the log. If the
     source fails, what was received until then stays in the ``.part`` file, complete, and the error
-    names it; an older file at `path` is left as it was.
+    names it; an older file at `path` is left as it was. However the recording ends, the metadata of
+    the source that have changed since its beginning are written then.
 
     Parameters
     ----------
@@ -72,17 +74,16 @@ def record(
     interrupted, topics = False, set[str]()
     writer = LogWriter(part, metadata=source.metadata, vessel_toml=source.vessel_toml)
     try:
-        with writer:
+        with writer, _metadata_at_end(source, writer):
             for chunk in source.chunks():
-                channels = [item for item in chunk if isinstance(item, Channel)]
-                writer.write(*channels)
+                writer.write(*chunk)
                 writer.flush()
-                topics.update(channel.topic for channel in channels)
+                topics.update(item.topic for item in chunk if isinstance(item, Channel))
                 on_chunk(writer.samples)
     except KeyboardInterrupt:
         interrupted = True
     except ShiplogError as error:
-        if writer.samples:
+        if writer.messages:
             message = f"{error}; the {writer.samples} samples until then are in {part}"
             raise ShiplogError(message) from error
         part.unlink(missing_ok=True)
@@ -90,3 +91,12 @@ def record(
     if part != final:
         part.replace(final)
     return Recording(writer.samples, len(topics), interrupted)
+
+
+@contextmanager
+def _metadata_at_end(source: Source, writer: LogWriter) -> Iterator[None]:
+    """Write the metadata that have changed, such as counts of rejected packets, at the end."""
+    try:
+        yield
+    finally:
+        writer.update_metadata(source.metadata)

@@ -1,4 +1,4 @@
-"""Encoding of samples to the data of MCAP chunks, by columns.
+"""Encoding of messages to the data of MCAP chunks, by columns.
 
 The counterpart of `shiplog.mcap.decode`. The messages of all channels, each a head and its payload,
 are interleaved in the order of reception in numpy arrays; no loop runs over messages of fixed size.
@@ -16,6 +16,7 @@ from shiplog.types import Channel, TimeArray, is_sorted
 
 from .records import INDEX_ENTRY, MESSAGE_HEAD, RECORD_HEAD
 from .schema import fill_message_rows, schema_for
+from .serialised import SerialisedMessages
 
 Bytes = NDArray[np.uint8]
 
@@ -23,22 +24,28 @@ MESSAGES_AT_ONCE = 1 << 16  # about some MCAP chunks, so that the CPU cache hold
 
 
 @dataclass(frozen=True, eq=False)
-class SampleBatch:
-    """Samples of one channel that are to be written.
+class MessageBatch:
+    """Messages of one channel of the file that are to be written.
 
     Attributes
     ----------
     channel_id
         The id of the channel in the file.
     first_sequence
-        The sequence number of the first sample within its channel.
-    samples
-        The samples.
+        The sequence number of the first message within its channel.
+    messages
+        Samples, or messages that are already serialised.
     """
 
     channel_id: int
     first_sequence: int
-    samples: Channel
+    messages: Channel | SerialisedMessages
+
+    def part(self, start: int, stop: int) -> "MessageBatch":
+        """Return the messages with the numbers `start` to `stop` - 1 of the batch."""
+        return MessageBatch(
+            self.channel_id, self.first_sequence + start, self.messages.part(start, stop)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +68,7 @@ class McapChunk:
     index: dict[int, NDArray[np.void]]
 
 
-def encode_mcap_chunks(batches: Sequence[SampleBatch], max_bytes: int) -> Iterator[McapChunk]:
+def encode_mcap_chunks(batches: Sequence[MessageBatch], max_bytes: int) -> Iterator[McapChunk]:
     """Encode batches as MCAP chunks of similar size, in the order of reception.
 
     Parameters
@@ -73,34 +80,32 @@ def encode_mcap_chunks(batches: Sequence[SampleBatch], max_bytes: int) -> Iterat
         The size that the data of an MCAP chunk exceeds by at most about one message.
     """
     for portion in _portions(batches):
-        yield from _encode_portion([batch for batch in portion if len(batch.samples)], max_bytes)
+        yield from _encode_portion([batch for batch in portion if len(batch.messages)], max_bytes)
 
 
-def _portions(batches: Sequence[SampleBatch]) -> Iterator[list[SampleBatch]]:
+def _portions(batches: Sequence[MessageBatch]) -> Iterator[list[MessageBatch]]:
     """Cut all batches at the same times of reception, into about `MESSAGES_AT_ONCE` messages."""
-    total = sum(len(batch.samples) for batch in batches)
-    longest = max(batches, key=lambda batch: len(batch.samples)).samples.received_ns
+    total = sum(len(batch.messages) for batch in batches)
+    longest = max(batches, key=lambda batch: len(batch.messages)).messages.received_ns
     step = max(1, MESSAGES_AT_ONCE * len(longest) // max(total, 1))
     times = longest[step::step]
-    if not all(is_sorted(batch.samples.received_ns) for batch in batches):
+    if not all(is_sorted(batch.messages.received_ns) for batch in batches):
         times = times[:0]
     cuts = [
-        [0, *np.searchsorted(b.samples.received_ns, times).tolist(), len(b.samples)]
+        [0, *np.searchsorted(b.messages.received_ns, times).tolist(), len(b.messages)]
         for b in batches
     ]
     for number in range(len(times) + 1):
         yield [
-            SampleBatch(batch.channel_id, batch.first_sequence + at[number],
-                        batch.samples.part(at[number], at[number + 1]))
-            for batch, at in zip(batches, cuts, strict=True)
-        ]  # fmt: skip
+            batch.part(at[number], at[number + 1]) for batch, at in zip(batches, cuts, strict=True)
+        ]
 
 
-def _encode_portion(batches: Sequence[SampleBatch], max_bytes: int) -> Iterator[McapChunk]:
+def _encode_portion(batches: Sequence[MessageBatch], max_bytes: int) -> Iterator[McapChunk]:
     if not batches:
         return
     messages = [_message_records(batch) for batch in batches]
-    received = np.concatenate([batch.samples.received_ns for batch in batches])
+    received = np.concatenate([batch.messages.received_ns for batch in batches])
     order = np.argsort(received, kind="stable")
     ends = np.cumsum(np.concatenate([m.sizes for m in messages])[order])
     starts = np.concatenate(([0], ends[:-1]))
@@ -109,7 +114,7 @@ def _encode_portion(batches: Sequence[SampleBatch], max_bytes: int) -> Iterator[
     data = np.empty(int(ends[-1]), np.uint8)
     index = {}
     for batch, batch_messages in zip(batches, messages, strict=True):
-        batch_offsets, offsets = np.split(offsets, [len(batch.samples)])
+        batch_offsets, offsets = np.split(offsets, [len(batch.messages)])
         _scatter(data, batch_offsets, batch_messages)
         index[batch.channel_id] = _index_entries(batch, batch_offsets)
     even_size = ceil(ends[-1] / ceil(ends[-1] / max_bytes))
@@ -122,10 +127,10 @@ def _encode_portion(batches: Sequence[SampleBatch], max_bytes: int) -> Iterator[
         yield McapChunk(data[start:end], first_ns, last_ns, present)
 
 
-def _index_entries(batch: SampleBatch, offsets: TimeArray) -> NDArray[np.void]:
+def _index_entries(batch: MessageBatch, offsets: TimeArray) -> NDArray[np.void]:
     """Return the index entries of a batch, in the order of their offsets."""
     entries = np.empty(len(offsets), INDEX_ENTRY)
-    entries["received"], entries["offset"] = batch.samples.received_ns, offsets
+    entries["received"], entries["offset"] = batch.messages.received_ns, offsets
     return entries if np.all(offsets[1:] > offsets[:-1]) else np.sort(entries, order="offset")
 
 
@@ -145,43 +150,48 @@ class _MessageRecords:
     sizes: TimeArray
 
 
-def _message_records(batch: SampleBatch) -> _MessageRecords:
-    samples, n = batch.samples, len(batch.samples)
-    fixed = schema_for(samples.fields).dtype
+def _message_records(batch: MessageBatch) -> _MessageRecords:
+    messages, n = batch.messages, len(batch.messages)
+    fixed = schema_for(messages.fields).dtype if isinstance(messages, Channel) else None
     rows = np.empty(n, MESSAGE_HEAD if fixed is None else MESSAGE_HEAD.descr + fixed.descr)
     rows["opcode"], rows["channel"] = Opcode.MESSAGE, batch.channel_id
     rows["sequence"] = np.arange(batch.first_sequence, batch.first_sequence + n)
-    rows["received"], rows["measured"] = samples.received_ns, samples.measured_ns
+    rows["received"], rows["measured"] = messages.received_ns, messages.measured_ns
+    if isinstance(messages, SerialisedMessages):
+        return _variable_width_records(rows, messages.messages)
     if fixed is None:
         from .messages import encode_messages  # noqa: PLC0415 - protobuf takes long to import
 
-        return _variable_width_records(rows, encode_messages(samples))
+        return _variable_width_records(rows, encode_messages(messages))
     rows["length"] = rows.dtype.itemsize - RECORD_HEAD.size
-    fill_message_rows(rows, samples)
+    fill_message_rows(rows, messages)
     return _MessageRecords(rows.view(np.uint8), np.full(n, rows.dtype.itemsize))
 
 
 def _variable_width_records(heads: NDArray[np.void], messages: Sequence[bytes]) -> _MessageRecords:
-    sizes = np.array([MESSAGE_HEAD.itemsize + len(data) for data in messages], np.int64)
+    sizes = np.fromiter(map(len, messages), np.int64, len(messages)) + heads.itemsize
     heads["length"] = sizes - RECORD_HEAD.size
-    data = b"".join(head.tobytes() + data for head, data in zip(heads, messages, strict=True))
+    head_bytes = heads.tobytes()
+    starts = range(0, len(head_bytes), heads.itemsize)
+    parts = [head_bytes[start : start + heads.itemsize] for start in starts]
+    data = b"".join([part for pair in zip(parts, messages, strict=True) for part in pair])
     return _MessageRecords(np.frombuffer(data, np.uint8), sizes)
 
 
 def _scatter(data: Bytes, offsets: TimeArray, messages: _MessageRecords) -> None:
-    """Copy each message to its offset, all messages of one size at once."""
+    """Copy each message to its offset, all at once where they have one size."""
     sizes = messages.sizes
     if np.all(sizes == sizes[0]):
         size = int(sizes[0])
         _every_window(data, size)[offsets] = messages.data.view(f"V{size}")
         return
-    starts = np.cumsum(sizes) - sizes
-    for size in np.unique(sizes).tolist():
-        alike = np.flatnonzero(sizes == size)
-        windows = _every_window(messages.data, size)
-        _every_window(data, size)[offsets[alike]] = windows[starts[alike]]
+    target, source = data.data, messages.data.data
+    start = 0
+    for at, size in zip(offsets.tolist(), sizes.tolist(), strict=True):
+        target[at : at + size] = source[start : start + size]
+        start += size
 
 
 def _every_window(data: Bytes, size: int) -> NDArray[np.void]:
-    """Return a view of the `size` bytes that begin at each byte, to gather or scatter them."""
+    """Return a view of the `size` bytes that begin at each byte, to scatter them."""
     return np.ndarray((len(data) - size + 1,), f"V{size}", data, 0, (1,))

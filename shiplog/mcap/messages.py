@@ -11,12 +11,14 @@ import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
 from google.protobuf.message import DecodeError, Message
 
-from shiplog.types import Channel, FloatArray
+from shiplog.types import Channel, Event, FloatArray
 from shiplog.units import GEOGRAPHIC
 
-from .schema import LOCATION_FIX, Schema, fill_message_rows, schema_for
+from .schema import EVENT, LOCATION_FIX, RAW, Schema, fill_message_rows, schema_for
 
-_DOUBLE = descriptor_pb2.FieldDescriptorProto.TYPE_DOUBLE
+_Field = descriptor_pb2.FieldDescriptorProto
+_DOUBLE = _Field.TYPE_DOUBLE
+_TIMESTAMP = ".google.protobuf.Timestamp"
 
 
 def encode_messages(channel: Channel) -> list[bytes]:
@@ -66,6 +68,21 @@ def decode_messages(schema: Schema, messages: list[bytes]) -> FloatArray:
     return values
 
 
+def encode_event(event: Event) -> bytes:
+    """Return an event as a serialised ``foxglove.Log``.
+
+    Examples
+    --------
+    >>> b"execute" in encode_event(Event(0, "execute"))
+    True
+    """
+    message = _message_type(EVENT)(
+        level=int(event.level), message=_encodable(event.text), name=_encodable(event.source)
+    )
+    message.timestamp.FromNanoseconds(event.time_ns)  # type: ignore[attr-defined]
+    return message.SerializeToString(deterministic=True)
+
+
 @cache
 def descriptor_set(schema: Schema) -> bytes:
     """Return the serialised ``FileDescriptorSet`` of a schema, as MCAP files carry it.
@@ -75,8 +92,7 @@ def descriptor_set(schema: Schema) -> bytes:
     >>> b"shiplog/Position.proto" in descriptor_set(schema_for(("north", "east")))
     True
     """
-    is_fix = schema.name == LOCATION_FIX
-    files = _location_fix_files() if is_fix else [_fixed_width_file(schema)]
+    files = _FILES.get(schema.name, lambda: [_fixed_width_file(schema)])()
     return descriptor_pb2.FileDescriptorSet(file=files).SerializeToString(deterministic=True)
 
 
@@ -92,7 +108,7 @@ def _fixed_width_file(schema: Schema) -> descriptor_pb2.FileDescriptorProto:
             name=field,
             number=number,
             type=_DOUBLE,
-            label=descriptor_pb2.FieldDescriptorProto.LABEL_OPTIONAL,
+            label=_Field.LABEL_OPTIONAL,
             oneof_index=number - 1,
             proto3_optional=True,
         )
@@ -101,32 +117,78 @@ def _fixed_width_file(schema: Schema) -> descriptor_pb2.FileDescriptorProto:
 
 def _location_fix_files() -> list[descriptor_pb2.FileDescriptorProto]:
     """Return Foxglove's schema for a geographic position, which viewers draw on a map."""
-    proto = descriptor_pb2.FieldDescriptorProto
-    file = descriptor_pb2.FileDescriptorProto(
-        name="foxglove/LocationFix.proto",
-        package="foxglove",
-        syntax="proto3",
-        dependency=["google/protobuf/timestamp.proto"],
-    )
-    message = file.message_type.add(name="LocationFix")
+    timestamp, file, message = _foxglove_files("LocationFix")
     kinds = message.enum_type.add(name="PositionCovarianceType")
     for value, label in enumerate(("UNKNOWN", "APPROXIMATED", "DIAGONAL_KNOWN", "KNOWN")):
         kinds.value.add(name=label, number=value)
-    one, many = proto.LABEL_OPTIONAL, proto.LABEL_REPEATED
-    for number, name, kind, arity, type_name in (
-        (1, "latitude", _DOUBLE, one, None),
-        (2, "longitude", _DOUBLE, one, None),
-        (3, "altitude", _DOUBLE, one, None),
-        (4, "position_covariance", _DOUBLE, many, None),
-        (5, "position_covariance_type", proto.TYPE_ENUM, one,
-         ".foxglove.LocationFix.PositionCovarianceType"),
-        (6, "timestamp", proto.TYPE_MESSAGE, one, ".google.protobuf.Timestamp"),
-        (7, "frame_id", proto.TYPE_STRING, one, None),
-    ):  # fmt: skip
-        message.field.add(name=name, number=number, type=kind, label=arity, type_name=type_name)
+    kind = ".foxglove.LocationFix.PositionCovarianceType"
+    _add_field(message, 1, "latitude", _DOUBLE)
+    _add_field(message, 2, "longitude", _DOUBLE)
+    _add_field(message, 3, "altitude", _DOUBLE)
+    _add_field(message, 4, "position_covariance", _DOUBLE, repeated=True)
+    _add_field(message, 5, "position_covariance_type", _Field.TYPE_ENUM, kind)
+    _add_field(message, 6, "timestamp", _Field.TYPE_MESSAGE, _TIMESTAMP)
+    _add_field(message, 7, "frame_id", _Field.TYPE_STRING)
+    return [timestamp, file]
+
+
+def _event_files() -> list[descriptor_pb2.FileDescriptorProto]:
+    """Return Foxglove's schema for a log message, which viewers list as text."""
+    timestamp, file, message = _foxglove_files("Log")
+    levels = message.enum_type.add(name="Level")
+    for value, label in enumerate(("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL")):
+        levels.value.add(name=label, number=value)
+    _add_field(message, 1, "timestamp", _Field.TYPE_MESSAGE, _TIMESTAMP)
+    _add_field(message, 2, "level", _Field.TYPE_ENUM, ".foxglove.Log.Level")
+    _add_field(message, 3, "message", _Field.TYPE_STRING)
+    _add_field(message, 4, "name", _Field.TYPE_STRING)
+    _add_field(message, 5, "file", _Field.TYPE_STRING)
+    _add_field(message, 6, "line", _Field.TYPE_FIXED32)
+    return [timestamp, file]
+
+
+def _raw_files() -> list[descriptor_pb2.FileDescriptorProto]:
+    """Return the schema of a raw packet."""
+    file = descriptor_pb2.FileDescriptorProto(
+        name="shiplog/Raw.proto", package="shiplog", syntax="proto3"
+    )
+    _add_field(file.message_type.add(name="Raw"), 1, "data", _Field.TYPE_BYTES)
+    return [file]
+
+
+def _foxglove_files(
+    name: str,
+) -> tuple[
+    descriptor_pb2.FileDescriptorProto,
+    descriptor_pb2.FileDescriptorProto,
+    descriptor_pb2.DescriptorProto,
+]:
+    """Return the file of time stamps, that of a message of Foxglove, and the empty message."""
     timestamp = descriptor_pb2.FileDescriptorProto()
     timestamp_pb2.DESCRIPTOR.CopyToProto(timestamp)
-    return [timestamp, file]
+    file = descriptor_pb2.FileDescriptorProto(
+        name=f"foxglove/{name}.proto",
+        package="foxglove",
+        syntax="proto3",
+        dependency=[timestamp.name],
+    )
+    return timestamp, file, file.message_type.add(name=name)
+
+
+def _add_field(
+    message: descriptor_pb2.DescriptorProto,
+    number: int,
+    name: str,
+    kind: descriptor_pb2.FieldDescriptorProto.Type.ValueType,
+    type_name: str | None = None,
+    *,
+    repeated: bool = False,
+) -> None:
+    arity = _Field.LABEL_REPEATED if repeated else _Field.LABEL_OPTIONAL
+    message.field.add(name=name, number=number, type=kind, label=arity, type_name=type_name)
+
+
+_FILES = {LOCATION_FIX: _location_fix_files, EVENT.name: _event_files, RAW.name: _raw_files}
 
 
 @cache
@@ -135,6 +197,11 @@ def _message_type(schema: Schema) -> type[Message]:
     for file in descriptor_pb2.FileDescriptorSet.FromString(descriptor_set(schema)).file:
         pool.Add(file)
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
+
+
+def _encodable(text: str) -> str:
+    """Return a text without surrogates, as which undecodable bytes of the wire may be in it."""
+    return text.encode(errors="replace").decode()
 
 
 def _encode_location_fixes(channel: Channel) -> list[bytes]:

@@ -19,6 +19,8 @@ VESSEL_ATTACHMENT = "vessel.toml"
 ENCODING = "protobuf"
 
 LOCATION_FIX = "foxglove.LocationFix"
+EVENTS_TOPIC = "/events"
+RAW_NAME = "raw"  # of the topics of raw packets, before the source
 
 _FIXED_WIDTH = {
     # name of the schema: its fields
@@ -54,6 +56,10 @@ class Schema:
         """The tag byte of each field in that layout; other bytes mean another layout."""
         fixed64 = 1  # the protobuf wire type of a double
         return {f"tag_{f}": number << 3 | fixed64 for number, f in enumerate(self.fields, start=1)}
+
+
+RAW = Schema("shiplog.Raw", ("data",))  # one packet of a source
+EVENT = Schema("foxglove.Log", ("timestamp", "level", "message", "name", "file", "line"))
 
 
 def schema_for(fields: tuple[str, ...]) -> Schema:

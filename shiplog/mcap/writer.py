@@ -1,4 +1,4 @@
-"""Writing of logs: whole trials, and samples as they are recorded."""
+"""Writing of logs: whole trials, and samples, raw packets and events as they are recorded."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -9,21 +9,39 @@ from typing import Self
 
 from mcap import records
 
+from shiplog.errors import UsageError
 from shiplog.files import atomic_write
-from shiplog.types import Channel, TrialLog, concatenate_channels
+from shiplog.types import Channel, Event, RawPackets, TrialLog, concatenate_channels
 from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 from shiplog.version import __version__
 
-from .encode import SampleBatch, encode_mcap_chunks
+from .encode import MessageBatch, encode_mcap_chunks
 from .record_writer import McapRecordWriter
-from .schema import ENCODING, FORMAT_VERSION, METADATA_NAME, VESSEL_ATTACHMENT, schema_for
+from .schema import (
+    ENCODING,
+    EVENT,
+    EVENTS_TOPIC,
+    FORMAT_VERSION,
+    METADATA_NAME,
+    RAW,
+    RAW_NAME,
+    VESSEL_ATTACHMENT,
+    Schema,
+    schema_for,
+)
+from .serialised import (
+    SerialisedMessages,
+    concatenate_messages,
+    serialise_events,
+    serialise_packets,
+)
 
 MAX_MCAP_CHUNK_BYTES = 1 << 20  # a crash loses at most about as much since the last flush
-_PENDING_SAMPLES = MAX_MCAP_CHUNK_BYTES // 40  # about an MCAP chunk: a scalar takes 40 bytes
+_SAMPLE_BYTES = 40  # of a scalar in an MCAP chunk, with its head
 
 
 class LogWriter:
-    """An open log to which samples are appended as they come; `close` makes it a complete file.
+    """An open log to which what is received is appended; `close` makes it a complete file.
 
     If the process is killed, the file can be read up to the last `flush`. A `LogWriter` is a
     context manager that closes the log.
@@ -65,10 +83,13 @@ class LogWriter:
         self._file = McapRecordWriter(path)
         self._schema_ids: dict[str, int] = {}  # by name
         self._channel_ids: dict[str, int] = {}  # by topic
-        self._counts: dict[int, int] = {}  # of samples, by channel id
-        self._pending: list[SampleBatch] = []
-        versions = {"format_version": FORMAT_VERSION, "written_by": f"shiplog {__version__}"}
-        self._file.write_metadata(METADATA_NAME, dict(metadata or {}) | versions)
+        self._counts: dict[int, int] = {}  # of messages, by channel id
+        self._samples = 0
+        self._pending: list[MessageBatch] = []
+        self._pending_bytes = 0
+        self._latest_ns = 0  # time of reception of the messages in the file so far
+        self._metadata: dict[str, str] = {}
+        self.update_metadata(dict(metadata or {}) | _versions())
         if vessel_toml is not None:
             content = vessel_toml.encode()
             self._file.write_attachment(VESSEL_ATTACHMENT, "application/toml", content)
@@ -86,32 +107,55 @@ class LogWriter:
 
     @property
     def samples(self) -> int:
-        """The number of samples written so far."""
+        """The number of samples written so far; raw packets and events are none."""
+        return self._samples
+
+    @property
+    def messages(self) -> int:
+        """The number of samples, raw packets and events written so far."""
         return sum(self._counts.values())
 
-    def write(self, *channels: Channel) -> None:
-        """Append samples, interleaved in the order of reception.
+    def write(self, *items: Channel | RawPackets | Event) -> None:
+        """Append samples, raw packets and events, interleaved in the order of reception.
 
         Parameters
         ----------
-        channels
-            The next samples of each channel. The first of a topic fixes its unit, fields and
-            metadata.
+        items
+            The next samples of each channel, the next packets of each source, and events. The first
+            of a topic fixes its unit, fields and metadata, or its format.
 
         Raises
         ------
         UsageError
-            The unit of a known channel does not measure its quantity.
+            The unit of a known channel does not measure its quantity, or a channel is named
+            ``raw``.
         """
-        for channel in channels:
-            channel_id = self._register(channel)
-            self._pending.append(SampleBatch(channel_id, self._counts[channel_id], channel))
-            self._counts[channel_id] += len(channel)
-        if sum(len(batch.samples) for batch in self._pending) >= _PENDING_SAMPLES:
+        events = [item for item in items if isinstance(item, Event)]
+        for item in items:
+            if isinstance(item, Channel):
+                self._append(self._register(item), item, _SAMPLE_BYTES * len(item))
+                self._samples += len(item)
+            elif isinstance(item, RawPackets):
+                size = _SAMPLE_BYTES * len(item) + sum(map(len, item.data))
+                self._append(self._register_packets(item), serialise_packets(item), size)
+        if events:
+            messages = serialise_events(events, self._latest_ns)
+            self._append(self._register_events(), messages, _SAMPLE_BYTES * len(events))
+        if self._pending_bytes >= MAX_MCAP_CHUNK_BYTES:
             self._write_pending()
 
+    def update_metadata(self, metadata: Mapping[str, str]) -> None:
+        """Append the entries of the trial's metadata that are new or have changed.
+
+        Readers use the last value of each key.
+        """
+        changed = {key: text for key, text in metadata.items() if self._metadata.get(key) != text}
+        if changed:
+            self._metadata |= changed
+            self._file.write_metadata(METADATA_NAME, changed)
+
     def flush(self) -> None:
-        """Hand all samples to the operating system, so that a killed process does not lose them."""
+        """Hand all to the operating system, so that a killed process does not lose it."""
         self._write_pending()
         self._file.flush()
 
@@ -122,29 +166,52 @@ class LogWriter:
                 self._write_pending()
                 self._file.finish(self._counts)
 
+    def _append(self, channel_id: int, messages: Channel | SerialisedMessages, size: int) -> None:
+        """Add messages to those that are still to be encoded, given about their size in bytes."""
+        self._pending.append(MessageBatch(channel_id, self._counts[channel_id], messages))
+        self._counts[channel_id] += len(messages)
+        self._pending_bytes += size
+
     def _register(self, channel: Channel) -> int:
         """Return the id of a channel, and describe the channel when it is new."""
-        if channel.topic not in self._channel_ids:
-            if channel.name in CATALOGUE and channel.fields != GEOGRAPHIC:
-                conversion_factor(channel.unit, CATALOGUE[channel.name].unit)  # reject bad units
-            channel_id = len(self._channel_ids) + 1
-            self._file.add_channel(
-                records.Channel(
-                    id=channel_id,
-                    topic=channel.topic,
-                    message_encoding=ENCODING,
-                    metadata=channel_metadata(channel),
-                    schema_id=self._register_schema(channel.fields),
-                )
-            )
-            self._channel_ids[channel.topic] = channel_id
-            self._counts[channel_id] = 0
-        return self._channel_ids[channel.topic]
+        if channel.topic in self._channel_ids:
+            return self._channel_ids[channel.topic]
+        if channel.name == RAW_NAME:
+            raise UsageError(f"{channel.topic!r} is a topic of raw packets; name the channel anew")
+        if channel.name in CATALOGUE and channel.fields != GEOGRAPHIC:
+            conversion_factor(channel.unit, CATALOGUE[channel.name].unit)  # reject bad units
+        return self._describe(channel.topic, schema_for(channel.fields), channel_metadata(channel))
 
-    def _register_schema(self, fields: tuple[str, ...]) -> int:
+    def _register_packets(self, packets: RawPackets) -> int:
+        if packets.topic in self._channel_ids:
+            return self._channel_ids[packets.topic]
+        metadata = {"source": packets.source, "format": packets.format}
+        return self._describe(packets.topic, RAW, metadata)
+
+    def _register_events(self) -> int:
+        if EVENTS_TOPIC in self._channel_ids:
+            return self._channel_ids[EVENTS_TOPIC]
+        return self._describe(EVENTS_TOPIC, EVENT, {})
+
+    def _describe(self, topic: str, schema: Schema, metadata: dict[str, str]) -> int:
+        """Describe a channel of the file, and return its id."""
+        channel_id = len(self._channel_ids) + 1
+        self._file.add_channel(
+            records.Channel(
+                id=channel_id,
+                topic=topic,
+                message_encoding=ENCODING,
+                metadata=metadata,
+                schema_id=self._register_schema(schema),
+            )
+        )
+        self._channel_ids[topic] = channel_id
+        self._counts[channel_id] = 0
+        return channel_id
+
+    def _register_schema(self, schema: Schema) -> int:
         from .messages import descriptor_set  # noqa: PLC0415 - protobuf takes long to import
 
-        schema = schema_for(fields)
         if schema.name not in self._schema_ids:
             schema_id = len(self._schema_ids) + 1
             record = records.Schema(
@@ -156,9 +223,11 @@ class LogWriter:
 
     def _write_pending(self) -> None:
         batches, self._pending = _one_batch_per_channel(self._pending), []
+        self._pending_bytes = 0
         if batches:
             for mcap_chunk in encode_mcap_chunks(batches, MAX_MCAP_CHUNK_BYTES):
                 self._file.write_mcap_chunk(mcap_chunk)
+                self._latest_ns = max(self._latest_ns, mcap_chunk.last_ns)
 
 
 def write(log: TrialLog, path: str | os.PathLike[str]) -> None:
@@ -193,13 +262,26 @@ def channel_metadata(channel: Channel) -> dict[str, str]:
     return dict(channel.metadata) | metadata
 
 
-def _one_batch_per_channel(batches: Sequence[SampleBatch]) -> list[SampleBatch]:
-    """Join the consecutive batches of each channel."""
-    by_channel: dict[int, list[SampleBatch]] = {}
+def _versions() -> dict[str, str]:
+    return {"format_version": FORMAT_VERSION, "written_by": f"shiplog {__version__}"}
+
+
+def _one_batch_per_channel(batches: Sequence[MessageBatch]) -> list[MessageBatch]:
+    """Join the consecutive batches of each channel of the file."""
+    by_channel: dict[int, list[MessageBatch]] = {}
     for batch in batches:
-        if len(batch.samples):
+        if len(batch.messages):
             by_channel.setdefault(batch.channel_id, []).append(batch)
     return [
-        replace(group[0], samples=concatenate_channels([batch.samples for batch in group]))
+        replace(group[0], messages=_concatenated([batch.messages for batch in group]))
         for group in by_channel.values()
     ]
+
+
+def _concatenated(
+    parts: Sequence[Channel | SerialisedMessages],
+) -> Channel | SerialisedMessages:
+    samples = [part for part in parts if isinstance(part, Channel)]
+    if samples:
+        return concatenate_channels(samples)
+    return concatenate_messages([p for p in parts if isinstance(p, SerialisedMessages)])

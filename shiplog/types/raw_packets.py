@@ -1,6 +1,6 @@
 """Raw packets: what a source sent, byte by byte, beside the samples that were decoded from it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,3 +48,7 @@ class RawPackets:
     def __len__(self) -> int:
         """Return the number of packets."""
         return len(self.data)
+
+    def part(self, start: int, stop: int) -> "RawPackets":
+        """Return the packets with the numbers `start` to `stop` - 1."""
+        return replace(self, received_ns=self.received_ns[start:stop], data=self.data[start:stop])

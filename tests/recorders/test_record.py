@@ -5,9 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 from recorders.record import Recording, record
+from recorders.source import Recordable
 from shiplog import Channel, ShiplogError, read
+from shiplog.types import Event, RawPackets
 
 
 class Sensor:
@@ -60,3 +63,45 @@ def test_an_unwritable_place_is_reported_and_leaves_no_file(tmp_path: Path, plac
     with pytest.raises(ShiplogError, match="cannot write"):
         record(Sensor(), tmp_path / place)
     assert list(tmp_path.iterdir()) == []
+
+
+class Stream:
+    """A source of packets whose metadata count those received so far."""
+
+    vessel_toml = None
+
+    def __init__(self, failure: ShiplogError | None = None) -> None:
+        self.received = 0
+        self.failure = failure
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        return {"source": "test", "rejected": str(self.received)}
+
+    def chunks(self) -> Iterator[tuple[Recordable, ...]]:
+        for k in range(3):
+            self.received += 1
+            at = np.array([k * 10**8])
+            yield RawPackets("gyro", "nmea0183", at, (b"?",)), Event(k * 10**8, "no sentence")
+        if self.failure:
+            raise self.failure
+
+
+@pytest.mark.parametrize("failure", [None, ShiplogError("no signal")])
+def test_packets_and_events_are_written_and_the_metadata_of_the_end(
+    tmp_path: Path, failure: ShiplogError | None
+) -> None:
+    path = tmp_path / "a.mcap"
+    if failure is None:
+        assert record(Stream(), path) == Recording(samples=0, channels=0, interrupted=False)
+    else:
+        with pytest.raises(ShiplogError, match=r"no signal"):
+            record(Stream(failure), path)
+        path = tmp_path / "a.mcap.part"
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count == 6
+    metadata = read(path).metadata
+    assert (metadata["source"], metadata["rejected"]) == ("test", "3")

@@ -66,7 +66,14 @@ def test_every_channel_except_rpm_is_in_si_and_has_a_display_unit() -> None:
 def test_rudder_and_rpm_are_commanded_and_compass_angles_are_circular() -> None:
     assert {name for name, kind in CATALOGUE.items() if kind.commanded} == {"rudder", "rpm"}
     circular = {name for name, kind in CATALOGUE.items() if kind.circular}
-    assert circular == {"heading", "wind_direction", "course_over_ground"}
+    assert circular == {
+        "heading",
+        "magnetic_heading",
+        "heading_order",
+        "wind_direction",
+        "apparent_wind_angle",
+        "course_over_ground",
+    }
 
 
 def test_a_channel_kind_is_found_by_name_or_the_nearest_is_suggested() -> None:

@@ -11,7 +11,7 @@ from mcap.writer import Writer
 
 import shiplog.mcap.encode
 from shiplog import Channel, LogWriter, TrialLog, write
-from shiplog.mcap.encode import SampleBatch, encode_mcap_chunks
+from shiplog.mcap.encode import MessageBatch, encode_mcap_chunks
 from shiplog.mcap.messages import descriptor_set, encode_messages
 from shiplog.mcap.schema import schema_for
 from shiplog.mcap.writer import MAX_MCAP_CHUNK_BYTES
@@ -56,7 +56,7 @@ def test_messages_are_those_that_the_mcap_library_writes(seed: int) -> None:
     for got, number, k, was, data in sorted(messages, key=lambda m: m[0]):
         writer.add_message(number, got, data, was, k)
     writer.finish()
-    parts = [SampleBatch(number, 0, c) for number, c in enumerate(log, start=1)]
+    parts = [MessageBatch(number, 0, c) for number, c in enumerate(log, start=1)]
     for chunk in encode_mcap_chunks(parts, 8192):
         ours.write(chunk.data.tobytes())
     by_mcap.seek(0)
@@ -81,7 +81,7 @@ def test_encoding_in_portions_gives_the_same_messages_as_all_at_once(
         at = np.sort(rng.integers(0, 2000, count))  # many at one instant
         fields = GEOGRAPHIC if name == "geo" else ()
         values = rng.normal(size=(count, len(fields)) if fields else count)
-        parts.append(SampleBatch(number, 7, Channel(name, "a", "1", at, at, values, fields)))
+        parts.append(MessageBatch(number, 7, Channel(name, "a", "1", at, at, values, fields)))
     at_once = b"".join(chunk.data.tobytes() for chunk in encode_mcap_chunks(parts, 4096))
     monkeypatch.setattr(shiplog.mcap.encode, "MESSAGES_AT_ONCE", 100)
     bits = list(encode_mcap_chunks(parts, 4096))
@@ -107,7 +107,7 @@ def _split(data: bytes) -> list[bytes]:
 @pytest.mark.parametrize("largest", [100, 1000, 1 << 20])
 def test_the_index_has_the_offset_of_each_message(largest: int) -> None:
     log = trial(np.random.default_rng(9), 150)
-    parts = [SampleBatch(number, 0, c) for number, c in enumerate(log, start=1)]
+    parts = [MessageBatch(number, 0, c) for number, c in enumerate(log, start=1)]
     seen = 0
     for chunk in encode_mcap_chunks(parts, largest):
         data = chunk.data.tobytes()

@@ -13,7 +13,7 @@ from mcap.reader import NonSeekingReader, make_reader
 
 import shiplog.mcap.writer
 from shiplog import Channel, LogWriter, ShiplogError, TrialLog, UsageError, read, write
-from shiplog.mcap.encode import McapChunk, SampleBatch, encode_mcap_chunks
+from shiplog.mcap.encode import McapChunk, MessageBatch, encode_mcap_chunks
 from shiplog.units import GEOGRAPHIC
 
 START = 1_700_000_000_000_000_000
@@ -100,7 +100,7 @@ def channels(draw: st.DrawFn, name: str, earliest: int, latest: int) -> Channel:
 
 
 def two_channels(earliest: int, latest: int) -> st.SearchStrategy[tuple[Channel, ...]]:
-    return st.tuples(*(channels(name, earliest, latest) for name in ("yaw_rate", "heave")))
+    return st.tuples(*(channels(name, earliest, latest) for name in ("yaw_rate", "vibration")))
 
 
 @given(two_channels(START, START + HOUR), st.dictionaries(keys, st.text()))
@@ -351,7 +351,7 @@ def test_a_failed_write_leaves_the_existing_file(
         write(trial(channel("speed", 30)), path)
     before = path.read_bytes() if stands else None
 
-    def full_disk(batches: list[SampleBatch], max_bytes: int) -> Iterator[McapChunk]:
+    def full_disk(batches: list[MessageBatch], max_bytes: int) -> Iterator[McapChunk]:
         yield from encode_mcap_chunks(batches, max_bytes)
         raise OSError(28, "No space left on device")
 
