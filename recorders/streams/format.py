@@ -15,22 +15,6 @@ if TYPE_CHECKING:
 GROUP = "shiplog.stream_formats"  # of the entry points
 
 
-@dataclass(frozen=True)
-class OpenedStream:
-    """A stream that is ready to be decoded.
-
-    Attributes
-    ----------
-    batches
-        Packets, each with its time of reception.
-    decoder
-        Decodes them.
-    """
-
-    batches: Batches
-    decoder: Decoder
-
-
 def _no_options(parser: argparse.ArgumentParser) -> None:
     """Add no option."""
 
@@ -42,7 +26,7 @@ class StreamFormat:
     A package adds one by an entry point of the group ``shiplog.stream_formats``. It is then a
     source of ``shiplog record NAME ADDRESS``, of a trial file, and of ``shiplog decode``. Its
     module is imported for ``shiplog record --help``, too, so that heavy libraries are best imported
-    inside `open`.
+    inside its functions.
 
     Attributes
     ----------
@@ -50,20 +34,25 @@ class StreamFormat:
         The name, such as ``nmea0183``; raw packets are recorded with it.
     help
         One line for the list of sources.
-    open
-        Makes the stages and the decoder of a stream. Its arguments are batches and the parsed
-        options. Packets of a file or of a raw topic come as lines; those of a file have no time
-        (`NO_TIME`), and the batches that `open` returns have one or raise a `ShiplogError` that
-        states what is missing.
+    make_decoder
+        Makes a decoder, given the parsed options. It decodes packets that have a time of reception,
+        from a live transport, a file, or a raw topic.
+    add_times
+        Gives the lines of a file their times of reception, from the text before each, or from its
+        content; a stage that takes and yields batches. Raises a `ShiplogError` that states what is
+        missing where there are none. The text before each payload is removed.
     configure
         Adds the format's own options to a parser. A trial file has the same options as keys.
-    transport
+    open_transport
         Makes the transport of an address that only this format has, such as ``can0``; returns None
         for other addresses.
     """
 
     name: str
     help: str
-    open: Callable[[Batches, argparse.Namespace], OpenedStream]
+    make_decoder: Callable[[argparse.Namespace], Decoder]
+    add_times: Callable[[Batches, argparse.Namespace], Batches]
     configure: Callable[[argparse.ArgumentParser], None] = _no_options
-    transport: "Callable[[str, ReceptionClock], Transport | None]" = lambda _address, _clock: None
+    open_transport: "Callable[[str, ReceptionClock], Transport | None]" = lambda _address, _clock: (
+        None
+    )

@@ -41,6 +41,12 @@ class _Column:
 class SampleBuffer:
     """Samples by topic, in the order in which they are added.
 
+    Parameters
+    ----------
+    prefix
+        Put before the source of each topic, such as ``gyro.``, so that two streams with the same
+        talker have topics of their own.
+
     Examples
     --------
     >>> buffer = SampleBuffer()
@@ -50,7 +56,8 @@ class SampleBuffer:
     (Channel(/heading/HE [rad], 1 samples),)
     """
 
-    def __init__(self) -> None:
+    def __init__(self, prefix: str = "") -> None:
+        self._prefix = prefix
         self._columns: dict[tuple[str, str], _Column] = {}
         self._events: list[Event] = []
 
@@ -126,5 +133,7 @@ class SampleBuffer:
         if len(self._columns) >= MAX_TOPICS:
             return None
         unit = "deg" if fields else CATALOGUE[name].unit  # an altitude is in m
-        column = self._columns[name, source] = _Column(name, source, unit, fields, {})
+        column = self._columns[name, source] = _Column(
+            name, self._prefix + source, unit, fields, {}
+        )
         return column

@@ -33,6 +33,8 @@ class StreamSource:
         Where the packets come from, for the metadata: a file name or an address.
     vessel_toml
         The text of the vessel file to keep in the log, or None.
+    samples
+        Collects what is decoded.
     """
 
     name: str
@@ -42,7 +44,7 @@ class StreamSource:
     keep_raw: bool = False
     origin: str = ""
     vessel_toml: str | None = None
-    _samples: SampleBuffer = field(default_factory=SampleBuffer, init=False, repr=False)
+    samples: SampleBuffer = field(default_factory=SampleBuffer, repr=False)
 
     @property
     def metadata(self) -> Mapping[str, str]:
@@ -53,16 +55,18 @@ class StreamSource:
         }
         return {"source": self.format, "origin": self.origin} | rejected
 
-    def chunks(self) -> Iterator[tuple[Recordable, ...]]:
-        """Yield the samples, events and raw packets of each batch."""
+    def steps(self) -> Iterator[tuple[Recordable, ...]]:
+        """Yield the samples, events and raw packets of each batch, or nothing, and of the end."""
         for batch in self.batches:
-            self.decoder.decode(batch, self._samples)
+            self.decoder.decode(batch, self.samples)
             raw = [self._raw(batch)] if self.keep_raw and batch else []
-            if items := (*self._samples.take(), *raw):
-                yield items
-        self.decoder.finish(self._samples)
-        if items := self._samples.take():
-            yield items
+            yield (*self.samples.take(), *raw)
+        self.decoder.finish(self.samples)
+        yield self.samples.take()
+
+    def chunks(self) -> Iterator[tuple[Recordable, ...]]:
+        """Yield what the steps yield, without those that yield nothing."""
+        return filter(None, self.steps())
 
     def _raw(self, batch: Sequence[Packet]) -> RawPackets:
         times = np.array([packet.received_ns for packet in batch], np.int64)
