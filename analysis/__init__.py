@@ -6,6 +6,8 @@ plan_replay, Replay
     The same in chunks, for logs longer than memory: the plan first, then the replay.
 identify
     Fit a ship model to one or several logs, with intervals and validation.
+ReadingOptions
+    The vessel, the sources and the strictness with which these read a log.
 compare
     Compare a replay with its reference.
 
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from analysis.identification.identified_ship import IdentifiedShip
     from analysis.identification.identify import identify
     from analysis.replay.plan import Plan, plan_replay
+    from analysis.replay.reading_options import ReadingOptions
     from analysis.replay.replay import Replay, analyse
     from analysis.replay.replay_results import Analysis, Findings, ReplayChunk
 
@@ -36,6 +39,7 @@ _MODULES = {
     "Findings": "replay.replay_results",
     "IdentifiedShip": "identification.identified_ship",
     "Plan": "replay.plan",
+    "ReadingOptions": "replay.reading_options",
     "Replay": "replay.replay",
     "ReplayChunk": "replay.replay_results",
     "analyse": "replay.replay",
@@ -50,6 +54,7 @@ __all__ = [
     "Findings",
     "IdentifiedShip",
     "Plan",
+    "ReadingOptions",
     "Replay",
     "ReplayChunk",
     "analyse",

@@ -29,10 +29,40 @@ from shiplog.files import atomic_write
 from shiplog.vessel.settings import DISTURBANCES
 
 if TYPE_CHECKING:
+    from analysis.identification.identified_ship import IdentifiedShip
+    from analysis.replay.reading_options import ReadingOptions
     from shiplog.types import Log
 
 DEFAULT_REVIEW = "identified.rrd"
-LENGTH_HELP = "length between perpendiculars, such as 320; precedes that of the vessel file"
+
+
+# ---- the options that replay and identify share
+
+
+def _add_reading_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--vessel", help="a preset or a vessel.toml, instead of the one that the log carries"
+    )
+    parser.add_argument(
+        "--length",
+        type=float,
+        metavar="METRES",
+        help="length between perpendiculars, such as 320; precedes that of the vessel file",
+    )
+    add_source_option(parser)
+    parser.add_argument(
+        "--strict", action="store_true", help="refuse a log with a contradiction in unit or sign"
+    )
+    add_cut_options(parser)
+
+
+def _reading_options(arguments: argparse.Namespace) -> "ReadingOptions":
+    from analysis.replay.reading_options import ReadingOptions
+    from shiplog.vessel.vessel_parser import load_vessel
+
+    sources = assigned_sources(arguments.source)
+    vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
+    return ReadingOptions(vessel, arguments.length, sources, arguments.strict)
 
 
 # ---- replay
@@ -40,11 +70,7 @@ LENGTH_HELP = "length between perpendiculars, such as 320; precedes that of the 
 
 def _configure_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", metavar="LOG")
-    parser.add_argument(
-        "--vessel", help="a preset or a vessel.toml, instead of the one the log carries"
-    )
-    parser.add_argument("--length", type=float, metavar="METRES", help=LENGTH_HELP)
-    add_source_option(parser)
+    _add_reading_options(parser)
     parser.add_argument(
         "--filter",
         metavar="NAME",
@@ -75,37 +101,25 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
         "(docs/vessel.md)",
     )
     parser.add_argument(
-        "--strict", action="store_true", help="refuse a log with a contradiction in unit or sign"
-    )
-    parser.add_argument(
         "-o", "--output", metavar="FILE", help="the review (default: LOG's name with .rrd, here)"
     )
     parser.add_argument(
         "--full", action="store_true", help="every sample in the review, not what a screen can show"
     )
     parser.add_argument("--json", metavar="FILE", help="write the summary as JSON; - is stdout")
-    add_cut_options(parser)
     parser.add_argument("--view", action="store_true", help="open the review in the Rerun viewer")
 
 
 def _replay(arguments: argparse.Namespace) -> ExitCode:
-    if Path(arguments.log).suffix == ".rrd":
-        raise UsageError(f"a review, not a log; open it with: rerun {arguments.log}")
-    output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
-    require_suffix(".rrd", output)
     settings = replay_settings(arguments)
-    sources = assigned_sources(arguments.source)
-    require_distinct([output, arguments.json], [arguments.log, arguments.vessel])
-    require_inputs(arguments.log)
-    require_outputs(output, arguments.json)
+    options = _reading_options(arguments)
+    output = _replay_output(arguments)
     from analysis.replay.plan import plan_replay
     from analysis.replay.precompile import compiling_beside
     from analysis.replay.replay import Replay
     from analysis.report.replay_json import replay_json
     from analysis.report.replay_tables import replay_markdown, replay_tables
-    from shiplog.vessel.vessel_parser import load_vessel
 
-    vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     with (
         progress("analysis") as on_progress,
         compiling_beside(arguments.filter, smooth=arguments.smooth) as compilation,
@@ -113,15 +127,7 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
         on_progress("read")
         log = open_cut(arguments.log, arguments)
         try:
-            plan = plan_replay(
-                log,
-                vessel,
-                settings=settings,
-                sources=sources,
-                length=arguments.length,
-                strict=arguments.strict,
-                on_progress=on_progress,
-            )
+            plan = plan_replay(log, options, settings=settings, on_progress=on_progress)
         except ShiplogError:
             print_warnings(log.warnings)  # they may explain the error
             raise
@@ -142,6 +148,18 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
     print_warnings(findings.warnings)
     _show_review(output, view=arguments.view)
     return ExitCode.DATA_LOST if log.data_lost else ExitCode.OK
+
+
+def _replay_output(arguments: argparse.Namespace) -> Path:
+    """Return the path of the review, after a check of all paths."""
+    if Path(arguments.log).suffix == ".rrd":
+        raise UsageError(f"a review, not a log; open it with: rerun {arguments.log}")
+    output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
+    require_suffix(".rrd", output)
+    require_distinct([output, arguments.json], [arguments.log, arguments.vessel])
+    require_inputs(arguments.log)
+    require_outputs(output, arguments.json)
+    return output
 
 
 def replay_settings(parsed: argparse.Namespace) -> dict[str, object]:
@@ -176,7 +194,7 @@ def _show_review(path: str | Path, *, view: bool) -> None:
 
 def _configure_identify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", metavar="LOG", nargs="+", help="logs of one ship, loaded alike")
-    add_source_option(parser)
+    _add_reading_options(parser)
     parser.add_argument(
         "--model",
         metavar="NAME",
@@ -199,14 +217,6 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
         help="fix a parameter instead of estimating it, such as T3=0.5",
     )
     parser.add_argument(
-        "--vessel",
-        help="a preset or a vessel.toml: length, α's and steering gear, instead of the logs' own",
-    )
-    parser.add_argument("--length", type=float, metavar="METRES", help=LENGTH_HELP)
-    parser.add_argument(
-        "--strict", action="store_true", help="refuse a log with a contradiction in unit or sign"
-    )
-    parser.add_argument(
         "-o", "--output", metavar="FILE", help="the vessel.toml, for simulation and replay"
     )
     parser.add_argument(
@@ -217,52 +227,33 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--view", action="store_true", help=f"open the review, else {DEFAULT_REVIEW}, in Rerun"
     )
-    add_cut_options(parser)
     parser.add_argument("--json", metavar="FILE", help="write the result as JSON; - is stdout")
 
 
 def _identify(arguments: argparse.Namespace) -> ExitCode:
     review = arguments.review or (DEFAULT_REVIEW if arguments.view else None)
-    outputs = [arguments.output, arguments.json, review]
-    fitted, held_out = (
-        [str(Path(path).resolve()) for path in paths]
-        for paths in (arguments.log, arguments.validate)
-    )
-    require_distinct(outputs, [*fitted, *held_out, arguments.vessel])
-    require_suffix(".rrd", review)
-    require_suffix(".toml", arguments.output)
     fixed = assigned_numbers(arguments.fix, "--fix", "T3=0.5")
-    sources = assigned_sources(arguments.source)
-    require_inputs(*arguments.log, *arguments.validate)
-    require_outputs(*outputs)
+    options = _reading_options(arguments)
+    _require_identify_paths(arguments, review)
     from analysis.identification.identify import identify
-    from analysis.identification.runs import require_distinct_logs
-    from analysis.identification.vessel_file import undetermined_parts, vessel_toml
+    from analysis.identification.vessel_file import vessel_toml
     from analysis.report.identification_json import identification_json
     from analysis.report.identification_tables import identification_tables
-    from shiplog.vessel.vessel_parser import load_vessel
 
-    require_distinct_logs(fitted, held_out)
-    vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     with progress("analysis", lines=arguments.model == "auto") as on_progress:
         on_progress("read")
-        logs = _measured_logs(arguments.log, arguments)
-        validation_logs = _measured_logs(arguments.validate, arguments)
         ship = identify(
-            logs,
+            _measured_logs(arguments.log, arguments),
             arguments.model,
-            validation_logs=validation_logs,
+            validation_logs=_measured_logs(arguments.validate, arguments),
             fixed=fixed,
-            vessel=vessel,
-            sources=sources,
-            length=arguments.length,
-            strict=arguments.strict,
+            options=options,
             on_progress=on_progress,
         )
-        text = vessel_toml(ship, on_progress) if arguments.output else ""
+        toml = vessel_toml(ship, on_progress) if arguments.output else ""
     if arguments.output:
         with atomic_write(arguments.output) as part:
-            part.write_text(text, encoding="utf-8")
+            part.write_text(toml, encoding="utf-8")
     if arguments.json:
         write_json(identification_json(ship), arguments.json)
     if review:
@@ -274,16 +265,40 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
     if review:
         _show_review(review, view=arguments.view)
     if arguments.output:
-        names = ", ".join(ship.uncertainty.unidentifiable)
-        caution = f"; not identifiable, and valid for these logs only: {names}" if names else ""
-        print(f"vessel file: {arguments.output}{caution}", file=sys.stderr)
-        for equation in undetermined_parts(ship):
-            print(
-                f"the vessel file gives no model, only comments: no parameter of the {equation} "
-                "equation is identifiable from these logs; add the log of a zig-zag",
-                file=sys.stderr,
-            )
+        _report_vessel_file(arguments.output, ship)
     return ExitCode.DATA_LOST if ship.data_lost else ExitCode.OK
+
+
+def _require_identify_paths(arguments: argparse.Namespace, review: str | None) -> None:
+    """Check all paths, and that no log is named twice."""
+    outputs = [arguments.output, arguments.json, review]
+    fitted, held_out = (
+        [str(Path(path).resolve()) for path in paths]
+        for paths in (arguments.log, arguments.validate)
+    )
+    require_distinct(outputs, [*fitted, *held_out, arguments.vessel])
+    require_suffix(".rrd", review)
+    require_suffix(".toml", arguments.output)
+    require_inputs(*arguments.log, *arguments.validate)
+    require_outputs(*outputs)
+    from analysis.identification.runs import require_distinct_logs
+
+    require_distinct_logs(fitted, held_out)
+
+
+def _report_vessel_file(path: str, ship: "IdentifiedShip") -> None:
+    """Report the vessel file that was written, and what it cannot be used for."""
+    from analysis.identification.vessel_file import undetermined_parts
+
+    names = ", ".join(ship.uncertainty.unidentifiable)
+    caution = f"; not identifiable, and valid for these logs only: {names}" if names else ""
+    print(f"vessel file: {path}{caution}", file=sys.stderr)
+    for equation in undetermined_parts(ship):
+        print(
+            f"the vessel file gives no model, only comments: no parameter of the {equation} "
+            "equation is identifiable from these logs; add the log of a zig-zag",
+            file=sys.stderr,
+        )
 
 
 def _measured_logs(paths: Sequence[str], arguments: argparse.Namespace) -> "list[Log]":

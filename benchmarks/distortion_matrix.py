@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from analysis.filters.base import OUTPUT_STATES
+from analysis.replay.reading_options import ReadingOptions
 from analysis.replay.replay import analyse
 from analysis.replay.replay_results import Analysis
 from recorders.simulated.sensors import DEG, suite
@@ -122,7 +123,7 @@ def run_case(case: Case, harmful: dict[str, bool] | None = None) -> Outcome:
             python_warnings.simplefilter("ignore")
             clocks = [d.clock for d in case.distortions if d.clock is not None]
             read = _written(log, clocks, Path(folder) / "trial.mcap") if clocks else log
-            analysis = analyse(read, vessel)
+            analysis = analyse(read, ReadingOptions(vessel))
     except ShiplogError as error:
         named = any(d.is_named_in(str(error)) for d in culprits)
         return Outcome(case, REFUSED if named else OTHER_REFUSAL, (), (str(error),))
@@ -216,7 +217,7 @@ def false_alarms(seeds: Iterable[int]) -> Iterator[str]:
     for seed in seeds:
         manoeuvre = MANOEUVRES[seed % len(MANOEUVRES)]
         log = as_log(undistorted_trial(seed, manoeuvre))
-        for warning in analyse(log, vessel).findings.warnings:
+        for warning in analyse(log, ReadingOptions(vessel)).findings.warnings:
             yield f"{manoeuvre}, seed {seed}: {warning}"
 
 

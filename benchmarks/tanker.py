@@ -16,6 +16,7 @@ from analysis.identification.identify import identify
 from analysis.identification.prediction import zigzag_overshoots
 from analysis.identification.runs import run_from_log
 from analysis.identification.validation import Validation, validate
+from analysis.replay.reading_options import ReadingOptions
 from shiplog import TrialLog, Vessel, load_vessel
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
@@ -84,7 +85,9 @@ def tanker(figures: Path) -> None:
     ships: dict[str, IdentifiedShip] = {}
     for name, runs in (("MARIN", MARIN), ("HSVA", HSVA), ("both", (*MARIN, *HSVA))):
         logs = [_log(run) for run in runs]
-        ships[name] = identify(logs, "auto", vessel=VESSEL, validation_logs=[circle])
+        ships[name] = identify(
+            logs, "auto", options=ReadingOptions(VESSEL), validation_logs=[circle]
+        )
     print("\n| cross-validation error, % | " + " | ".join(ships) + " |\n|---|---|---|---|")
     for name in [c.model.name for c in next(iter(ships.values())).candidates]:
         print(f"| {name} | {' | '.join(_score(ship, name) for ship in ships.values())} |")

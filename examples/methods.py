@@ -22,6 +22,7 @@ from analysis.design.shaping import wave_filter
 from analysis.filters.base import STATES
 from analysis.filters.noise_model import Wave
 from analysis.replay.plan import Plan, plan_replay
+from analysis.replay.reading_options import ReadingOptions
 from analysis.replay.replay import Replay
 from analysis.replay.replay_results import Findings, ReplayChunk
 from analysis.signals.concat import concatenate
@@ -151,7 +152,7 @@ class Replays:
         key = frozenset(shared.items()), "wave" in models
         if key not in self._plans:
             shared["disturbance.models"] = models
-            self._plans[key] = plan_replay(self.log, self._vessel, settings=shared)
+            self._plans[key] = plan_replay(self.log, ReadingOptions(self._vessel), settings=shared)
         plan = self._plans[key]
         vessel = with_settings(plan.vessel, settings)
         frequency = plan.disturbance_settings.wave_frequency

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.replay.reading_options import ReadingOptions
 from analysis.replay.replay import analyse
 from shiplog import Channel, ShiplogError, TrialLog, Vessel, read, write
 
@@ -193,7 +194,7 @@ def compare(
         trial = log if isinstance(log, TrialLog) else read(log)
         if trial.data_lost:
             raise ShiplogError(f"data were lost: {'; '.join(trial.warnings)}")
-        replay = make_reference(analyse(trial, vessel))
+        replay = make_reference(analyse(trial, ReadingOptions(vessel=vessel)))
         known = _reference(log if reference is None else reference, beside=reference is None)
     except ShiplogError as error:
         return Comparison(name, (), str(error), replay)

@@ -13,6 +13,7 @@ from analysis.identification.comparison.parameter_ekf import parameter_ekf
 from analysis.identification.comparison.windows import window_estimates
 from analysis.identification.fit.output_error import OutputError, make_problem, output_error
 from analysis.identification.fit.uncertainty import Uncertainty, uncertainty
+from analysis.replay.reading_options import DEFAULT_OPTIONS, ReadingOptions
 from shiplog.checks.consistency.findings import naming_contradictions
 from shiplog.errors import LogError, UsageError
 from shiplog.mcap.stream import open_log
@@ -42,10 +43,7 @@ def identify(
     *,
     validation_logs: LogSource | Sequence[LogSource] = (),
     fixed: Mapping[str, float] | None = None,
-    vessel: Vessel | None = None,
-    sources: Mapping[str, str] | None = None,
-    length: float | None = None,
-    strict: bool = False,
+    options: ReadingOptions = DEFAULT_OPTIONS,
     on_progress: ProgressCallback = no_progress,
 ) -> IdentifiedShip:
     """Fit a ship model to one or more logs of the same ship by output error.
@@ -62,15 +60,10 @@ def identify(
         Logs that are not fitted but predicted, given as `logs`.
     fixed
         Parameters that are not estimated, by name, in their own units.
-    vessel
-        Gives the ship's length, the parameters alpha1, alpha2 and alpha3 of the rudder, and the
-        steering gear; if None, the vessel file that the logs carry. It may have any of these.
-    sources
-        The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
-    length
-        The ship's length, m, in place of the vessel's.
-    strict
-        Refuse a log whose channels contradict each other in unit or sign.
+    options
+        The vessel, the ship's length, the sources of channels, and whether contradictions are
+        refused. The vessel gives the length, the parameters alpha1, alpha2 and alpha3 of the
+        rudder, and the steering gear, or any of these; by default the one that the logs carry.
     on_progress
         Given each step and the share of the whole work that is done.
 
@@ -103,8 +96,8 @@ def identify(
         require_two_runs(len(to_fit))
     steps = _Steps(on_progress, auto=model == AUTO)
     steps.begin("read")
-    runs, held_out = distinct_runs(to_fit, to_predict, sources, vessel, strict=strict)
-    ship = with_length(common_vessel([*runs, *held_out], vessel), length)
+    runs, held_out = distinct_runs(to_fit, to_predict, options)
+    ship = with_length(common_vessel([*runs, *held_out], options.vessel), options.length)
     steps.begin("fit")
     with naming_contradictions([text for run in runs for text in run.contradictions]):
         candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)

@@ -1,6 +1,6 @@
 """Logs as a fit takes them: resampled, split at input gaps, checked for one common ship."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -13,6 +13,7 @@ from analysis.replay.channel_warnings import (
     end_warnings,
     late_channel_warnings,
 )
+from analysis.replay.reading_options import DEFAULT_OPTIONS, ReadingOptions
 from shiplog.checks.channel_stats import ChannelStats, gap_threshold_secs
 from shiplog.checks.consistency.consistency_check import consistency_findings
 from shiplog.checks.consistency.findings import (
@@ -71,25 +72,16 @@ class Run:
     contradictions: tuple[str, ...] = ()
 
 
-def run_from_log(
-    log: Log,
-    sources: Mapping[str, str] | None = None,
-    given: Vessel | None = None,
-    *,
-    strict: bool = False,
-) -> Run:
+def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     """Resample a log, split it into segments and check its data.
 
     Parameters
     ----------
     log
         A log with `REQUIRED_CHANNELS`; `OPTIONAL_CHANNELS` and positions are used if present.
-    sources
-        The source to use, by the name of a channel that has several.
-    given
-        The vessel, whose steering gear follows an order of the rudder; by default that of the log.
-    strict
-        Refuse a log whose channels contradict each other in unit or sign.
+    options
+        Of these the sources of channels, whether contradictions are refused, and the vessel, whose
+        steering gear follows an order of the rudder; by default that of the log.
 
     Returns
     -------
@@ -106,16 +98,16 @@ def run_from_log(
         REQUIRED_CHANNELS,
         (*OPTIONAL_CHANNELS, "position"),
         purpose="an identification",
-        sources=sources,
+        sources=options.sources,
     )
     stats = screened.screening.stats
     toml = log.vessel_toml
     vessel = parse_vessel(toml, f"vessel.toml in {log.name}") if toml is not None else None
-    gear = given or vessel or Vessel("", None)
+    gear = options.vessel or vessel or Vessel("", None)
     clock = choose_clock(screened, stats, None, REQUIRED_CHANNELS, OPTIONAL_CHANNELS)
     clock = with_steering_gear(clock, gear.rudder_rate)
     findings = consistency_findings(screened, stats)
-    if strict:
+    if options.strict:
         refuse_contradictions(findings)
     contradictions = tuple(f.text for f in findings if f.kind in CONTRADICTIONS)
     signals = concatenate_signals(resample_chunks(screened.chunks(), clock))
@@ -142,12 +134,7 @@ def run_from_log(
 
 
 def distinct_runs(
-    logs: Sequence[Log],
-    held_out: Sequence[Log],
-    sources: Mapping[str, str] | None = None,
-    given: Vessel | None = None,
-    *,
-    strict: bool = False,
+    logs: Sequence[Log], held_out: Sequence[Log], options: ReadingOptions
 ) -> tuple[list[Run], list[Run]]:
     """Prepare logs for fitting and for validation, each with a unique name.
 
@@ -157,12 +144,8 @@ def distinct_runs(
         The logs to fit.
     held_out
         The logs to predict.
-    sources
-        The source to use, by the name of a channel that has several, in each log that has it.
-    given
-        The vessel file named by the user.
-    strict
-        Refuse a log whose channels contradict each other in unit or sign.
+    options
+        As in `run_from_log`, for each log.
 
     Returns
     -------
@@ -176,7 +159,7 @@ def distinct_runs(
     """
     runs: list[Run] = []
     for log in (*logs, *held_out):
-        run = run_from_log(log, sources, given, strict=strict)
+        run = run_from_log(log, options)
         for other in runs:
             if _same_data(run, other):
                 raise UsageError(

@@ -83,7 +83,7 @@ class SecondPass:
 
 
 def first_pass(
-    log: Log, vessel: Vessel, sources: Mapping[str, str] | None, on_progress: ProgressCallback
+    log: Log, vessel: Vessel, sources: Mapping[str, str], on_progress: ProgressCallback
 ) -> FirstPass:
     """Screen a log and define the clock of its replay.
 

@@ -30,6 +30,7 @@ from shiplog.vessel.vessel import with_length, with_settings
 from shiplog.vessel.vessel_parser import parse_vessel
 
 from .passes import FirstPass, SecondPass, first_pass, second_pass
+from .reading_options import DEFAULT_OPTIONS, ReadingOptions
 
 GIVEN_MODEL = "given"
 ATTACHED_MODEL = "attached to the log"
@@ -100,13 +101,10 @@ class Plan:
 
 def plan_replay(
     log: Log,
-    vessel: Vessel | None = None,
+    options: ReadingOptions = DEFAULT_OPTIONS,
     *,
     filter: FilterKind | str | None = None,  # noqa: A002 - as on the command line
     settings: Mapping[str, object] | None = None,
-    sources: Mapping[str, str] | None = None,
-    length: float | None = None,
-    strict: bool = False,
     on_progress: ProgressCallback = no_progress,
 ) -> Plan:
     """Make the plan of a replay, from two passes over the log.
@@ -115,21 +113,10 @@ def plan_replay(
     ----------
     log
         The log; one longer than memory is read in chunks.
-    vessel
-        The vessel; by default the one that the log carries, or else a first model is fitted to the
-        log.
-    filter
-        The filter, or its name; by default the one that the settings or the vessel name.
-    settings
-        Settings that take precedence over the vessel's, such as ``{"filter.gate": 4.0}``.
-    sources
-        The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
-    length
-        The ship's length, m, in place of the vessel's.
-    strict
-        Refuse a log whose channels contradict each other in unit or sign.
-    on_progress
-        Called with each step and its share done.
+    options
+        As in `analyse`.
+    filter, settings, on_progress
+        As in `analyse`.
 
     Returns
     -------
@@ -143,11 +130,11 @@ def plan_replay(
     UsageError
         Where a setting is invalid.
     """
-    vessel, origin = _stated_vessel(log, vessel, settings or {})
-    vessel = with_length(vessel, length) or vessel
+    vessel, origin = _stated_vessel(log, options.vessel, settings or {})
+    vessel = with_length(vessel, options.length) or vessel
     vessel, kind = _with_filter(vessel, filter)
-    first = first_pass(log, vessel, sources, on_progress)
-    second = second_pass(first, vessel, on_progress, strict=strict)
+    first = first_pass(log, vessel, options.sources, on_progress)
+    second = second_pass(first, vessel, on_progress, strict=options.strict)
     on_progress("choose the model", 0.0)
     with naming_contradictions(second.contradictions):
         return _plan(vessel, origin, kind, first, second)

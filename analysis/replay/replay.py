@@ -13,7 +13,7 @@ from analysis.filters.factory import smoothable
 from analysis.filters.smoother import Adjoint, SmoothingPass
 from analysis.signals.concat import concatenate
 from analysis.signals.hold import InputHold, held_throughout
-from shiplog import Vessel, open_log
+from shiplog import open_log
 from shiplog.checks.consistency.findings import naming_contradictions
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.screening import ScreenedLog
@@ -22,6 +22,7 @@ from shiplog.types import Log
 from .estimator_design import make_estimators
 from .passes import resampled_chunks
 from .plan import Plan, plan_replay
+from .reading_options import DEFAULT_OPTIONS, ReadingOptions
 from .replay_results import Analysis, Findings, ReplayChunk
 from .stages import Stages
 
@@ -31,12 +32,10 @@ PROGRESS_STEPS = ("check the log", "resample", "choose the model", "smooth", "re
 
 def analyse(
     log: Log | str | os.PathLike[str],
-    vessel: Vessel | None = None,
+    options: ReadingOptions = DEFAULT_OPTIONS,
     *,
     filter: FilterKind | str | None = None,  # noqa: A002 - as on the command line
     settings: Mapping[str, object] | None = None,
-    sources: Mapping[str, str] | None = None,
-    length: float | None = None,
     on_progress: ProgressCallback = no_progress,
 ) -> Analysis:
     """Replay a log: filter it, estimate disturbances and coefficients, test the residuals.
@@ -47,17 +46,14 @@ def analyse(
     ----------
     log
         A log, or the path of one.
-    vessel
-        The vessel; by default the one that the log carries, or else a first model is fitted to the
-        log.
+    options
+        The vessel, the ship's length, the sources of channels, and whether contradictions are
+        refused; by default all that the log states holds, and without a vessel a first model is
+        fitted to it.
     filter
         The filter, or its name; by default the one that the settings or the vessel name.
     settings
         Settings that take precedence over the vessel's, such as ``{"filter.gate": 4.0}``.
-    sources
-        The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``.
-    length
-        The ship's length, m, in place of the vessel's.
     on_progress
         Called with each of `PROGRESS_STEPS` and its share done.
 
@@ -78,15 +74,7 @@ def analyse(
     """
     if isinstance(log, str | os.PathLike):
         log = open_log(log)
-    plan = plan_replay(
-        log,
-        vessel,
-        filter=filter,
-        settings=settings,
-        sources=sources,
-        length=length,
-        on_progress=on_progress,
-    )
+    plan = plan_replay(log, options, filter=filter, settings=settings, on_progress=on_progress)
     replay = Replay(log, plan, on_progress=on_progress)
     whole = concatenate(list(replay.chunks()))
     return Analysis(

@@ -24,13 +24,14 @@ g = -0.05
 h = 0.05
 """
 IN_PYTHON = """
-from analysis import identify
+from analysis import ReadingOptions, identify
 from quadratic_nomoto import QUADRATIC
 from shiplog import load_vessel, open_log
 from shiplog.ships import ship_model
 
 assert ship_model("quadratic") is QUADRATIC
-ship = identify([open_log("run.mcap")], model=QUADRATIC, vessel=load_vessel("ship.toml")[0])
+options = ReadingOptions(load_vessel("ship.toml")[0])
+ship = identify([open_log("run.mcap")], model=QUADRATIC, options=options)
 print(ship.model.name, *(round(value, 1) for value in ship.parameters.values()))
 """
 TRUTH = {"a": -0.5, "a2": -1.5, "k": 0.5, "f": -0.5, "g": -0.05, "h": 0.05}

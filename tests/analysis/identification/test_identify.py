@@ -19,6 +19,7 @@ from analysis.identification.model_selection import rank_models
 from analysis.identification.prediction import predict
 from analysis.identification.runs import run_from_log
 from analysis.identification.vessel_file import vessel_toml
+from analysis.replay.reading_options import ReadingOptions
 from analysis.report.identification_json import identification_json
 from analysis.report.identification_tables import identification_tables
 from recorders.simulated.sensors import suite
@@ -131,7 +132,7 @@ def test_ties_are_consistent_with_data_of_a_tied_ship_and_contradicted_by_others
     untied = parse_vessel(TOML, "x")
     untied = replace(untied, coefficients=untied.coefficients._replace(b1=-2.6e-4))
     trial = simulate(untied, "zigzag-20-20", duration_secs=500.0, sensors=suite("white"))
-    contradicted = identify([as_log(trial)], "burylin-tied", vessel=VESSEL).ties
+    contradicted = identify([as_log(trial)], "burylin-tied", options=ReadingOptions(VESSEL)).ties
     assert contradicted is not None
     assert "contradicted by the data" in contradicted.advice(tied=False)
     assert identify([a_log()], "nomoto").ties is None
@@ -216,7 +217,7 @@ def test_logs_that_carry_different_ships_are_rejected() -> None:
 
 def test_logs_of_different_ships_under_one_vessel_file_give_a_warning() -> None:
     other = TOML.replace("T1 = 150.0", "T1 = 90.0").replace("T2 = 50.0", "T2 = 40.0")
-    mixed = identify([a_log(), a_log(toml=other)], vessel=VESSEL)
+    mixed = identify([a_log(), a_log(toml=other)], options=ReadingOptions(VESSEL))
     assert any("another ship" in warning for warning in mixed.warnings)
     log = a_log()
     speed = log["speed"]

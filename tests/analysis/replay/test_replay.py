@@ -13,6 +13,7 @@ from trial_logs import InChunks, as_log
 from analysis.regression.weak_form import weak_form
 from analysis.replay.passes import REQUIRED_CHANNELS
 from analysis.replay.plan import FITTED_MODEL, Plan, plan_replay
+from analysis.replay.reading_options import ReadingOptions
 from analysis.replay.replay import PROGRESS_STEPS, Replay, analyse
 from analysis.replay.replay_results import Analysis
 from analysis.report.replay_tables import replay_markdown
@@ -51,7 +52,7 @@ def test_a_vessel_given_takes_precedence_over_the_attached_one(
     zigzag_log: TrialLog, vessel: Vessel
 ) -> None:
     other = replace(vessel, name="another")
-    assert analyse(zigzag_log, other).findings.plan.vessel is other
+    assert analyse(zigzag_log, ReadingOptions(other)).findings.plan.vessel is other
 
 
 def test_without_a_model_a_first_one_is_fitted(zigzag_log: TrialLog) -> None:
@@ -153,7 +154,7 @@ def test_a_vessel_with_faults_in_the_log_is_refused_with_all_of_them(zigzag_log:
 def test_a_divergent_model_is_refused(zigzag_log: TrialLog, vessel: Vessel) -> None:
     wild = replace(vessel, coefficients=vessel.coefficients._replace(b3=1e9, b1=10.0))
     with pytest.raises(LogError, match="diverges"):
-        analyse(zigzag_log, wild)
+        analyse(zigzag_log, ReadingOptions(wild))
 
 
 def test_channels_of_other_rates_with_jitter_are_replayed(vessel: Vessel) -> None:
@@ -164,7 +165,7 @@ def test_channels_of_other_rates_with_jitter_are_replayed(vessel: Vessel) -> Non
         "rpm.rate_hz": 2.0,
     }
     trial = simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=suite("paper", settings))
-    found = analyse(as_log(trial), vessel)
+    found = analyse(as_log(trial), ReadingOptions(vessel))
     offset = (found.signals.start_ns - START_NS) * 1e-9
     truth = trial.trajectory.at(found.signals.time_secs + offset)
     rms = np.sqrt(np.mean((found.estimates.states[:, 0] - truth["yaw_rate"]) ** 2))
@@ -258,7 +259,7 @@ def test_impossible_values_are_removed_and_warned_of(zigzag_log: TrialLog) -> No
 
 def test_a_ship_whose_rudder_does_nothing_replays(zigzag_log: TrialLog, vessel: Vessel) -> None:
     adrift = replace(vessel, coefficients=vessel.coefficients._replace(d=0.0, e=0.0))
-    found = analyse(zigzag_log, adrift)
+    found = analyse(zigzag_log, ReadingOptions(adrift))
     assert np.isnan(found.disturbance.rudder).all()
     page = replay_markdown(found.findings)
     assert "yaw, as rudder angle [deg] |  |" in page
@@ -268,7 +269,7 @@ def test_noise_set_for_one_sample_is_reduced_for_the_mean_of_several(vessel: Ves
     sensors = suite("white", {"speed.rate_hz": 50.0})
     trial = simulate(vessel, "zigzag-20-20", duration_secs=300.0, sensors=sensors)
     stated = replace(vessel.filter, speed_std=0.1, yaw_rate_std=np.radians(0.005))
-    found = analyse(as_log(trial), replace(vessel, filter=stated))
+    found = analyse(as_log(trial), ReadingOptions(replace(vessel, filter=stated)))
     assert found.findings.residuals[1].mean_nis == pytest.approx(1, abs=0.1)
 
 
@@ -517,7 +518,7 @@ def test_windows_too_short_for_the_coefficients_are_empty_and_warned_of(
 @pytest.mark.parametrize("manoeuvre", ["turning-circle", "zigzag-20-20"])
 def test_ten_seconds_determine_no_coefficient(vessel: Vessel, manoeuvre: str) -> None:
     trial = simulate(vessel, manoeuvre, duration_secs=10.0, sensors=suite("paper"))
-    found = analyse(as_log(trial), vessel)
+    found = analyse(as_log(trial), ReadingOptions(vessel))
     every = found.findings.yaw.coefficients | found.findings.surge.coefficients
     assert not any(coefficient.determined for coefficient in every.values())
     assert "use a longer log" in window_warnings(found)[0]
@@ -544,7 +545,7 @@ def test_a_rudder_at_rest_determines_no_coefficient(vessel: Vessel) -> None:
             if c.name in REQUIRED_CHANNELS
         ),
     )  # fmt: skip
-    found = analyse(log, vessel)
+    found = analyse(log, ReadingOptions(vessel))
     every = found.findings.yaw.coefficients | found.findings.surge.coefficients
     assert not any(coefficient.determined for coefficient in every.values())
     assert found.findings.changes == ()

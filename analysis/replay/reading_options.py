@@ -1,0 +1,41 @@
+"""Options of replay and identification about the logs themselves: vessel, sources, strictness."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from shiplog.vessel.vessel import Vessel
+
+
+@dataclass(frozen=True)
+class ReadingOptions:
+    """How logs are read: by default, all that they state holds.
+
+    A part of a log is read with ``shiplog.open_log(path, 120, -30)`` or ``log.between(120, -30)``.
+
+    Attributes
+    ----------
+    vessel
+        The vessel, in place of the one that the logs carry.
+    length
+        The ship's length, m, in place of the vessel's.
+    sources
+        The source of a channel that has several, by its name, such as ``{"yaw_rate": "TI"}``; by
+        default it is chosen by comparing them.
+    strict
+        Refuse a log whose channels contradict each other in unit or sign, instead of a warning.
+
+    Examples
+    --------
+    >>> from analysis import analyse
+    >>> options = ReadingOptions(length=150.0, strict=True)
+    >>> analyse("sample_data/zigzag_20_20.mcap", options).findings.plan.vessel.length
+    150.0
+    """
+
+    vessel: Vessel | None = None
+    length: float | None = None
+    sources: Mapping[str, str] = field(default_factory=dict)
+    strict: bool = False
+
+
+DEFAULT_OPTIONS = ReadingOptions()
