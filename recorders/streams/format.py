@@ -20,6 +20,23 @@ def _no_options(parser: argparse.ArgumentParser) -> None:
 
 
 @dataclass(frozen=True)
+class OpenedFile:
+    """The lines of a file with their times, and the decoder for them.
+
+    Attributes
+    ----------
+    batches
+        The lines, each with its time of reception.
+    decoder
+        Decodes them. Its counts have the lines that were rejected for want of a time, and the
+        warnings about the times are among its events.
+    """
+
+    batches: Batches
+    decoder: Decoder
+
+
+@dataclass(frozen=True)
 class StreamFormat:
     """A format of packets, such as NMEA 0183.
 
@@ -35,12 +52,12 @@ class StreamFormat:
     help
         One line for the list of sources.
     make_decoder
-        Makes a decoder, given the parsed options. It decodes packets that have a time of reception,
-        from a live transport, a file, or a raw topic.
-    add_times
-        Gives the lines of a file their times of reception, from the text before each, or from its
-        content; a stage that takes and yields batches. Raises a `ShiplogError` that states what is
-        missing where there are none. The text before each payload is removed.
+        Makes a decoder of packets that have a time of reception, from a live transport or a raw
+        topic, given the parsed options.
+    open_file
+        Gives the lines of a file, which have no time (`NO_TIME`), their times of reception, from
+        the text before each or from their content, and makes their decoder. Raises a
+        `ShiplogError` that states what is missing, or the batches do, where there are no times.
     configure
         Adds the format's own options to a parser. A trial file has the same options as keys.
     open_transport
@@ -51,7 +68,7 @@ class StreamFormat:
     name: str
     help: str
     make_decoder: Callable[[argparse.Namespace], Decoder]
-    add_times: Callable[[Batches, argparse.Namespace], Batches]
+    open_file: Callable[[Batches, argparse.Namespace], OpenedFile]
     configure: Callable[[argparse.ArgumentParser], None] = _no_options
     open_transport: "Callable[[str, ReceptionClock], Transport | None]" = lambda _address, _clock: (
         None
