@@ -383,7 +383,8 @@ REPLAY = Verb(
         "shiplog replay trial.mcap --vessel my_ship.toml -o run.rrd --json run.json",
         "shiplog replay trial.mcap --filter extended --smooth --set filter.process_ratio=auto",
     ),
-    unneeded=("pandas",),  # pyarrow imports it to recognise data frames; rerun passes it none
+    # pyarrow imports pandas to recognise data frames; scipy imports all names of numpy
+    unneeded=("pandas", "numpy.f2py"),
 )
 IDENTIFY = Verb(
     "fit a ship model to logs, with intervals, and validate it on others",

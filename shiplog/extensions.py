@@ -1,5 +1,7 @@
 """Objects that installed packages add to shiplog by entry point."""
 
+import sys
+from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,6 +13,23 @@ from .units import did_you_mean
 T = TypeVar("T")
 
 
+def declared_entries(group: str) -> tuple[EntryPoint, ...]:
+    """List the entry points that installed packages declare in a group, importing none.
+
+    The metadata of the packages are read once, and anew where a package was installed since.
+    """
+    folders = (Path(place) for place in sys.path)
+    stamps = tuple((str(path), path.stat().st_mtime_ns) for path in folders if path.is_dir())
+    return _entries_by_group(stamps).get(group, ())
+
+
+@lru_cache(maxsize=1)
+def _entries_by_group(_: tuple[tuple[str, int], ...], /) -> dict[str, tuple[EntryPoint, ...]]:
+    """Read the entry points, given the folders of packages and when these changed last."""
+    found = entry_points()
+    return {group: tuple(found.select(group=group)) for group in found.groups}
+
+
 def extension_names(group: str) -> tuple[str, ...]:
     """List the names of a group of entry points, in alphabetical order, without importing any.
 
@@ -19,7 +38,7 @@ def extension_names(group: str) -> tuple[str, ...]:
     >>> extension_names("shiplog.recorders")
     ('simulate',)
     """
-    return tuple(sorted({entry.name for entry in entry_points(group=group)}))
+    return tuple(sorted({entry.name for entry in declared_entries(group)}))
 
 
 def extension_sources(group: str) -> list[Path]:
@@ -28,7 +47,7 @@ def extension_sources(group: str) -> list[Path]:
     Of each package these are all files below its top-level module.
     """
     files: set[Path] = set()
-    for module in {entry.module.partition(".")[0] for entry in entry_points(group=group)}:
+    for module in {entry.module.partition(".")[0] for entry in declared_entries(group)}:
         spec = find_spec(module)
         folders = list((spec and spec.submodule_search_locations) or ())
         files |= {file for folder in folders for file in Path(folder).rglob("*.py")}
@@ -78,7 +97,7 @@ def load_extension(group: str, name: str, kind: type[T], noun: str) -> T:
 
 
 def _entry(group: str, name: str, noun: str) -> EntryPoint:
-    entries = list(entry_points(group=group, name=name))
+    entries = [entry for entry in declared_entries(group) if entry.name == name]
     if not entries:
         names = extension_names(group)
         known = f"installed: {', '.join(names)}" if names else "none is installed: pip install -e ."

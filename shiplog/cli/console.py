@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from shiplog.files import atomic_write
-from shiplog.progress import ProgressCallback
+from shiplog.progress import ProgressCallback, no_progress
 from shiplog.text_table import TextTable
 
 MIN_NAME_WIDTH = 12  # characters of a shortened cell in the first column
@@ -31,32 +31,49 @@ def progress(compiles: str | None = None, *, lines: bool = False) -> Iterator[Pr
     lines
         Whether to print a line for each step of a known share where stderr is no terminal.
     """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    console, note = Console(stderr=True), ""
+    note = ""
     if compiles:
         from shiplog.compiled import is_compiled
 
         note = "" if is_compiled(compiles) else " (first run: compiling the loops, once)"
+    if sys.stderr.isatty():
+        with _progress_bar(note) as on_progress:
+            yield on_progress
+    else:
+        yield _progress_lines(note) if lines else no_progress
+
+
+@contextmanager
+def _progress_bar(note: str) -> Iterator[ProgressCallback]:
+    """Show the progress as a bar that is removed at the end, with the note after each step."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
     bar_columns = (SpinnerColumn(), BarColumn(bar_width=24), TimeElapsedColumn())
     columns = (*bar_columns, TextColumn("{task.description}"))
-    start, reported, on_terminal = time.monotonic(), set[str](), console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=not on_terminal) as bar:
+    start = time.monotonic()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
 
         def on_progress(step: str, share: float | None = None, /) -> None:
-            remaining = _remaining(time.monotonic() - start, share)
-            if on_terminal:
-                total = None if share is None else 1.0
-                text = f"{step}{note}{remaining}"
-                bar.update(task, description=text, total=total, completed=share or 0.0)
-            elif lines and share is not None and step not in reported:
-                text = f"{step}{remaining}{'' if reported else note}"
-                print(text, file=sys.stderr, flush=True)
-                reported.add(step)
+            text = f"{step}{note}{_remaining(time.monotonic() - start, share)}"
+            total = None if share is None else 1.0
+            bar.update(task, description=text, total=total, completed=share or 0.0)
 
         yield on_progress
+
+
+def _progress_lines(note: str) -> ProgressCallback:
+    """Return a callback that prints each step of a known share once, the first with the note."""
+    start, reported = time.monotonic(), set[str]()
+
+    def on_progress(step: str, share: float | None = None, /) -> None:
+        if share is not None and step not in reported:
+            text = f"{step}{_remaining(time.monotonic() - start, share)}"
+            print(text if reported else text + note, file=sys.stderr, flush=True)
+            reported.add(step)
+
+    return on_progress
 
 
 def _remaining(elapsed_secs: float, share: float | None) -> str:

@@ -7,14 +7,14 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from importlib.abc import MetaPathFinder
-from importlib.metadata import entry_points
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
 from shiplog.errors import ShiplogError, UsageError
-from shiplog.extensions import extension_names, load_extension
+from shiplog.extensions import declared_entries, extension_names, load_extension
 from shiplog.version import __version__
 
 from .verb import ExitCode, Verb
@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return ExitCode.USAGE
         verb: Verb = parsed.verb
         if is_process:
-            _block(verb.unneeded)
+            sys.meta_path.insert(0, _UnneededModules(verb.unneeded))
         code = verb.run(parsed)
         sys.stdout.flush()
     except UsageError as error:
@@ -63,10 +63,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
-class _BlockedModules(MetaPathFinder):
-    """Refuses to find some modules, as where they are not installed.
+class _EmptyModule(Loader):
+    """Makes a module with nothing in it."""
 
-    None in `sys.modules` would not do: libraries compiled by Cython take it for the module.
+    def exec_module(self, module: ModuleType) -> None:
+        """Execute nothing."""
+
+
+class _UnneededModules(MetaPathFinder):
+    """Finds none of the unneeded packages, and of the unneeded parts of packages empty ones.
+
+    A package is missing as where it is not installed. A part such as ``numpy.f2py`` is installed
+    with its package, which relies on it. None in `sys.modules` would not do for either: libraries
+    compiled by Cython take it for the module.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -74,15 +83,13 @@ class _BlockedModules(MetaPathFinder):
 
     def find_spec(
         self, fullname: str, _path: Sequence[str] | None, _target: ModuleType | None = None, /
-    ) -> None:
-        """Raise `ModuleNotFoundError` for a blocked module; leave all others to other finders."""
-        if fullname in self._names:
-            raise ModuleNotFoundError(f"No module named {fullname!r}", name=fullname)
-
-
-def _block(modules: Sequence[str]) -> None:
-    """Make an import of these modules fail, as where they are not installed."""
-    sys.meta_path.insert(0, _BlockedModules(modules))
+    ) -> ModuleSpec | None:
+        """Return the empty part, raise `ModuleNotFoundError`, or leave it to other finders."""
+        if fullname not in self._names:
+            return None
+        if "." in fullname:
+            return ModuleSpec(fullname, _EmptyModule())
+        raise ModuleNotFoundError(f"No module named {fullname!r}", name=fullname)
 
 
 def _fail(error: object, code: ExitCode) -> ExitCode:
@@ -129,8 +136,9 @@ def _verb_names() -> list[str]:
 
 def _load(name: str) -> Verb:
     """Import a verb; raises `ShiplogError` that names the package where that fails."""
-    for entry in entry_points(group=GROUP, name=name):
-        _require_not_shadowed(entry.module.partition(".")[0])
+    for entry in declared_entries(GROUP):
+        if entry.name == name:
+            _require_not_shadowed(entry.module.partition(".")[0])
     return load_extension(GROUP, name, Verb, "verb")
 
 

@@ -35,9 +35,9 @@ class Verb:
     examples
         Command lines for the end of the help text, one a line.
     unneeded
-        Modules that libraries import only where they are installed, that this verb does not need
-        and whose import takes longer than its work. The process of the command does not import
-        them.
+        Modules that libraries import although this verb does not need them, and whose import takes
+        long. In the process of the command, a package is not found, as where it is not installed;
+        a part of a package, with a dot in its name, is empty.
     """
 
     help: str

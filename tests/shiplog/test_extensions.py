@@ -1,11 +1,12 @@
 """Objects that packages add by entry point: found by name, reported in one line where broken."""
 
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
 from extensions import declare
 
-from shiplog import ShiplogError, UsageError
+from shiplog import ShiplogError, UsageError, extensions
 from shiplog.extensions import extension_names, extension_sources, load_extension
 
 GROUP = "shiplog.for_tests"
@@ -32,6 +33,20 @@ def test_names_are_listed_without_importing_anything(packages: Path) -> None:
     declare(packages, "broken", GROUP, zulu="broken_module:A", alpha="no_such_module:B")
     assert extension_names(GROUP) == ("alpha", "zulu")
     assert extension_names("shiplog.nothing") == ()
+
+
+def test_the_metadata_of_packages_are_read_once_and_again_where_one_was_installed(
+    packages: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scans = []
+    monkeypatch.setattr(extensions, "entry_points", lambda: scans.append(0) or entry_points())
+    declare(packages, "one", GROUP, alpha="sound_module:PLACE")
+    for _ in range(3):
+        assert extension_names(GROUP) == ("alpha",)
+    assert len(scans) == 1
+    declare(packages, "other", GROUP, zulu="sound_module:PLACE")
+    assert extension_names(GROUP) == ("alpha", "zulu")
+    assert len(scans) == 2
 
 
 def test_an_object_is_found_by_its_name(packages: Path) -> None:

@@ -1,6 +1,8 @@
 """Printed tables fit the console without breaking a word or a number."""
 
 import re
+import sys
+from io import StringIO
 
 import pytest
 
@@ -69,6 +71,17 @@ def test_without_a_terminal_each_step_is_a_line_where_it_is_asked_for(
     with progress() as on_progress:
         on_progress("read")
     assert capsys.readouterr().err == ""
+
+
+def test_on_a_terminal_the_step_stands_beside_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = StringIO()
+    monkeypatch.setattr(stream, "isatty", lambda: True)
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress() as on_progress:
+        on_progress("model 1 of 7", 0.5)
+    assert "model 1 of 7" in stream.getvalue()
+    assert stream.getvalue().endswith("\x1b[2K")  # the bar is removed
 
 
 def test_the_remaining_time_follows_from_the_share_that_is_done(
