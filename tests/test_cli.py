@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fitted_runs import identify_auto
+from mcap_files import end_mcap_chunk
 from places import KVLCC2, LAYOUTS, PROJECT, SAMPLE_DATA
 
 from recorders.record import record
@@ -177,7 +178,7 @@ def test_a_damaged_log_is_replayed_and_lost_data_are_reported(
                     for c in chunk
                 )
             )  # fmt: skip
-            writer.flush()
+            end_mcap_chunk(writer)
     writer.close()
     data = bytearray(Path("bad.mcap").read_bytes())
     data[len(data) // 2] ^= 0x10

@@ -5,6 +5,7 @@ Others are kept as bytes, to be decoded one by one.
 """
 
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 
@@ -27,7 +28,16 @@ from .locate import (
     record_sizes,
 )
 from .records import MESSAGE_HEAD, RECORD_HEAD
-from .schema import METADATA_NAME, VESSEL_ATTACHMENT, Schema, schema_named
+from .schema import (
+    ENCODING,
+    EVENT,
+    EVENTS_TOPIC,
+    METADATA_NAME,
+    RAW,
+    VESSEL_ATTACHMENT,
+    Schema,
+    schema_named,
+)
 
 MALFORMED = (  # what the decoders raise on damaged bytes; the exceptions have no common base
     McapError, zstandard.ZstdError, struct.error,
@@ -222,12 +232,31 @@ def read_record(opcode: int, content: bytes, contents: McapContents) -> None:
         contents.damage.append(f"skipped a damaged record: {error}")
 
 
-def schema_of(channel: records.Channel, schemas: dict[int, records.Schema]) -> Schema | None:
-    """Return shiplog's schema for a channel's messages; None for messages of other programs."""
-    if channel.message_encoding != "protobuf":
-        return None
+def schema_of(channel: records.Channel, schemas: Mapping[int, records.Schema]) -> Schema | None:
+    """Return the schema of a channel's samples; None where its messages are none."""
+    return schema_named(_schema_name(channel, schemas))
+
+
+def is_raw(channel: records.Channel, schemas: Mapping[int, records.Schema]) -> bool:
+    """Whether a channel's messages are raw packets."""
+    return _schema_name(channel, schemas) == RAW.name
+
+
+def is_events(channel: records.Channel, schemas: Mapping[int, records.Schema]) -> bool:
+    """Whether a channel's messages are the events of the log, not log messages of a program."""
+    return channel.topic == EVENTS_TOPIC and _schema_name(channel, schemas) == EVENT.name
+
+
+def is_foreign(channel: records.Channel, schemas: Mapping[int, records.Schema]) -> bool:
+    """Whether shiplog cannot read a channel's messages."""
+    ours = is_raw(channel, schemas) or is_events(channel, schemas)
+    return not ours and schema_of(channel, schemas) is None
+
+
+def _schema_name(channel: records.Channel, schemas: Mapping[int, records.Schema]) -> str:
+    """Return the name of the protobuf schema of a channel; empty for other encodings."""
     schema = schemas.get(channel.schema_id)
-    return schema_named(schema.name) if schema else None
+    return schema.name if schema and channel.message_encoding == ENCODING else ""
 
 
 def _read_record(opcode: int, stream: ReadDataStream, contents: McapContents) -> None:

@@ -20,6 +20,7 @@ from .serialised import SerialisedMessages
 
 Bytes = NDArray[np.uint8]
 
+MAX_MCAP_CHUNK_BYTES = 1 << 20  # before compression
 MESSAGES_AT_ONCE = 1 << 16  # about some MCAP chunks, so that the CPU cache holds them
 
 

@@ -7,18 +7,19 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import mcap
+import numpy as np
 import zstandard
 from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
+from numpy.typing import NDArray
 
 from shiplog.files import write_error
 from shiplog.version import __version__
 
 from .encode import McapChunk
-from .records import INDEX_HEAD, MAGIC, MCAP_CHUNK_HEAD, RECORD_HEAD
-
-_COMPRESSION = b"zstd"
+from .open_chunk import COMPRESSION, OpenMcapChunk, mcap_chunk_head
+from .records import INDEX_HEAD, MAGIC, RECORD_HEAD
 
 
 class McapRecordWriter:
@@ -47,6 +48,7 @@ class McapRecordWriter:
         self._mcap_chunk_indexes: list[records.ChunkIndex] = []
         self._metadata_indexes: list[records.MetadataIndex] = []
         self._attachment_indexes: list[records.AttachmentIndex] = []
+        self._open: OpenMcapChunk | None = None
         self._compressor = zstandard.ZstdCompressor()
         self._append(MAGIC)
         library = f"shiplog {__version__} mcap {mcap.__version__}"
@@ -63,6 +65,7 @@ class McapRecordWriter:
 
     def write_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
         """Append a metadata record."""
+        self.close_mcap_chunk()
         data = _record_bytes(records.Metadata(name=name, metadata=dict(metadata)))
         index = records.MetadataIndex(offset=self._size, length=len(data), name=name)
         self._metadata_indexes.append(index)
@@ -70,6 +73,7 @@ class McapRecordWriter:
 
     def write_attachment(self, name: str, media_type: str, content: bytes) -> None:
         """Append an attachment, without times, so that the same log gives the same bytes."""
+        self.close_mcap_chunk()
         data = _record_bytes(
             records.Attachment(
                 create_time=0, log_time=0, name=name, media_type=media_type, data=content
@@ -99,37 +103,53 @@ class McapRecordWriter:
         self._undescribed.append(channel)
 
     def write_mcap_chunk(self, mcap_chunk: McapChunk) -> None:
-        """Append an MCAP chunk and its message indexes."""
+        """Append a complete MCAP chunk and its message indexes."""
+        self.close_mcap_chunk()
         descriptions = self._take_descriptions()
-        size = len(descriptions) + len(mcap_chunk.data)
         data = descriptions + mcap_chunk.data.tobytes() if descriptions else mcap_chunk.data.data
         compressed = self._compressor.compress(data)
-        start = self._size
-        head = MCAP_CHUNK_HEAD.pack(
-            mcap_chunk.first_ns, mcap_chunk.last_ns, size, zlib.crc32(data), len(_COMPRESSION)
+        head = mcap_chunk_head(
+            mcap_chunk.first_ns, mcap_chunk.last_ns, len(data), zlib.crc32(data), len(compressed)
         )
-        head += _COMPRESSION + struct.pack("<Q", len(compressed))
+        start = self._size
         self._append(RECORD_HEAD.pack(Opcode.CHUNK, len(head) + len(compressed)) + head)
         self._append(compressed)
-        length, index_offsets = self._size - start, {}
-        for channel_id, entries in mcap_chunk.index.items():
+        for entries in mcap_chunk.index.values():
             entries["offset"] += len(descriptions)
-            index_offsets[channel_id] = self._size
-            self._append(RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, INDEX_HEAD.size + entries.nbytes))
-            self._append(INDEX_HEAD.pack(channel_id, entries.nbytes) + entries.tobytes())
-        self._mcap_chunk_indexes.append(
-            records.ChunkIndex(
-                chunk_length=length,
-                chunk_start_offset=start,
-                compression=_COMPRESSION.decode(),
-                compressed_size=len(compressed),
-                message_end_time=mcap_chunk.last_ns,
-                message_index_length=self._size - start - length,
-                message_index_offsets=index_offsets,
-                message_start_time=mcap_chunk.first_ns,
-                uncompressed_size=size,
-            )
-        )
+        span = mcap_chunk.first_ns, mcap_chunk.last_ns
+        self._write_indexes(start, span, (len(data), len(compressed)), mcap_chunk.index)
+
+    def extend_mcap_chunk(self, messages: McapChunk) -> None:
+        """Append messages to an MCAP chunk that stays open for more, until it is large enough.
+
+        After a `flush` they can be read, as those of complete MCAP chunks. A pipe is given complete
+        ones.
+        """
+        if not self._stream.seekable():
+            self.write_mcap_chunk(messages)
+            return
+        if self._undescribed:  # descriptions precede the messages of an MCAP chunk
+            self.close_mcap_chunk()
+        if self._open is None:
+            self._open = OpenMcapChunk(self._size, self._take_descriptions(), messages.first_ns)
+            self._write(self._open.first_bytes())
+        self._write(self._open.append(messages))
+        if self._open.is_full:
+            self.close_mcap_chunk()
+
+    def close_mcap_chunk(self) -> None:
+        """Complete the open MCAP chunk, where there is one, and append its message indexes."""
+        if self._open is None:
+            return
+        mcap_chunk, self._open = self._open, None
+        self._write(mcap_chunk.last_bytes())
+        head, compressed = mcap_chunk.record_parts()
+        self._stream.seek(mcap_chunk.offset)  # after it has handed all data to the system
+        self._stream.write(head)
+        self._stream.seek(0, os.SEEK_END)
+        self._crc = zlib.crc32(compressed, zlib.crc32(head, self._crc))
+        span, sizes = (mcap_chunk.first_ns, mcap_chunk.last_ns), (mcap_chunk.size, len(compressed))
+        self._write_indexes(mcap_chunk.offset, span, sizes, mcap_chunk.index())
 
     def finish(self, message_counts: Mapping[int, int]) -> None:
         """Append the summary, which completes the file; it stays open.
@@ -139,6 +159,7 @@ class McapRecordWriter:
         message_counts
             The number of messages written, by channel id.
         """
+        self.close_mcap_chunk()
         self._append(self._take_descriptions())  # of channels without samples
         self._append(_record_bytes(records.DataEnd(data_section_crc=self._crc)))
         self._write_summary(message_counts)
@@ -148,9 +169,53 @@ class McapRecordWriter:
         self._stream.close()
 
     def _append(self, data: bytes) -> None:
+        """Write bytes that do not change."""
+        self._write(data)
+        self._crc = zlib.crc32(data, self._crc)
+
+    def _write(self, data: bytes) -> None:
+        """Write bytes that are not yet part of the checksum."""
         self._stream.write(data)
         self._size += len(data)
-        self._crc = zlib.crc32(data, self._crc)
+
+    def _write_indexes(
+        self,
+        start: int,
+        span_ns: tuple[int, int],
+        sizes: tuple[int, int],
+        index: Mapping[int, NDArray[np.void]],
+    ) -> None:
+        """Append the message indexes of the MCAP chunk that was written last.
+
+        Parameters
+        ----------
+        start
+            The offset of its record.
+        span_ns
+            Its first and its last time of reception, ns.
+        sizes
+            The sizes of its data before and after compression.
+        index
+            The index entries by channel id.
+        """
+        length, index_offsets = self._size - start, {}
+        for channel_id, entries in index.items():
+            index_offsets[channel_id] = self._size
+            self._append(RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, INDEX_HEAD.size + entries.nbytes))
+            self._append(INDEX_HEAD.pack(channel_id, entries.nbytes) + entries.tobytes())
+        self._mcap_chunk_indexes.append(
+            records.ChunkIndex(
+                chunk_length=length,
+                chunk_start_offset=start,
+                compression=COMPRESSION.decode(),
+                compressed_size=sizes[1],
+                message_end_time=span_ns[1],
+                message_index_length=self._size - start - length,
+                message_index_offsets=index_offsets,
+                message_start_time=span_ns[0],
+                uncompressed_size=sizes[0],
+            )
+        )
 
     def _take_descriptions(self) -> bytes:
         undescribed, self._undescribed = self._undescribed, []

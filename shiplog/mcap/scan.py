@@ -22,6 +22,7 @@ from .decode import (
     read_record,
 )
 from .decompress import mcap_chunk_data, truncated_mcap_chunk_data
+from .locate import complete_records
 from .records import MAGIC, MCAP_CHUNK_HEAD, RECORD_HEAD, crc32_of_range
 
 _MAX_LOOSE_BYTES = 1 << 20  # of messages outside of MCAP chunks that are collected at once
@@ -195,9 +196,18 @@ def _read_truncated_end(reader: _RecordReader, contents: McapContents) -> None:
 
 
 def _read_truncated_mcap_chunk(record: bytes, contents: McapContents) -> None:
-    """Collect the complete messages of an MCAP chunk that is cut off by the end of the file."""
+    """Collect the complete messages of an MCAP chunk that is cut off by the end of the file.
+
+    One that a recorder had left open is not cut off where it ends with a message.
+    """
     head = RECORD_HEAD.size + MCAP_CHUNK_HEAD.size
     if len(record) <= head or record[0] != Opcode.CHUNK:
         return
     content = record[RECORD_HEAD.size :]
-    _collect_mcap_chunk(truncated_mcap_chunk_data(content), content, [], contents)
+    data = truncated_mcap_chunk_data(content)
+    _collect_mcap_chunk(data, content, [], contents)
+    *_, size, _, _ = MCAP_CHUNK_HEAD.unpack_from(content)
+    if size == 0:  # its head was not completed
+        contents.truncated = max((end for *_, end in complete_records(data, 0)), default=0) < len(
+            data
+        )

@@ -18,7 +18,7 @@ from shiplog.types import (
 from shiplog.units import CATALOGUE, conversion_factor
 
 from .clock_repair import MessageColumns, drop_impossible_times, pause_warnings, repair_clock_steps
-from .decode import McapContents, SampleBlock, schema_of
+from .decode import McapContents, SampleBlock, is_foreign, schema_of
 from .schema import FORMAT_VERSION, Schema
 from .unset_times import replace_unset_times
 
@@ -125,7 +125,7 @@ def _warnings(contents: McapContents) -> list[str]:
     foreign = [
         channel.topic
         for _, channel in sorted(contents.channels.items())
-        if schema_of(channel, contents.schemas) is None
+        if is_foreign(channel, contents.schemas)
     ]
     if foreign:
         warnings.append(f"ignored {len(foreign)} topics of other programs: {', '.join(foreign)}")

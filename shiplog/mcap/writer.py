@@ -1,7 +1,7 @@
 """Writing of logs: whole trials, and samples, raw packets and events as they are recorded."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from types import TracebackType
@@ -15,7 +15,7 @@ from shiplog.types import Channel, Event, RawPackets, TrialLog, concatenate_chan
 from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 from shiplog.version import __version__
 
-from .encode import MessageBatch, encode_mcap_chunks
+from .encode import MAX_MCAP_CHUNK_BYTES, McapChunk, MessageBatch, encode_mcap_chunks
 from .record_writer import McapRecordWriter
 from .schema import (
     ENCODING,
@@ -36,15 +36,14 @@ from .serialised import (
     serialise_packets,
 )
 
-MAX_MCAP_CHUNK_BYTES = 1 << 20  # a crash loses at most about as much since the last flush
 _SAMPLE_BYTES = 40  # of a scalar in an MCAP chunk, with its head
 
 
 class LogWriter:
     """An open log to which what is received is appended; `close` makes it a complete file.
 
-    If the process is killed, the file can be read up to the last `flush`. A `LogWriter` is a
-    context manager that closes the log.
+    If the process is killed, the file can be read up to the last `flush`; what was written since,
+    at most about 1 MiB, is lost. A `LogWriter` is a context manager that closes the log.
 
     Parameters
     ----------
@@ -142,7 +141,8 @@ class LogWriter:
             messages = serialise_events(events, self._latest_ns)
             self._append(self._register_events(), messages, _SAMPLE_BYTES * len(events))
         if self._pending_bytes >= MAX_MCAP_CHUNK_BYTES:
-            self._write_pending()
+            for mcap_chunk in self._encode_pending():
+                self._file.write_mcap_chunk(mcap_chunk)
 
     def update_metadata(self, metadata: Mapping[str, str]) -> None:
         """Append the entries of the trial's metadata that are new or have changed.
@@ -156,14 +156,16 @@ class LogWriter:
 
     def flush(self) -> None:
         """Hand all to the operating system, so that a killed process does not lose it."""
-        self._write_pending()
+        for mcap_chunk in self._encode_pending():
+            self._file.extend_mcap_chunk(mcap_chunk)
         self._file.flush()
 
     def close(self) -> None:
         """Write the summary and close the file; a second call has no effect."""
         if not self._file.closed:
             with closing(self._file):
-                self._write_pending()
+                for mcap_chunk in self._encode_pending():
+                    self._file.write_mcap_chunk(mcap_chunk)
                 self._file.finish(self._counts)
 
     def _append(self, channel_id: int, messages: Channel | SerialisedMessages, size: int) -> None:
@@ -221,12 +223,13 @@ class LogWriter:
             self._schema_ids[schema.name] = schema_id
         return self._schema_ids[schema.name]
 
-    def _write_pending(self) -> None:
+    def _encode_pending(self) -> Iterator[McapChunk]:
+        """Yield the messages that are not yet in the file."""
         batches, self._pending = _one_batch_per_channel(self._pending), []
         self._pending_bytes = 0
         if batches:
             for mcap_chunk in encode_mcap_chunks(batches, MAX_MCAP_CHUNK_BYTES):
-                self._file.write_mcap_chunk(mcap_chunk)
+                yield mcap_chunk
                 self._latest_ns = max(self._latest_ns, mcap_chunk.last_ns)
 
 

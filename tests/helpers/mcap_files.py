@@ -139,13 +139,20 @@ def mcap_chunk_ranges(data: bytes) -> list[tuple[int, int]]:
     return [(start, end) for opcode, start, end in file_records(data) if opcode == Opcode.CHUNK]
 
 
+def end_mcap_chunk(writer: LogWriter) -> None:
+    """Let the MCAP chunk in the file end here, which a flush leaves open for more."""
+    writer.flush()
+    writer._file.close_mcap_chunk()
+    writer.flush()
+
+
 def write_flushed(path: Path, chunks: int = 5, count: int = 100) -> tuple[TrialLog, bytes]:
     """Write a log in many MCAP chunks; return it and the bytes of its file."""
     whole = [channel("yaw_rate", chunks * count, 1), channel("speed", chunks * count, 2)]
     with LogWriter(path, metadata={"place": "Neva"}) as writer:
         for at in range(0, chunks * count, count):
             writer.write(*(c.part(at, at + count) for c in whole))
-            writer.flush()
+            end_mcap_chunk(writer)
     return TrialLog("trial.mcap", tuple(whole)), path.read_bytes()
 
 

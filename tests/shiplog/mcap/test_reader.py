@@ -17,6 +17,7 @@ from mcap_files import (
     START,
     UNIT,
     channel,
+    end_mcap_chunk,
     file_records,
     flip_bit,
     is_subset_of,
@@ -202,7 +203,7 @@ def test_only_the_mcap_chunks_of_the_part_are_decompressed(
         for number, name in enumerate(names):
             at = START + 1000 * number + np.arange(100)
             writer.write(Channel(name, "test", UNIT[name], at, at, np.full(100, float(number))))
-            writer.flush()
+            end_mcap_chunk(writer)
     inflated: list[int] = []
     inflate = shiplog.mcap.decompress._decompress
     monkeypatch.setattr(
@@ -231,7 +232,7 @@ def test_the_index_of_a_skipped_mcap_chunk_is_not_used_for_another(
                 values = np.ones((100, 2))
                 here.append(Channel("position", "x", "m", at, at, values, ("north", "east")))
             writer.write(*here)
-            writer.flush()
+            end_mcap_chunk(writer)
     monkeypatch.delattr(shiplog.mcap.decode, "_locate_by_walk")
     assert len(read(path, channels=["position"])["position"]) == 300
 
@@ -242,7 +243,7 @@ def test_damage_is_reported_in_the_mcap_chunks_of_the_part_only(path: Path) -> N
         for number, name in enumerate(names):
             at = START + 1000 * number + np.arange(100)
             writer.write(Channel(name, "test", UNIT[name], at, at, np.ones(100)))
-            writer.flush()
+            end_mcap_chunk(writer)
     data = path.read_bytes()
     start, end = mcap_chunk_ranges(data)[2]
     path.write_bytes(flip_bit(data, 4 * (start + end)))

@@ -15,6 +15,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from mcap_files import (
     START,
     channel,
+    end_mcap_chunk,
     file_records,
     flip_bit,
     mcap_chunk_ranges,
@@ -97,7 +98,7 @@ def write_recording(path: Path) -> bytes:
             values = np.random.default_rng(start).normal(size=(2, 100))
             writer.write(Channel("yaw_rate", "test", "rad/s", at - 7, at, values[0]))
             writer.write(Channel("speed", "test", "m/s", at, at + 5, values[1]))
-            writer.flush()
+            end_mcap_chunk(writer)
     return path.read_bytes()
 
 
@@ -235,7 +236,7 @@ def test_a_file_with_mcap_chunks_out_of_order_is_read_into_memory(
         for start in (5000, 0):
             at = START + start + np.arange(1000)
             writer.write(Channel("speed", "log", "m/s", at, at, np.ones(1000)))
-            writer.flush()
+            end_mcap_chunk(writer)
     if unfinished:
         path.write_bytes(path.read_bytes()[:-10])
     log = open_log(path)
@@ -278,7 +279,7 @@ def test_whether_times_are_replaced_is_decided_once_for_the_whole_file(
             writer.write(
                 Channel("speed", "log", "m/s", measured[rows], received[rows], np.ones(50))
             )
-            writer.flush()
+            end_mcap_chunk(writer)
     if unfinished:
         path.write_bytes(path.read_bytes()[:-10])
     monkeypatch.setattr(shiplog.mcap.stream, "FILE_CHUNK_SAMPLES", 50)
