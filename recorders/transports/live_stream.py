@@ -4,7 +4,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import Enum
 
 from recorders.streams.packets import Batches, Packet
@@ -28,14 +27,6 @@ class StreamState(Enum):
     ENDED = "ended"
 
 
-@dataclass(frozen=True)
-class _Gap:
-    """Since when a stream has had no connection."""
-
-    since_ns: int
-    cause: str
-
-
 class LiveStream:
     """Packets of one transport from a reader thread; it is opened again, with back-off, when lost.
 
@@ -55,6 +46,8 @@ class LiveStream:
     ----------
     state
         Whether the transport is open.
+    fault
+        Why the transport is not open, or was not before the end; empty where it is.
     dropped
         The number of packets dropped so far because too many waited.
     """
@@ -67,6 +60,7 @@ class LiveStream:
         self._thread = threading.Thread(target=self._run, name=f"reader of {name}", daemon=True)
         self._reported_drops = 0
         self.state = StreamState.CONNECTING
+        self.fault = ""
         self.dropped = 0
 
     def start(self) -> None:
@@ -106,17 +100,17 @@ class LiveStream:
 
     def _run(self) -> None:
         """Read until the end of the recording or of the source; open again what is lost."""
-        retry_secs, gap = FIRST_RETRY_SECS, None
+        retry_secs, lost_ns = FIRST_RETRY_SECS, None
         while not self._stop.is_set():
             try:
                 self._transport.open()
-                self._set_open(gap)
-                gap, retry_secs = None, FIRST_RETRY_SECS
+                self._set_open(lost_ns)
+                lost_ns, retry_secs = None, FIRST_RETRY_SECS
                 self._read()
             except EOFError:
                 break
             except OSError as error:
-                gap = gap or self._set_lost(error)
+                lost_ns = lost_ns or self._set_lost(error)
             finally:
                 self._transport.close()
             self._stop.wait(retry_secs)
@@ -130,17 +124,18 @@ class LiveStream:
             self._waiting.extend(packets[:room] if room < len(packets) else packets)
             self.dropped += max(0, len(packets) - room)
 
-    def _set_open(self, gap: _Gap | None) -> None:
-        self.state = StreamState.OPEN
-        if gap is not None:
-            secs = (self._clock.now_ns() - gap.since_ns) * 1e-9
+    def _set_open(self, lost_ns: int | None) -> None:
+        self.state, self.fault = StreamState.OPEN, ""
+        if lost_ns is not None:
+            secs = (self._clock.now_ns() - lost_ns) * 1e-9
             self._report(f"connected again after a gap of {secs:.1f} s", EventLevel.INFO)
 
-    def _set_lost(self, error: OSError) -> _Gap:
+    def _set_lost(self, error: OSError) -> int:
+        """Report the loss, and return its time, ns."""
         self.state = StreamState.LOST
-        gap = _Gap(self._clock.now_ns(), error.strerror or str(error) or type(error).__name__)
-        self._report(f"no connection to {self._transport.address}: {gap.cause}")
-        return gap
+        self.fault = error.strerror or str(error) or type(error).__name__
+        self._report(f"no connection to {self._transport.address}: {self.fault}")
+        return self._clock.now_ns()
 
     def _report(self, text: str, level: EventLevel = EventLevel.WARNING) -> None:
         self._events.append(Event(self._clock.now_ns(), text, self._name, level))

@@ -114,9 +114,7 @@ class LiveSource:
         for each, stream_steps in zip(self.inputs, steps, strict=True):
             items += next(stream_steps, ())
             items += each.live.take_events()
-            if last:
-                each.stream.decoder.finish(each.stream.samples)
-                items += each.stream.samples.take()
+            items += each.stream.finish() if last else ()
         items += self.take_marks()
         self.status.add(items)
         now_ns = self.clock.now_ns()

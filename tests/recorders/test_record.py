@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from recorders.record import Recording, record
+from recorders.record import Recording, Rotation, record
 from recorders.source import Recordable
 from shiplog import Channel, ShiplogError, read
 from shiplog.types import Event, RawPackets
@@ -33,7 +33,7 @@ class Sensor:
 def test_all_samples_of_a_source_are_written_and_counted(tmp_path: Path) -> None:
     counts: list[int] = []
     recording = record(Sensor(), tmp_path / "a.mcap", on_chunk=counts.append)
-    assert recording == Recording(samples=30, channels=1, interrupted=False)
+    assert recording == Recording(30, 1, interrupted=False, files=(tmp_path / "a.mcap",))
     assert counts == [10, 20, 30]
     log = read(tmp_path / "a.mcap")
     assert len(log["yaw_rate"]) == 30
@@ -42,7 +42,7 @@ def test_all_samples_of_a_source_are_written_and_counted(tmp_path: Path) -> None
 
 def test_ctrl_c_ends_the_recording_and_keeps_the_samples(tmp_path: Path) -> None:
     recording = record(Sensor(KeyboardInterrupt()), tmp_path / "a.mcap")
-    assert recording == Recording(samples=20, channels=1, interrupted=True)
+    assert recording == Recording(20, 1, interrupted=True, files=(tmp_path / "a.mcap",))
     log = read(tmp_path / "a.mcap")
     assert len(log["yaw_rate"]) == 20
     assert not log.warnings
@@ -93,7 +93,7 @@ def test_packets_and_events_are_written_and_the_metadata_of_the_end(
 ) -> None:
     path = tmp_path / "a.mcap"
     if failure is None:
-        assert record(Stream(), path) == Recording(samples=0, channels=0, interrupted=False)
+        assert record(Stream(), path) == Recording(0, 0, interrupted=False, files=(path,))
     else:
         with pytest.raises(ShiplogError, match=r"no signal"):
             record(Stream(failure), path)
@@ -105,3 +105,23 @@ def test_packets_and_events_are_written_and_the_metadata_of_the_end(
     assert summary.statistics.message_count == 6
     metadata = read(path).metadata
     assert (metadata["source"], metadata["rejected"]) == ("test", "3")
+
+
+def test_a_rotated_recording_goes_on_in_numbered_files_that_hold_all_samples(
+    tmp_path: Path,
+) -> None:
+    every_chunk = Rotation(megabytes=1e-6)
+    recording = record(Sensor(), tmp_path / "a.mcap", rotation=every_chunk)
+    assert [file.name for file in recording.files] == [f"a.00{n}.mcap" for n in (1, 2, 3)]
+    logs = [read(file) for file in recording.files]
+    assert [log["yaw_rate"].measured_ns[0] for log in logs] == [0, 10**9, 2 * 10**9]
+    assert [len(log["yaw_rate"]) for log in logs] == [10, 10, 10]
+    assert all(log.metadata["source"] == "test" and not log.warnings for log in logs)
+    assert recording.samples == 30
+    assert not (tmp_path / "a.mcap").exists()
+
+
+def test_a_rotation_by_time_is_due_after_its_minutes() -> None:
+    rotation = Rotation(minutes=2.0)
+    assert not rotation.is_due(119.0, 10**9)
+    assert rotation.is_due(120.0, 0)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from extensions import declare
 
-from recorders.cli import GROUP
+from recorders.cli.record_verb import GROUP
 from shiplog.cli.main import main
 
 

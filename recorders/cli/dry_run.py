@@ -1,0 +1,85 @@
+"""Dry run of a recording: listen for a while, and report what is heard and what is missing."""
+
+import argparse
+import sys
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+from recorders.streams.format import StreamFormat
+from recorders.streams.reception_clock import ReceptionClock
+from recorders.trial.live_source import LiveSource, stopped_by_signals
+from recorders.trial.open_source import (
+    StreamRequest,
+    open_streams,
+    trial_requests,
+)
+from recorders.trial.stream_tables import stream_tables
+from recorders.trial.trial_file import load_trial_file
+from shiplog.cli.console import print_tables
+from shiplog.cli.verb import ExitCode
+from shiplog.errors import UsageError
+from shiplog.text_table import TextTable
+
+from .live_display import rate_in_words, value_in_words
+
+
+def listen_to_trial(path: str, secs: float) -> ExitCode:
+    """Listen to the sources of a trial file; fails where a needed channel is missing."""
+    return _listen(trial_requests(load_trial_file(path)), secs)
+
+
+def listen_to_stream(
+    arguments: argparse.Namespace, stream_format: StreamFormat[Any], secs: float
+) -> ExitCode:
+    """Listen to one stream; fails where a needed channel is missing."""
+    request = StreamRequest(stream_format.name, stream_format, arguments.address, arguments)
+    return _listen([request], secs)
+
+
+def _listen(requests: Sequence[StreamRequest], secs: float) -> ExitCode:
+    source = open_streams(requests, ReceptionClock())
+    if not isinstance(source, LiveSource):
+        raise UsageError("--dry-run listens to live sources; of a file, record it and see its info")
+    print(f"listening for {secs:.0f} s", file=sys.stderr, flush=True)
+    timer = threading.Timer(secs, source.stop)
+    timer.start()
+    with stopped_by_signals(source.stop):
+        for _ in source.chunks():
+            pass
+    timer.cancel()
+    print_tables([_state_table(source), _channel_table(source)])
+    print_tables(stream_tables(each.stream for each in source.inputs))
+    missing = source.status.missing
+    if not missing:
+        print("all channels that a replay needs are heard")
+        return ExitCode.OK
+    print(f"missing for a replay: {', '.join(missing)}")
+    return ExitCode.FAILURE
+
+
+def _state_table(source: LiveSource) -> TextTable:
+    rows = []
+    for each in source.inputs:
+        counts = each.stream.decoder.counts
+        decoded, rejected = sum(counts.accepted.values()), sum(counts.rejected.values())
+        rows.append(
+            (
+                each.stream.name,
+                each.stream.origin,
+                each.live.fault or "open",
+                str(decoded),
+                str(sum(counts.unused.values())),
+                str(rejected),
+            )
+        )
+    columns = ("stream", "address", "state", "decoded", "not used", "rejected")
+    return TextTable("Streams", columns, tuple(rows))
+
+
+def _channel_table(source: LiveSource) -> TextTable:
+    rows = tuple(
+        (channel.topic, rate_in_words(channel), value_in_words(channel), str(channel.samples))
+        for channel in source.status.channels
+    )
+    return TextTable("Channels", ("channel", "rate", "last value", "samples"), rows)

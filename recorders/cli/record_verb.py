@@ -1,0 +1,205 @@
+"""The verb `record`: a trial file, or one subcommand for each installed source of samples."""
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from recorders.record import Recording
+from recorders.source import RecorderCommand
+from recorders.streams.format import GROUP as FORMAT_GROUP
+from recorders.streams.format import StreamFormat
+from shiplog.cli.console import progress
+from shiplog.cli.paths import require_outputs, require_suffix
+from shiplog.cli.verb import ExitCode, Verb
+from shiplog.errors import ShiplogError, UsageError
+from shiplog.extensions import extension_names, load_extension
+from shiplog.files import is_device
+
+GROUP = "shiplog.recorders"
+TRIAL = "TRIAL"  # the file itself, whose name ends with .toml
+DRY_RUN_SECS = 10.0
+
+
+class _Parsers(dict[str, argparse.ArgumentParser]):
+    """The parsers of the sources by name; any name of a TOML file is that of a trial file."""
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or _is_trial(name)
+
+    def __missing__(self, name: str) -> argparse.ArgumentParser:
+        if not _is_trial(name):
+            raise KeyError(name)
+        return self[TRIAL]
+
+
+def _is_trial(name: object) -> bool:
+    return isinstance(name, str) and name.lower().endswith(".toml")
+
+
+class _SourceAction(argparse._SubParsersAction):  # type: ignore[type-arg]  # noqa: SLF001 - argparse has no public class for it
+    """Subcommands of which one, the trial file, is chosen by the ending of its name."""
+
+    def __init__(self, *arguments: Any, **settings: Any) -> None:  # noqa: ANN401 - argparse's own
+        super().__init__(*arguments, **settings)
+        self._name_parser_map = self.choices = _Parsers()
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[Any] | None,
+        option_string: str | None = None,
+    ) -> None:
+        """Keep the name of a trial file for its parser."""
+        given = list(values or ())
+        namespace.trial = given[0] if _is_trial(given[0]) else None
+        super().__call__(parser, namespace, given, option_string)
+
+
+def _configure(parser: argparse.ArgumentParser) -> None:
+    """Add a subcommand for each source; one that cannot be loaded reports it when used."""
+    parser.add_argument(
+        "--dry-run",
+        action="store_true",
+        help=f"listen for {DRY_RUN_SECS:.0f} s, report what is heard, and write nothing",
+    )
+    sources = parser.add_subparsers(
+        action=_SourceAction, metavar="SOURCE", dest="source_name", required=True
+    )
+    for name, command in _loaded(GROUP, RecorderCommand, "recorder", sources):
+        own = _add_source(sources, name, command.help)
+        command.configure(own)
+        _add_output(own, required=True)
+        own.set_defaults(recorder=command)
+    for name, stream_format in _loaded(FORMAT_GROUP, StreamFormat, "format", sources):
+        from .stream_commands import configure_stream
+
+        own = _add_source(sources, name, stream_format.help)
+        configure_stream(own, stream_format)
+        _add_output(own, required=False)
+        own.set_defaults(recorder=stream_format)
+    own = _add_source(sources, TRIAL, "all sources of a trial file, into one log")
+    _add_output(own, required=False)
+    own.set_defaults(recorder=None)
+
+
+def _loaded(group: str, kind: type[Any], noun: str, sources: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - argparse's private class
+    """Yield the extensions of a group; the others become subcommands that report the error."""
+    for name in extension_names(group):
+        try:
+            yield name, load_extension(group, name, kind, noun)
+        except ShiplogError as error:
+            _add_unloadable(sources, name, error)
+
+
+def _add_source(sources: Any, name: str, text: str) -> argparse.ArgumentParser:  # noqa: ANN401 - argparse's private class
+    parser: argparse.ArgumentParser = sources.add_parser(
+        name,
+        help=text,
+        description=f"{text[0].upper()}{text[1:]}.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    return parser
+
+
+def _add_output(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    parser.add_argument(
+        "-o", "--output", required=required, metavar="FILE", help="the log to write"
+    )
+
+
+def _add_unloadable(sources: Any, name: str, error: ShiplogError) -> None:  # noqa: ANN401 - argparse's private class
+    """Add a subcommand that accepts any arguments and reports the error."""
+
+    def report(_: argparse.Namespace) -> Any:  # noqa: ANN401 - it never returns
+        raise error
+
+    # with this prefix no argument is an option, so that none is rejected before the report
+    own = sources.add_parser(
+        name, help="(cannot be loaded; use it to see why)", prefix_chars="\0", add_help=False
+    )
+    own.add_argument("arguments", nargs="*")
+    own.set_defaults(recorder=RecorderCommand("", lambda _: None, report), output=None)
+
+
+def _record(arguments: argparse.Namespace) -> ExitCode:
+    """Record what was asked for, or only listen to it."""
+    if arguments.dry_run:
+        return _listen(arguments)
+    recording = _recorded(arguments)
+    first, *others = recording.files
+    names = f"{first} to {others[-1].name}" if others else str(first)
+    print(
+        f"{names}: {recording.samples} samples of {recording.channels} channels",
+        file=sys.stderr if is_device(first) else sys.stdout,
+    )
+    if recording.interrupted:
+        print("interrupted: the log ends there", file=sys.stderr)
+    return ExitCode.OK
+
+
+def _recorded(arguments: argparse.Namespace) -> Recording:
+    """Record a trial file, a stream, or another source."""
+    if arguments.recorder is None:
+        from .stream_commands import record_trial
+
+        return record_trial(_trial_name(arguments), arguments.output)
+    if isinstance(arguments.recorder, RecorderCommand):
+        if arguments.output is not None:
+            require_outputs(arguments.output)
+            require_suffix(".mcap", arguments.output)
+        return _record_command(arguments.recorder, arguments)
+    if arguments.output is None:
+        raise UsageError("no output; add -o FILE")
+    from .stream_commands import record_stream
+
+    require_outputs(arguments.output)
+    require_suffix(".mcap", arguments.output)
+    return record_stream(arguments, arguments.recorder, Path(arguments.output))
+
+
+def _record_command(command: RecorderCommand[Any], arguments: argparse.Namespace) -> Recording:
+    """Open the source of a recorder and write it to the log."""
+    source = command.open(arguments)
+    from recorders.record import record
+
+    with progress() as on_progress:
+        on_progress("write")
+        recording = record(
+            source, arguments.output, on_chunk=lambda n: on_progress(f"write: {n} samples")
+        )
+        if not recording.interrupted:
+            command.finish(arguments, source)
+    return recording
+
+
+def _trial_name(arguments: argparse.Namespace) -> str:
+    if arguments.trial is None:
+        raise UsageError("name a trial file, such as trial.toml")
+    return str(arguments.trial)
+
+
+def _listen(arguments: argparse.Namespace) -> ExitCode:
+    """Report what is heard, without writing anything."""
+    if isinstance(arguments.recorder, RecorderCommand):
+        raise UsageError("--dry-run is for trial files and for live sources")
+    from .dry_run import listen_to_stream, listen_to_trial
+
+    if arguments.recorder is None:
+        return listen_to_trial(_trial_name(arguments), DRY_RUN_SECS)
+    return listen_to_stream(arguments, arguments.recorder, DRY_RUN_SECS)
+
+
+RECORD = Verb(
+    "record sensor streams to a log",
+    _configure,
+    _record,
+    (
+        "shiplog record simulate zigzag-20-20 --seed 1 --duration 600 -o trial.mcap",
+        "shiplog record nmea0183 udp://127.0.0.1:10110 -o trial.mcap",
+        "shiplog record nmea0183 gyro.log -o gyro.mcap",
+        "shiplog record --dry-run trial.toml",
+    ),
+)

@@ -1,0 +1,146 @@
+"""What `record` does with streams: one stream of a format, or all sources of a trial file."""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from recorders.record import Recording, Rotation, record
+from recorders.streams.format import StreamFormat
+from recorders.streams.reception_clock import ReceptionClock
+from recorders.streams.stream_source import StreamSource
+from recorders.trial.live_source import LiveSource, stopped_by_signals
+from recorders.trial.marks import MarkListener
+from recorders.trial.open_source import (
+    StreamRequest,
+    open_streams,
+    trial_metadata,
+    trial_requests,
+)
+from recorders.trial.recorded_source import RecordedSource
+from recorders.trial.stream_tables import stream_tables
+from recorders.trial.trial_file import load_trial_file
+from shiplog.cli.console import print_tables, progress
+from shiplog.cli.paths import require_outputs, require_suffix
+from shiplog.errors import UsageError
+from shiplog.files import is_device
+from shiplog.types import Event
+
+from .live_display import MarkKey, live_display
+
+
+def configure_stream(parser: argparse.ArgumentParser, stream_format: StreamFormat[Any]) -> None:
+    """Add the arguments of ``record FORMAT ADDRESS``."""
+    from recorders.transports.address import FORMS
+
+    parser.add_argument("address", metavar="ADDRESS", help=f"a file, or {FORMS}")
+    parser.add_argument(
+        "--raw",
+        action=argparse.BooleanOptionalAction,
+        help="record the packets beside the samples (default: of live sources only)",
+    )
+    parser.add_argument("--vessel", metavar="FILE", help="the vessel file to keep in the log")
+    stream_format.configure(parser)
+
+
+def record_stream(
+    arguments: argparse.Namespace, stream_format: StreamFormat[Any], output: Path
+) -> Recording:
+    """Record one stream of a format."""
+    request = StreamRequest(
+        stream_format.name, stream_format, arguments.address, arguments, arguments.raw
+    )
+    return _record([request], output, {}, arguments.vessel)
+
+
+def record_trial(path: str, output: str | None) -> Recording:
+    """Record the sources of a trial file."""
+    trial = load_trial_file(path)
+    log = Path(output) if output is not None else trial.output
+    if log is None:
+        raise UsageError(f"no output; add -o FILE, or `file` in [output]: {path}")
+    require_outputs(log)
+    require_suffix(".mcap", log)
+    rotation = (
+        Rotation(trial.rotate_minutes, trial.rotate_megabytes)
+        if trial.rotate_minutes or trial.rotate_megabytes
+        else None
+    )
+    return _record(trial_requests(trial), log, trial_metadata(trial), trial.vessel, rotation)
+
+
+def _record(
+    requests: Sequence[StreamRequest],
+    log: Path,
+    metadata: dict[str, str],
+    vessel: str | None,
+    rotation: Rotation | None = None,
+) -> Recording:
+    vessel_toml = _vessel_text(vessel)
+    clock = ReceptionClock()
+    marks = _Marks(clock)
+    source = open_streams(
+        requests, clock, metadata=metadata, vessel_toml=vessel_toml, take_marks=marks.take
+    )
+    with _shown(source, log, marks) as on_chunk:
+        recording = record(source, log, rotation=rotation, on_chunk=on_chunk)
+    print_tables(stream_tables(_streams(source)), to_stderr=is_device(log))
+    return recording
+
+
+class _Marks:
+    """Marks of a live recording, from its own terminal and from others."""
+
+    def __init__(self, clock: ReceptionClock) -> None:
+        self._clock = clock
+        self._listener: MarkListener | None = None
+        self.key = MarkKey(clock.now_ns)
+
+    def take(self) -> list[Event]:
+        """Return the marks since the last call."""
+        return [*self.key.take(), *(self._listener.take() if self._listener else ())]
+
+    @contextmanager
+    def listening(self, log: Path) -> Iterator[None]:
+        """Take marks within the block."""
+        self._listener = MarkListener(log, self._clock)
+        try:
+            with self.key.listening():
+                yield
+        finally:
+            self._listener.close()
+
+
+@contextmanager
+def _shown(
+    source: LiveSource | RecordedSource, log: Path, marks: _Marks
+) -> Iterator[Callable[[int], None]]:
+    """Show the status of a live source, which signals end, or the progress of a recorded one."""
+    if isinstance(source, LiveSource):
+        part = log if is_device(log) else log.with_name(f"{log.name}.part")
+        with (
+            marks.listening(log),
+            stopped_by_signals(source.stop),
+            live_display(source, part) as on_chunk,
+        ):
+            print(f"recording to {log}; Ctrl-C ends it", file=sys.stderr, flush=True)
+            yield on_chunk
+    else:
+        with progress() as on_progress:
+            yield lambda samples: on_progress(f"decode: {samples} samples")
+
+
+def _streams(source: LiveSource | RecordedSource) -> list[StreamSource]:
+    if isinstance(source, LiveSource):
+        return [each.stream for each in source.inputs]
+    return list(source.streams)
+
+
+def _vessel_text(vessel: str | None) -> str | None:
+    if vessel is None:
+        return None
+    from shiplog.vessel.vessel_parser import load_vessel
+
+    return load_vessel(vessel)[1]

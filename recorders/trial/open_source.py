@@ -1,0 +1,162 @@
+"""Sources opened as a command line or a trial file describes them."""
+
+import argparse
+import os
+import stat
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from recorders.streams.files import read_lines
+from recorders.streams.format import StreamFormat
+from recorders.streams.reception_clock import ReceptionClock
+from recorders.streams.sample_buffer import SampleBuffer
+from recorders.streams.stream_source import StreamSource
+from recorders.transports.address import is_live, open_transport
+from recorders.transports.live_stream import LiveStream
+from recorders.transports.transport import Transport
+from shiplog.errors import LogError, UsageError
+from shiplog.types import Event
+
+from .conditions import condition_metadata
+from .live_source import LiveInput, LiveSource, waiting_packets
+from .recorded_source import RecordedSource
+from .trial_file import SourceEntry, TrialFile
+
+
+@dataclass(frozen=True)
+class StreamRequest:
+    """One stream that is to be recorded.
+
+    Attributes
+    ----------
+    name
+        Its name, for its raw topic and its events.
+    format
+        The format of its packets.
+    address
+        The address of a live transport, or the path of a file; ``-`` is the standard input.
+    options
+        The parsed options of the format.
+    keep_raw
+        Whether to record the packets; None for live streams only.
+    prefix
+        Put before the source of its topics.
+    """
+
+    name: str
+    format: StreamFormat[Any]
+    address: str
+    options: argparse.Namespace
+    keep_raw: bool | None = None
+    prefix: str = ""
+
+
+def open_streams(
+    requests: Sequence[StreamRequest],
+    clock: ReceptionClock,
+    *,
+    metadata: dict[str, str] | None = None,
+    vessel_toml: str | None = None,
+    take_marks: Callable[[], Sequence[Event]] = tuple,
+) -> LiveSource | RecordedSource:
+    """Open streams, all of them live or all recorded, as one source.
+
+    Parameters
+    ----------
+    requests
+        At least one stream.
+    clock
+        The clock of reception of live streams.
+    metadata
+        Text about the trial, by key.
+    vessel_toml
+        The text of the vessel file to keep in the log, or None.
+    take_marks
+        Returns the events that a person has marked in a live recording since the last call.
+
+    Raises
+    ------
+    UsageError
+        An address is wrong, or live and recorded streams are mixed.
+    LogError
+        A file is missing.
+    """
+    transports = [_transport(request, clock) for request in requests]
+    live = [transport for transport in transports if transport is not None]
+    if live and len(live) < len(requests):
+        files = [r.address for r, t in zip(requests, transports, strict=True) if t is None]
+        raise UsageError(
+            f"live and recorded sources in one recording have no common time; record the files "
+            f"apart: {', '.join(files)}"
+        )
+    if live:
+        inputs = [_live(r, t, clock) for r, t in zip(requests, live, strict=True)]
+        return LiveSource(inputs, clock, metadata or {}, vessel_toml, take_marks)
+    return RecordedSource([_recorded(r) for r in requests], metadata or {}, vessel_toml)
+
+
+def trial_requests(trial: TrialFile) -> list[StreamRequest]:
+    """Return the streams of a trial file; paths are relative to the file."""
+    return [_request(entry, trial.path.parent) for entry in trial.sources]
+
+
+def trial_metadata(trial: TrialFile) -> dict[str, str]:
+    """Return the metadata that a trial file gives its log: its name and the conditions."""
+    return {"trial_file": trial.path.name} | condition_metadata(trial.conditions)
+
+
+def _request(entry: SourceEntry, folder: Path) -> StreamRequest:
+    address = entry.address
+    own = entry.format.open_transport(address, ReceptionClock()) is not None
+    if not own and not is_live(address) and address != "-":
+        address = os.fspath(folder / address)
+    return StreamRequest(
+        entry.name, entry.format, address, entry.options, entry.keep_raw, f"{entry.name}."
+    )
+
+
+def _transport(request: StreamRequest, clock: ReceptionClock) -> Transport | None:
+    """Return the live transport of a stream, not opened yet; None for a recorded stream."""
+    address = request.address
+    if own := request.format.open_transport(address, clock):
+        return own
+    if is_live(address) or (address == "-" and not _is_recording(sys.stdin.fileno())):
+        return open_transport(address, clock)
+    if address != "-" and not Path(address).is_file():
+        raise LogError(f"no such file: {address}")
+    return None
+
+
+def _is_recording(descriptor: int) -> bool:
+    """Whether a file descriptor is a file, which was recorded before, and not a pipe."""
+    return stat.S_ISREG(os.fstat(descriptor).st_mode)
+
+
+def _live(request: StreamRequest, transport: Transport, clock: ReceptionClock) -> LiveInput:
+    live = LiveStream(transport, clock, request.name)
+    stream = StreamSource(
+        request.name,
+        request.format.name,
+        waiting_packets(live),
+        request.format.make_decoder(request.options),
+        keep_raw=request.keep_raw is not False,
+        origin=transport.address,
+        samples=SampleBuffer(request.prefix),
+    )
+    return LiveInput(live, stream)
+
+
+def _recorded(request: StreamRequest) -> StreamSource:
+    decoder = request.format.make_decoder(request.options)
+    return StreamSource(
+        request.name,
+        request.format.name,
+        request.format.add_times(read_lines(request.address), request.options, decoder),
+        decoder,
+        keep_raw=request.keep_raw is True,
+        origin=Path(request.address).name,
+        samples=SampleBuffer(request.prefix),
+    )

@@ -1,0 +1,64 @@
+"""Tests of recorders.trial.recorded_source: files joined in the order of their times."""
+
+from pathlib import Path
+
+import pytest
+from number_format import NUMBERS
+
+from recorders.record import record
+from recorders.streams.reception_clock import ReceptionClock
+from recorders.trial.open_source import StreamRequest, open_streams
+from recorders.trial.recorded_source import RecordedSource
+from recorders.trial.trial_file import parse_options
+from shiplog import read
+from shiplog.errors import LogError, UsageError
+
+
+def _request(path: Path, **options: float) -> StreamRequest:
+    parsed = parse_options(NUMBERS, options, path.stem)
+    return StreamRequest(path.stem, NUMBERS, str(path), parsed, None, f"{path.stem}.")
+
+
+def _written(path: Path, *lines: str) -> Path:
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return path
+
+
+def test_two_files_are_joined_in_the_order_of_reception(tmp_path: Path) -> None:
+    fast = _written(tmp_path / "fast.txt", *(f"heading {n / 1000}" for n in range(20_000)))
+    slow = _written(tmp_path / "slow.txt", *(f"speed {n / 10}" for n in range(200)))
+    source = open_streams(
+        [_request(fast, step=0.01), _request(slow, start=3.0, step=1.0)], ReceptionClock()
+    )
+    chunks = list(source.chunks())
+    ends = 0
+    for chunk in chunks:
+        times = [t for item in chunk for t in item.received_ns.tolist()]  # type: ignore[union-attr]
+        assert min(times) >= ends
+        ends = max(times)
+    record(open_streams([_request(fast, step=0.01), _request(slow, start=3.0, step=1.0)],
+                        ReceptionClock()), tmp_path / "log.mcap")  # fmt: skip
+    log = read(tmp_path / "log.mcap")
+    assert log.warnings == ()
+    assert len(log["heading/fast.N"]) == 20_000
+    assert len(log["speed/slow.N"]) == 200
+    assert log["speed/slow.N"].measured_ns[0] == 3 * 10**9
+
+
+def test_a_file_without_any_sample_is_an_error_that_names_it(tmp_path: Path) -> None:
+    source = open_streams([_request(_written(tmp_path / "a.txt", "x", "y"))], ReceptionClock())
+    assert isinstance(source, RecordedSource)
+    with pytest.raises(LogError, match=r"no sample could be decoded.*a\.txt"):
+        list(source.chunks())
+
+
+def test_a_missing_file_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="no such file"):
+        open_streams([_request(tmp_path / "none.txt")], ReceptionClock())
+
+
+def test_live_and_recorded_sources_together_are_refused(tmp_path: Path) -> None:
+    file = _written(tmp_path / "a.txt", "rpm 60")
+    live = StreamRequest("live", NUMBERS, "udp://127.0.0.1:1", parse_options(NUMBERS, {}, "live"))
+    with pytest.raises(UsageError, match="have no common time"):
+        open_streams([_request(file), live], ReceptionClock())
