@@ -4,7 +4,6 @@ import argparse
 import sys
 import threading
 from collections.abc import Sequence
-from typing import Any
 
 from recorders.streams.format import StreamFormat
 from recorders.streams.reception_clock import ReceptionClock
@@ -30,7 +29,7 @@ def listen_to_trial(path: str, secs: float) -> ExitCode:
 
 
 def listen_to_stream(
-    arguments: argparse.Namespace, stream_format: StreamFormat[Any], secs: float
+    arguments: argparse.Namespace, stream_format: StreamFormat, secs: float
 ) -> ExitCode:
     """Listen to one stream; fails where a needed channel is missing."""
     request = StreamRequest(stream_format.name, stream_format, arguments.address, arguments)

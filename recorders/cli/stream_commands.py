@@ -4,8 +4,8 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
-from typing import Any
 
 from recorders.record import Recording, Rotation, record
 from recorders.streams.format import StreamFormat
@@ -31,7 +31,7 @@ from shiplog.types import Event
 from .live_display import MarkKey, live_display
 
 
-def configure_stream(parser: argparse.ArgumentParser, stream_format: StreamFormat[Any]) -> None:
+def configure_stream(parser: argparse.ArgumentParser, stream_format: StreamFormat) -> None:
     """Add the arguments of ``record FORMAT ADDRESS``."""
     from recorders.transports.address import FORMS
 
@@ -41,16 +41,27 @@ def configure_stream(parser: argparse.ArgumentParser, stream_format: StreamForma
         action=argparse.BooleanOptionalAction,
         help="record the packets beside the samples (default: of live sources only)",
     )
+    parser.add_argument(
+        "--pace",
+        type=_factor,
+        metavar="FACTOR",
+        help="read a file FACTOR times as fast as it was received (default: as fast as possible)",
+    )
     parser.add_argument("--vessel", metavar="FILE", help="the vessel file to keep in the log")
     stream_format.configure(parser)
 
 
 def record_stream(
-    arguments: argparse.Namespace, stream_format: StreamFormat[Any], output: Path
+    arguments: argparse.Namespace, stream_format: StreamFormat, output: Path
 ) -> Recording:
     """Record one stream of a format."""
     request = StreamRequest(
-        stream_format.name, stream_format, arguments.address, arguments, arguments.raw
+        stream_format.name,
+        stream_format,
+        arguments.address,
+        arguments,
+        arguments.raw,
+        pace=arguments.pace,
     )
     return _record([request], output, {}, arguments.vessel)
 
@@ -136,6 +147,13 @@ def _streams(source: LiveSource | RecordedSource) -> list[StreamSource]:
     if isinstance(source, LiveSource):
         return [each.stream for each in source.inputs]
     return list(source.streams)
+
+
+def _factor(text: str) -> float:
+    value = float(text)
+    if not 0 < value < inf:
+        raise argparse.ArgumentTypeError(f"{text} is no positive number")
+    return value
 
 
 def _vessel_text(vessel: str | None) -> str | None:

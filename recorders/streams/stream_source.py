@@ -61,8 +61,12 @@ class StreamSource:
             self.decoder.decode(batch, self.samples)
             raw = [self._raw(batch)] if self.keep_raw and batch else []
             yield (*self.samples.take(), *raw)
+        yield self.finish()
+
+    def finish(self) -> tuple[Recordable, ...]:
+        """Return what the decoder still held after the last batch."""
         self.decoder.finish(self.samples)
-        yield self.samples.take()
+        return self.samples.take()
 
     def chunks(self) -> Iterator[tuple[Recordable, ...]]:
         """Yield what the steps yield, without those that yield nothing."""

@@ -7,10 +7,10 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from recorders.streams.files import read_lines
 from recorders.streams.format import StreamFormat
+from recorders.streams.pace import paced
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.streams.sample_buffer import SampleBuffer
 from recorders.streams.stream_source import StreamSource
@@ -44,14 +44,18 @@ class StreamRequest:
         Whether to record the packets; None for live streams only.
     prefix
         Put before the source of its topics.
+    pace
+        How many times faster than it was received a recorded stream is let through; None for as
+        fast as possible.
     """
 
     name: str
-    format: StreamFormat[Any]
+    format: StreamFormat
     address: str
     options: argparse.Namespace
     keep_raw: bool | None = None
     prefix: str = ""
+    pace: float | None = None
 
 
 def open_streams(
@@ -150,12 +154,13 @@ def _live(request: StreamRequest, transport: Transport, clock: ReceptionClock) -
 
 
 def _recorded(request: StreamRequest) -> StreamSource:
-    decoder = request.format.make_decoder(request.options)
+    opened = request.format.open_file(read_lines(request.address), request.options)
+    batches = opened.batches if request.pace is None else paced(opened.batches, request.pace)
     return StreamSource(
         request.name,
         request.format.name,
-        request.format.add_times(read_lines(request.address), request.options, decoder),
-        decoder,
+        batches,
+        opened.decoder,
         keep_raw=request.keep_raw is True,
         origin=Path(request.address).name,
         samples=SampleBuffer(request.prefix),

@@ -94,14 +94,9 @@ class RecordedSource:
                 feed.release(until_ns)
             if items := tuple(item for each in steps for item in next(each)):
                 yield items
-        items = tuple(item for stream in self.streams for item in _finished(stream))
+        items = tuple(item for stream in self.streams for item in stream.finish())
         if items:
             yield items
         if not any(stream.decoder.counts.accepted for stream in self.streams):
             names = ", ".join(stream.origin for stream in self.streams)
             raise LogError(f"no sample could be decoded; check the format of: {names}")
-
-
-def _finished(stream: StreamSource) -> tuple[Recordable, ...]:
-    stream.decoder.finish(stream.samples)
-    return stream.samples.take()

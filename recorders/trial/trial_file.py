@@ -44,7 +44,7 @@ class SourceEntry:
     """
 
     name: str
-    format: StreamFormat[Any]
+    format: StreamFormat
     address: str
     keep_raw: bool | None
     options: argparse.Namespace
@@ -235,7 +235,7 @@ class _Parser:
             return None
         return SourceEntry(name, stream_format, address, keep_raw, options)
 
-    def _format(self, where: str, table: Mapping[str, Any]) -> StreamFormat[Any] | None:
+    def _format(self, where: str, table: Mapping[str, Any]) -> StreamFormat | None:
         name = self._text(table, f"{where}.format", required=True)
         if not name:
             return None
@@ -246,7 +246,7 @@ class _Parser:
             return None
 
     def _options(
-        self, where: str, stream_format: StreamFormat[Any], table: Mapping[str, Any]
+        self, where: str, stream_format: StreamFormat, table: Mapping[str, Any]
     ) -> argparse.Namespace | None:
         """Parse the further keys of a source as the options of its format."""
         given = {key: value for key, value in table.items() if key not in _SOURCE_KEYS}
@@ -265,7 +265,7 @@ class _OptionParser(argparse.ArgumentParser):
 
 
 def parse_options(
-    stream_format: StreamFormat[Any], given: Mapping[str, object], where: str
+    stream_format: StreamFormat, given: Mapping[str, object], where: str
 ) -> argparse.Namespace:
     """Parse the options of a format that are given as keys and values.
 

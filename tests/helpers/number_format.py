@@ -4,8 +4,7 @@ import argparse
 from collections.abc import Sequence
 
 from recorders.streams.counts import StreamCounts
-from recorders.streams.decoder import Decoder
-from recorders.streams.format import StreamFormat
+from recorders.streams.format import OpenedFile, StreamFormat
 from recorders.streams.packets import Batches, Packet
 from recorders.streams.sample_buffer import SampleBuffer
 
@@ -30,8 +29,12 @@ class NumberDecoder:
         """Add nothing."""
 
 
-def _add_times(batches: Batches, options: argparse.Namespace, _: Decoder) -> Batches:
+def _open_file(batches: Batches, options: argparse.Namespace) -> OpenedFile:
     """Give the lines times from `start`, `step` s apart."""
+    return OpenedFile(_timed(batches, options), NumberDecoder())
+
+
+def _timed(batches: Batches, options: argparse.Namespace) -> Batches:
     number = 0
     for batch in batches:
         yield [
@@ -48,5 +51,5 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 
 NUMBERS = StreamFormat(
-    "numbers", "numbers", lambda _: NumberDecoder(), _add_times, configure=_configure
+    "numbers", "numbers", lambda _: NumberDecoder(), _open_file, configure=_configure
 )

@@ -1,5 +1,6 @@
 """Tests of recorders.trial.recorded_source: files joined in the order of their times."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -62,3 +63,22 @@ def test_live_and_recorded_sources_together_are_refused(tmp_path: Path) -> None:
     live = StreamRequest("live", NUMBERS, "udp://127.0.0.1:1", parse_options(NUMBERS, {}, "live"))
     with pytest.raises(UsageError, match="have no common time"):
         open_streams([_request(file), live], ReceptionClock())
+
+
+def test_the_pace_changes_no_sample(tmp_path: Path) -> None:
+    file = _written(tmp_path / "a.txt", *(f"rpm {n}" for n in range(50)))
+    slow, fast = (
+        list(open_streams([replace(_request(file), pace=pace)], ReceptionClock()).chunks())
+        for pace in (50.0, None)
+    )
+    assert len(slow) > len(fast)
+    record_of = [
+        [
+            (t, v)
+            for chunk in chunks
+            for c in chunk
+            for t, v in zip(c.received_ns, c.values, strict=True)
+        ]  # type: ignore[union-attr]
+        for chunks in (slow, fast)
+    ]
+    assert record_of[0] == record_of[1]
