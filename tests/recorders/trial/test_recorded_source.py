@@ -13,6 +13,7 @@ from recorders.trial.recorded_source import RecordedSource
 from recorders.trial.trial_file import parse_options
 from shiplog import read
 from shiplog.errors import LogError, UsageError
+from shiplog.types import Channel
 
 
 def _request(path: Path, **options: float) -> StreamRequest:
