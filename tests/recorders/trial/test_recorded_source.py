@@ -75,11 +75,13 @@ def test_the_pace_changes_no_sample(tmp_path: Path) -> None:
     assert len(slow) > len(fast)
     record_of = [
         [
-            (t, v)
+            sample
             for chunk in chunks
-            for c in chunk
-            for t, v in zip(c.received_ns, c.values, strict=True)
-        ]  # type: ignore[union-attr]
+            for channel in chunk
+            if isinstance(channel, Channel)
+            for sample in zip(channel.received_ns.tolist(), channel.values.tolist(), strict=True)
+        ]
         for chunks in (slow, fast)
     ]
+    assert len(record_of[0]) == 50
     assert record_of[0] == record_of[1]
