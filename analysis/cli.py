@@ -141,6 +141,7 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
                 review.add(chunk)
             findings = replay.findings
             on_progress("review")
+            review.add_further_channels(log)
             review.finish(findings, replay_markdown(findings))
     if arguments.json:
         write_json(replay_json(findings), arguments.json)

@@ -70,6 +70,8 @@ UNITS: dict[str, tuple[str, float]] = {
     "g": ("m/s2", 9.80665),
 }
 
+# units in which people are shown a quantity that is not in the catalogue
+DISPLAY_UNITS = {"rad": "deg", "rad/s": "deg/s", "W": "kW", "N": "kN", "Nm": "kNm"}
 GEOGRAPHIC = ("latitude", "longitude", "altitude")  # deg, deg, m: components of a `position`
 
 
@@ -225,6 +227,32 @@ def conversion_factor(unit: str, to: str) -> float:
             f"cannot convert {unit!r} to {to!r}: their SI units are {base} and {other_base}"
         )
     return to_base / to_other
+
+
+def display_conversion(name: str, unit: str) -> tuple[str, float]:
+    """Return the unit in which a channel is shown to people, and the factor to that unit.
+
+    Parameters
+    ----------
+    name
+        The channel's name; one that is not in the catalogue is shown in its own unit, or degrees
+        and thousands of it.
+    unit
+        The unit of its values.
+
+    Examples
+    --------
+    >>> display_conversion("power", "W")
+    ('kW', 0.001)
+    >>> display_conversion("fuel_flow", "kg/h")
+    ('kg/h', 1.0)
+    """
+    kind = CATALOGUE.get(name)
+    if kind is not None and unit in UNITS and UNITS[unit][0] == kind.unit:
+        shown = kind.display_unit
+    else:
+        shown = DISPLAY_UNITS.get(unit, unit)
+    return shown, conversion_factor(unit, shown) if shown != unit else 1.0
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

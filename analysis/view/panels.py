@@ -26,12 +26,37 @@ class Panel:
         The series.
     limits
         The ends of the value axis.
+    legend
+        Whether the names of the lines are shown.
     """
 
     name: str
     title: str
     series: tuple[Series, ...]
     limits: tuple[float, float]
+    legend: bool = False
+
+
+def words(name: str) -> str:
+    """Return the name of a quantity as words.
+
+    Examples
+    --------
+    >>> words("yaw_rate")
+    'yaw rate'
+    """
+    return name.replace("_", " ")
+
+
+def title_of(name: str, unit: str) -> str:
+    """Return the title of a panel of a quantity.
+
+    Examples
+    --------
+    >>> title_of("yaw_rate", "deg/s"), title_of("rpm", "rpm")
+    ('yaw rate [deg/s]', 'rpm')
+    """
+    return name if name == unit else f"{words(name)} [{unit}]"
 
 
 def thousands(size: float) -> tuple[str, float]:

@@ -12,7 +12,7 @@ from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
 from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
 
-from .panels import Panel, limits, rounded, thousands
+from .panels import Panel, limits, rounded, thousands, title_of, words
 from .series import BLUE, GREY, ORANGE, RED, Colour, Line, Series, banded
 
 Drawn = Mapping[str, Series]  # by entity, as `SeriesBuilder.result` returns them
@@ -48,7 +48,7 @@ def history_panels(findings: Findings, drawn: Drawn) -> list[Panel]:
 
 def _output(drawn: Drawn, name: str) -> Panel:
     measured, state = drawn[f"{name}/measured"], drawn[f"{name}/state"]
-    title = f"{_words(name)} [{CATALOGUE[name].display_unit}]"
+    title = title_of(name, CATALOGUE[name].display_unit)
     axis = limits(measured.lines[0].values, state.lines[-1].values)
     return Panel(name, title, (measured, state, *_optional(drawn, f"{name}/wave")), axis)
 
@@ -59,8 +59,7 @@ def _optional(drawn: Drawn, entity: str) -> tuple[Series, ...]:
 
 
 def _input(drawn: Drawn, name: str) -> Panel:
-    measured, unit = drawn[f"{name}/measured"], CATALOGUE[name].display_unit
-    title = name if name == unit else f"{name} [{unit}]"
+    measured, title = drawn[f"{name}/measured"], title_of(name, CATALOGUE[name].display_unit)
     return Panel(name, title, (measured,), limits(measured.lines[0].values))
 
 
@@ -87,7 +86,7 @@ def _innovation(findings: Findings, drawn: Drawn, name: str) -> Panel:
     normalised = drawn[f"innovation_{name}/normalised"]
     return Panel(
         f"innovation_{name}",
-        f"{_words(name)} innovation / expected σ",
+        f"{words(name)} innovation / expected σ",
         (normalised, _guides(findings, "±2σ", BAND_STDS, "sigma_limits")),
         limits(normalised.lines[0].values, np.array([-2.0, 2.0]) * BAND_STDS),
     )
@@ -175,7 +174,3 @@ def _span(findings: Findings) -> FloatArray:
     """Return the start and the end of the clock, s."""
     clock = findings.plan.clock
     return np.array([0.0, (clock.count - 1) * clock.dt_secs])
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")

@@ -1,4 +1,4 @@
-"""The review of a replay in Rerun: its entities, and one page that shows them."""
+"""The review of a replay in Rerun: its entities, and the page and the tab that show them."""
 
 import os
 import re
@@ -12,7 +12,9 @@ import rerun.blueprint as rrb
 
 from analysis.replay.plan import Plan
 from analysis.replay.replay_results import Analysis, Findings, ReplayChunk
+from shiplog.types import Log
 
+from .further_channels import FurtherChannels
 from .panels import Panel
 from .replay_panels import equation_panels, history_panels
 from .rerun_io import (
@@ -28,7 +30,7 @@ from .rerun_io import (
 from .series_builder import SeriesBuilder
 from .track_chart import TrackChart, draw_track
 
-ROW_SHARES = [1.3, 0.9, 1.0, 0.9]  # heights: outputs, inputs, disturbances, innovations
+ROW_SHARES = [1.45, 0.8, 1.0, 0.9]  # heights: outputs, inputs, disturbances, innovations
 LEGEND = """
 ## Legend
 
@@ -42,6 +44,11 @@ and after a change
 sliding window that ends there
 - **gap in a curve**: nothing measured, or a window that does not determine the coefficient
 """
+FURTHER_NAME = "further channels"
+FURTHER_LEGEND = f"""\
+- **tab "{FURTHER_NAME}"**: what else the log has, as measured, and all sources of a quantity that \
+has several; steps are values held until the next, such as orders
+"""
 
 
 class ReplayReview:
@@ -51,6 +58,7 @@ class ReplayReview:
         self._recording, self._full = recording, full
         self._start_ns = plan.clock.start_ns
         self._builder = SeriesBuilder(plan.clock, plan.stats)
+        self._further = FurtherChannels(plan.screening, plan.clock, full=full)
 
     def add(self, chunk: ReplayChunk) -> None:
         """Draw the next chunk."""
@@ -58,6 +66,18 @@ class ReplayReview:
         if self._full:
             for entity, series in dense.items():
                 send_points(self._recording, entity, series, self._start_ns)
+
+    def add_further_channels(self, log: Log) -> None:
+        """Draw the channels that the replay does not use: a pass over the log if it has any.
+
+        Parameters
+        ----------
+        log
+            The log as recorded, as it was given to `plan_replay`.
+        """
+        if self._further:
+            for chunk in log.chunks():
+                self._further.add(chunk)
 
     def finish(self, findings: Findings, text: str) -> None:
         """Draw what is known only at the end.
@@ -73,10 +93,12 @@ class ReplayReview:
         drawn = self._builder.result()
         yaw, surge = equation_panels(findings, drawn)
         coefficients, chart = history_panels(findings, drawn), draw_track(findings, drawn)
-        rr.send_blueprint(_blueprint(yaw, surge, coefficients, chart), recording=recording)
+        further = self._further.panels()
+        page = _replay_page(yaw, surge, coefficients, chart)
+        rr.send_blueprint(_blueprint(page, further), recording=recording)
         _send_properties(recording, findings)
-        send_text(recording, "summary", text + LEGEND)
-        for panel in (*yaw, *surge, *coefficients):
+        send_text(recording, "summary", text + LEGEND + (FURTHER_LEGEND if further else ""))
+        for panel in (*yaw, *surge, *coefficients, *further):
             for series in panel.series:
                 entity = f"{panel.name}/{series.name}"
                 send_style(recording, entity, series)
@@ -114,11 +136,21 @@ def open_replay_review(
 
 
 def write_replay_review(
-    analysis: Analysis, path: str | os.PathLike[str], *, text: str, full: bool = False
+    analysis: Analysis,
+    path: str | os.PathLike[str],
+    *,
+    text: str,
+    full: bool = False,
+    log: Log | None = None,
 ) -> None:
-    """Write the review of an analysis to an .rrd file; see `open_replay_review`."""
+    """Write the review of an analysis to an .rrd file; see `open_replay_review`.
+
+    The channels that the replay did not use are drawn where the log is given.
+    """
     with open_replay_review(analysis.findings.plan, path, full=full) as review:
         review.add(analysis.as_chunk())
+        if log is not None:
+            review.add_further_channels(log)
         review.finish(analysis.findings, text)
 
 
@@ -155,9 +187,18 @@ def _send_properties(recording: rr.RecordingStream, findings: Findings) -> None:
     recording.send_property("trial", trial)
 
 
-def _blueprint(
+def _blueprint(page: rrb.Container, further: list[Panel]) -> rrb.Blueprint:
+    """Return a blueprint of the replay's page, with a tab for further channels if there are any."""
+    if not further:
+        return make_blueprint(page)
+    columns = 1 + (len(further) > 3) + (len(further) > 8)
+    grid = rrb.Grid(*map(plot_view, further), grid_columns=columns, name=FURTHER_NAME)
+    return make_blueprint(rrb.Tabs(page, grid, active_tab=0))
+
+
+def _replay_page(
     yaw: list[Panel], surge: list[Panel], coefficients: list[Panel], chart: TrackChart | None
-) -> rrb.Blueprint:
+) -> rrb.Container:
     """Lay out one page: yaw and surge on the left; track, summary and coefficients on the right."""
     plots = rrb.Horizontal(
         *(rrb.Vertical(*map(plot_view, column), row_shares=ROW_SHARES) for column in (yaw, surge))
@@ -170,4 +211,4 @@ def _blueprint(
     if coefficients:
         side.append(rrb.Grid(*map(plot_view, coefficients), grid_columns=3, name="coefficients"))
     right = rrb.Vertical(*side, row_shares=[2, 3][: len(side)])
-    return make_blueprint(rrb.Horizontal(plots, right, column_shares=[1, 1]))
+    return rrb.Horizontal(plots, right, column_shares=[1, 1], name="replay")

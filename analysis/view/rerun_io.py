@@ -54,6 +54,7 @@ def send_style(recording: rr.RecordingStream, entity: str, series: Series) -> No
         colors=[line.colour for line in series.lines],
         widths=[line.width for line in series.lines],
         aggregation_policy="MinMax" if series.spiky else "Average",
+        interpolation_mode="StepAfter" if series.steps else "Linear",
     )
     recording.log(entity, style, static=True)
 
@@ -116,7 +117,7 @@ def plot_view(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesVie
         name=panel.title,
         axis_x=axis,
         axis_y=rrb.ScalarAxis(range=panel.limits),
-        plot_legend=rrb.PlotLegend(visible=False),
+        plot_legend=rrb.PlotLegend("RightTop", visible=panel.legend),
     )
 
 

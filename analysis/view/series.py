@@ -55,12 +55,15 @@ class Series:
         The lines.
     spiky
         Whether, where many points fall on a pixel, their extremes are drawn and not their mean.
+    steps
+        Whether each value is drawn as held until the next, instead of joined to it.
     """
 
     name: str
     time_secs: FloatArray
     lines: tuple[Line, ...]
     spiky: bool = False
+    steps: bool = False
 
 
 def banded(

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from shiplog.errors import LogError
-from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
+from shiplog.units import display_conversion
 
 from .channel_stats import ChannelStats, LogStats, is_rudder_order
 from .on_change import INTERPOLATION_KEY, INTERPOLATIONS
@@ -232,10 +232,8 @@ def _worst(channel: ChannelStats) -> str:
 
 def _displayed(channel: ChannelStats, value: float) -> str:
     """Format a value in the unit people use."""
-    kind = CATALOGUE.get(channel.name)
-    if kind is None or channel.fields == GEOGRAPHIC:
-        return f"{value:.4g} {channel.unit}"
-    return f"{value * conversion_factor(kind.unit, kind.display_unit):.4g} {kind.display_unit}"
+    unit, factor = display_conversion(channel.name, channel.unit)
+    return f"{value * factor:.4g} {unit}"
 
 
 def _count(number: int, thing: str) -> str:

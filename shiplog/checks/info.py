@@ -16,7 +16,7 @@ from shiplog.mcap.stream import open_log
 from shiplog.mcap.summary import McapSummary, read_summary
 from shiplog.mcap.trial_log import build_trial_log
 from shiplog.types import Channel, Log, TrialLog
-from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
+from shiplog.units import CATALOGUE, GEOGRAPHIC, display_conversion
 
 from .channel_stats import ChannelStats
 from .data_quality import MAX_IRREGULAR_SHARE
@@ -324,13 +324,10 @@ def _info_of_channel(stats: ChannelStats, channel: Channel | None) -> ChannelInf
 
 def _ranges(stats: ChannelStats, channel: Channel | None) -> Iterator[ValueRange]:
     """Yield the range of each component that has a finite value."""
-    kind, unit = CATALOGUE.get(stats.name), stats.unit
-    if kind and unit == kind.unit:
-        unit = kind.display_unit
+    unit, scale = display_conversion(stats.name, stats.unit)
     if not stats.fields:
         low, high = stats.value_range
         if low <= high:
-            scale = conversion_factor(stats.unit, unit) if unit != stats.unit else 1.0
             yield ValueRange("", unit, low * scale, high * scale)
         return
     if channel is None:
@@ -338,5 +335,5 @@ def _ranges(stats: ChannelStats, channel: Channel | None) -> Iterator[ValueRange
     for field, values in zip(channel.fields, channel.values.T, strict=True):
         finite = values[np.isfinite(values)]
         if len(finite):
-            component_unit = "deg" if field in GEOGRAPHIC[:2] else unit
-            yield ValueRange(field, component_unit, float(finite.min()), float(finite.max()))
+            low, high = float(finite.min()) * scale, float(finite.max()) * scale
+            yield ValueRange(field, "deg" if field in GEOGRAPHIC[:2] else unit, low, high)

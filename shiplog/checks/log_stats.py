@@ -35,7 +35,9 @@ MIN_INTERVALS = 10  # fewer do not show whether a channel is irregular
 LAST_INSTANT_NS = np.iinfo(np.int64).max
 
 
-def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
+def compute_log_stats(
+    log: Log, *, strict: bool = False, sources: Mapping[str, str] | None = None
+) -> LogStats:
     """Compute the statistics of all channels in one pass over the log.
 
     The log may be longer than memory holds. Where its chunks are cut changes no result.
@@ -47,6 +49,8 @@ def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
     strict
         Treat impossible values and sentinels as not measured: they are then not valid. Where there
         are sentinels, the log is read a second time.
+    sources
+        The source in use, by the name of a quantity: fixes are not judged by another speed.
 
     Examples
     --------
@@ -59,7 +63,9 @@ def compute_log_stats(log: Log, *, strict: bool = False) -> LogStats:
     if strict:
         cleanings = {key: found for key, each in collectors.items() if (found := each.cleaning())}
         collectors = _collect(log, cleanings, strict=True) if cleanings else collectors
-    max_speed = max((c.max_value for c in collectors.values() if c.name == "speed"), default=0.0)
+    used = (sources or {}).get("speed")
+    speeds = [c for c in collectors.values() if c.name == "speed" and used in (None, c.source)]
+    max_speed = max((c.max_value for c in speeds), default=0.0)
     return LogStats(log.name, tuple(c.result(max_speed) for c in collectors.values()))
 
 
@@ -116,6 +122,11 @@ class _ChannelStatsCollector:
     def name(self) -> str:
         """Name of the channel."""
         return self._channel.name
+
+    @property
+    def source(self) -> str:
+        """Source of the channel."""
+        return self._channel.source
 
     @property
     def max_value(self) -> float:

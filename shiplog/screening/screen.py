@@ -79,11 +79,11 @@ def screen_values(
     """
     chosen = dict(sources or {})
     selected = log.select_sources(chosen) if chosen else log
-    stats = compute_log_stats(selected, strict=True)
+    all_stats = compute_log_stats(log, strict=True, sources=chosen)
+    stats = all_stats.select_sources(chosen)
     present = tuple(name for name in names if name in stats)
     found, warnings = choose_sources(selected, stats, present, chosen)
-    chosen |= found
-    return ScreenedLog(log, Screening(stats.select_sources(chosen), chosen, tuple(warnings)))
+    return ScreenedLog(log, Screening(all_stats, chosen | found, tuple(warnings)))
 
 
 def _require_channels(stats: LogStats, required: Sequence[str], purpose: str) -> None:

@@ -13,17 +13,23 @@ class Screening:
 
     Attributes
     ----------
-    stats
-        Statistics of the channels as screened; counts of defects are those of the raw log.
+    all_stats
+        Statistics of the channels of all sources as screened; counts of defects are those of the
+        raw log.
     sources
         The chosen source, by the name of each quantity that has several or was chosen by the user.
     warnings
         Problems of the data, each in a sentence.
     """
 
-    stats: LogStats
+    all_stats: LogStats
     sources: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    @property
+    def stats(self) -> LogStats:
+        """Statistics of the channels that are used, with one source of each quantity."""
+        return self.all_stats.select_sources(self.sources)
 
 
 class ScreenedLog:

@@ -10,7 +10,7 @@ from shiplog.checks.channel_stats import ChannelStats, LogStats
 from shiplog.checks.interpolate import Interpolator, valid_samples
 from shiplog.geodesy import LocalFrame, positions_of
 from shiplog.types import Channel, FloatArray, Log
-from shiplog.units import CATALOGUE, conversion_factor
+from shiplog.units import CATALOGUE, display_conversion
 
 MAX_INSTANTS = 20_000  # of the clock on which sources are compared
 MIN_INSTANTS = 20  # at which two sources are known, to compare them
@@ -445,10 +445,7 @@ def _min_disagreement(name: str, sources: Sequence[_Source]) -> float:
 
 def _display(channel: ChannelStats) -> tuple[str, float]:
     """Return the unit in which a channel is shown, and the factor to it."""
-    kind = CATALOGUE.get(channel.name)
-    if kind is None or channel.fields:
-        return ("m" if channel.fields else channel.unit), 1.0
-    return kind.display_unit, conversion_factor(kind.unit, kind.display_unit)
+    return ("m", 1.0) if channel.fields else display_conversion(channel.name, channel.unit)
 
 
 def _rms(values: FloatArray) -> float:

@@ -14,7 +14,7 @@ from shiplog.checks.log_stats import compute_log_stats
 from shiplog.errors import LogError, UsageError
 from shiplog.resampling import MAX_INSTANTS, Clock, resample_chunks
 from shiplog.types import Channel, FloatArray, TimeArray, TrialLog, concatenate_signals
-from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
+from shiplog.units import GEOGRAPHIC, display_conversion
 
 if TYPE_CHECKING:  # only what makes a frame or a dataset waits for these libraries
     import pandas as pd
@@ -104,10 +104,8 @@ def wide_table(
     values = {key: np.array(signals[key]) for key in usable}
     if display_units:
         for key in usable:
-            kind = CATALOGUE.get(columns[key].name)
-            if kind is not None:
-                values[key] *= conversion_factor(units[key], kind.display_unit)
-                units[key] = kind.display_unit
+            units[key], factor = display_conversion(columns[key].name, units[key])
+            values[key] *= factor
     return WideTable(signals.timestamps_ns, values, units)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from shiplog.types import Channel
+from shiplog.units import CATALOGUE
 
 START = 1_700_000_000 * 10**9
 
@@ -15,4 +16,5 @@ def channel(
     """Return a channel of 10 Hz, or of the given times (n,), s, received `lag` s later."""
     at = 0.1 * np.arange(len(values)) if times is None else times
     stamps = START + np.round(at * 1e9).astype(np.int64)
-    return Channel(name, "a", "1", stamps, stamps + int(lag * 1e9), values)
+    unit = CATALOGUE[name].unit if name in CATALOGUE else "1"
+    return Channel(name, "a", unit, stamps, stamps + int(lag * 1e9), values)

@@ -4,7 +4,14 @@ from math import pi
 import pytest
 
 from shiplog import UsageError
-from shiplog.units import CATALOGUE, UNITS, channel_kind, conversion_factor, did_you_mean
+from shiplog.units import (
+    CATALOGUE,
+    UNITS,
+    channel_kind,
+    conversion_factor,
+    did_you_mean,
+    display_conversion,
+)
 
 
 @pytest.mark.parametrize(
@@ -74,6 +81,24 @@ def test_rudder_and_rpm_are_commanded_and_compass_angles_are_circular() -> None:
         "apparent_wind_angle",
         "course_over_ground",
     }
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "shown", "factor"),
+    [
+        ("yaw_rate", "rad/s", "deg/s", 180 / pi),
+        ("power", "kW", "kW", 1.0),
+        ("power", "MW", "kW", 1000.0),
+        ("hull_power", "W", "kW", 1e-3),
+        ("thruster_azimuth", "rad", "deg", 180 / pi),
+        ("power", "litre/h", "litre/h", 1.0),
+        ("fuel_flow", "kg/h", "kg/h", 1.0),
+    ],
+)
+def test_any_channel_is_shown_in_the_unit_people_use(
+    name: str, unit: str, shown: str, factor: float
+) -> None:
+    assert display_conversion(name, unit) == (shown, pytest.approx(factor))
 
 
 def test_a_channel_kind_is_found_by_name_or_the_nearest_is_suggested() -> None:

@@ -9,6 +9,7 @@ from shiplog.checks.channel_stats import ChannelStats
 from shiplog.checks.data_quality import data_warnings
 from shiplog.checks.log_stats import compute_log_stats
 from shiplog.types import Channel, FloatArray, TrialLog
+from shiplog.units import CATALOGUE
 
 START = 1_700_000_000_000_000_000
 EXECUTES = np.array([10.0, 82.8, 257.6, 437.9])
@@ -22,7 +23,9 @@ def channel(
     **metadata: str,
 ) -> Channel:
     at = START + np.round(np.asarray(secs) * 1e9).astype(np.int64)
-    return Channel(name, source, "1", at, at, np.asarray(values, float), metadata=metadata)
+    return Channel(
+        name, source, CATALOGUE[name].unit, at, at, np.asarray(values, float), metadata=metadata
+    )
 
 
 def stats_of(*args: object, **kwargs: str) -> ChannelStats:

@@ -163,6 +163,27 @@ def test_the_user_can_choose_any_source(trial: TrialLog) -> None:
     assert not any("sources" in warning for warning in result.warnings)
 
 
+@pytest.mark.parametrize("sources", [None, {"yaw_rate": "other"}])
+def test_the_statistics_of_sources_that_are_not_used_are_kept_apart(
+    trial: TrialLog, sources: dict[str, str] | None
+) -> None:
+    screening = screened(with_source(trial, "yaw_rate", lambda x: -x), sources).screening
+    names = [channel.name for channel in screening.stats]
+    assert names.count("yaw_rate") == 1
+    assert len(screening.all_stats) == len(screening.stats) + 1
+
+
+def test_a_speed_that_is_not_used_does_not_judge_the_fixes(trial: TrialLog) -> None:
+    alone = screened(trial).screening.stats["position"]
+    log = with_source(trial, "speed", lambda x: 5.0 * x)
+    kept = screened(log, {"speed": "simulated"}).screening.stats["position"]
+    fixes = alone.fixes, kept.fixes
+    assert repr(fixes[0]) == repr(fixes[1])
+    assert repr(screened(log, {"speed": "other"}).screening.stats["position"].fixes) != repr(
+        fixes[0]
+    )
+
+
 def test_where_the_log_is_cut_into_chunks_does_not_change_the_choice(trial: TrialLog) -> None:
     log = with_source(trial, "rudder", lambda x: 0.5 * x)
 

@@ -1,5 +1,7 @@
 """Wide tables of a trial in pandas and xarray."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,6 +9,7 @@ from small_logs import trial
 
 from shiplog.errors import LogError, UsageError
 from shiplog.resampling import resample
+from shiplog.tables.long_form import from_frame, to_frame
 from shiplog.types import Channel, TrialLog
 
 START = 1_700_000_000_000_000_000
@@ -47,6 +50,58 @@ def test_display_units_are_named_in_the_columns(zigzag_log: TrialLog) -> None:
     np.testing.assert_allclose(shown["speed [kn]"], si["speed"] * 3600 / 1852)
     assert shown.attrs["units"]["rudder [deg]"] == "deg"
     assert si.attrs["units"]["rudder"] == "rad"
+
+
+def further_channels() -> TrialLog:
+    """Return a log of quantities that no replay uses, and a second shaft."""
+    at, port = [0.0, 1.0, 2.0, 3.0], [80.0, 81.0, 82.0, 83.0]
+    units = {"heel": "rad", "power": "W", "fuel_flow": "kg/h", "thruster_azimuth": "rad"}
+    further = [
+        replace(channel(name, at, [0.1, 0.2, 0.3, 0.4]), unit=unit) for name, unit in units.items()
+    ]
+    shafts = [
+        replace(channel("rpm", at, [k * each for each in port], source), unit="rpm")
+        for source, k in (("port", 1), ("starboard", 2))
+    ]
+    return TrialLog("x", (*further, *shafts))
+
+
+def test_further_channels_are_columns_with_their_units() -> None:
+    frame = further_channels().to_pandas()
+    assert frame.attrs["units"] == {
+        "heel": "rad", "power": "W", "fuel_flow": "kg/h", "thruster_azimuth": "rad",
+        "rpm": "rpm", "rpm/starboard": "rpm",
+    }  # fmt: skip
+    assert frame["power"].tolist() == [0.1, 0.2, 0.3, 0.4]
+    assert frame["rpm/starboard"].tolist() == [160.0, 162.0, 164.0, 166.0]
+
+
+def test_further_channels_are_shown_in_the_units_people_use() -> None:
+    log = further_channels()
+    frame = log.to_pandas(display_units=True)
+    assert list(frame.columns) == [
+        "heel [deg]", "power [kW]", "fuel_flow [kg/h]", "thruster_azimuth [deg]",
+        "rpm [rpm]", "rpm/starboard [rpm]",
+    ]  # fmt: skip
+    assert list(frame.attrs["units"].values()) == ["deg", "kW", "kg/h", "deg", "rpm", "rpm"]
+    expected = (
+        ("heel", 180 / np.pi),
+        ("power", 1e-3),
+        ("fuel_flow", 1),
+        ("thruster_azimuth", 180 / np.pi),
+    )
+    for (name, factor), column in zip(expected, frame.columns, strict=False):
+        np.testing.assert_allclose(frame[column], log[name].values * factor)
+
+
+def test_the_long_form_keeps_further_channels_with_their_units() -> None:
+    log = further_channels()
+    frame = to_frame(log)
+    assert set(frame["topic"]) == {each.topic for each in log}
+    power = frame[frame["topic"] == "/power/a"]
+    assert power["value"].tolist() == log["power"].values.tolist()
+    back = from_frame(frame)
+    assert {each.topic: each.unit for each in back} == {each.topic: each.unit for each in log}
 
 
 def test_components_and_second_sources_are_columns_and_empty_channels_are_left_out() -> None:
