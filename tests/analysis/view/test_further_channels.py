@@ -135,10 +135,10 @@ def test_an_order_is_drawn_in_steps_with_what_it_commands() -> None:
 
 
 def test_an_order_alone_has_its_own_panel_and_one_before_the_clock_holds_throughout() -> None:
-    order = channel(np.array([12.0]), np.array([-5.0]), "heading_order")
+    order = channel(np.array([2.0]), np.array([-5.0]), "heading_order")
     panel = panel_of(from_source("autopilot", order, "rad"))
     assert panel.title == "heading order [deg]"
-    angle = np.degrees(12.0)
+    angle = np.degrees(2.0)
     np.testing.assert_allclose(points(panel.series[0]), [[0, angle], [100, angle]], rtol=1e-12)
 
 
