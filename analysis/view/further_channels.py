@@ -24,7 +24,7 @@ from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Line, Series
 
 SOURCE_COLOURS = BLUE, ORANGE, GREEN, RED, CYAN, GREY
 ORDER_SUFFIX = "_order"  # of the name of a quantity that is commanded
-TRACK_QUANTITY = "position"
+NOT_DRAWN = "position", "gnss_time"  # the track, and a clock
 LEGEND_SHARE = 0.15  # of an axis, above the values, for each name in the legend
 
 
@@ -52,7 +52,8 @@ class FurtherChannels:
     """Draws the channels of a log that a replay does not use, chunk by chunk.
 
     Of a quantity with several sources all are drawn, the one that the replay uses included.
-    Positions are not drawn: they are the track. Where the chunks are cut changes no result.
+    Positions are not drawn, as they are the track, nor are the times of a satellite receiver. Where
+    the chunks are cut changes no result.
 
     Parameters
     ----------
@@ -187,7 +188,7 @@ def _by_quantity(stats: LogStats) -> dict[_Quantity, list[ChannelStats]]:
     """Return the channels to draw by quantity, in the order of the catalogue."""
     groups: dict[_Quantity, list[ChannelStats]] = {}
     for channel in stats:
-        if channel.valid and channel.name != TRACK_QUANTITY:
+        if channel.valid and channel.name not in NOT_DRAWN:
             groups.setdefault(_quantity(channel, stats), []).append(channel)
     order = {name: number for number, name in enumerate(CATALOGUE)}
     return {

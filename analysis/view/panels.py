@@ -53,10 +53,10 @@ def title_of(name: str, unit: str) -> str:
 
     Examples
     --------
-    >>> title_of("yaw_rate", "deg/s"), title_of("rpm", "rpm")
-    ('yaw rate [deg/s]', 'rpm')
+    >>> title_of("yaw_rate", "deg/s"), title_of("rpm", "rpm"), title_of("satellites", "1")
+    ('yaw rate [deg/s]', 'rpm', 'satellites')
     """
-    return name if name == unit else f"{words(name)} [{unit}]"
+    return words(name) if unit in (name, "1") else f"{words(name)} [{unit}]"
 
 
 def thousands(size: float) -> tuple[str, float]:

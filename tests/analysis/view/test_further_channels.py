@@ -70,6 +70,7 @@ def points(series: Series) -> list[list[float]]:
         ("depth", "m", "depth [m]", 1.0),
         ("wind_speed", "m/s", "wind speed [kn]", 3600 / 1852),
         ("propeller_pitch", "1", "propeller pitch [%]", 100.0),
+        ("satellites", "1", "satellites", 1.0),
         ("fuel_flow", "kg/h", "fuel flow [kg/h]", 1.0),
         ("thruster_azimuth", "rad", "thruster azimuth [deg]", 180 / np.pi),
     ],
@@ -91,6 +92,8 @@ def test_nothing_is_drawn_of_what_a_replay_shows_and_of_what_a_log_lacks() -> No
     log = shiplog.read(SAMPLE_DATA / "zigzag_20_20.mcap")
     assert {c.name for c in log} == {*REQUIRED_CHANNELS, "heading", "position"}
     assert list(panels_of(log, start_ns=log.span_ns[0])) == ["heading [deg]"]
+    clock = from_source("gnss", channel(START * 1e-9 + TIMES, TIMES, "gnss_time"))
+    assert panels_of(TrialLog("a.mcap", (clock,))) == {}
     empty = channel(np.full(101, np.nan), TIMES, "power")
     assert panels_of(TrialLog("a.mcap", (empty,))) == {}
     late = channel(np.ones(50), TIMES[:50] + DURATION + 1, "power")
