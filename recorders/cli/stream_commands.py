@@ -22,7 +22,7 @@ from recorders.trial.open_source import (
 from recorders.trial.recorded_source import RecordedSource
 from recorders.trial.stream_tables import stream_tables
 from recorders.trial.trial_file import load_trial_file
-from shiplog.cli.console import print_tables, progress
+from shiplog.cli.console import print_tables, print_warnings, progress
 from shiplog.cli.paths import require_outputs, require_suffix
 from shiplog.errors import UsageError
 from shiplog.files import is_device
@@ -97,7 +97,9 @@ def _record(
     )
     with _shown(source, log, marks) as on_chunk:
         recording = record(source, log, rotation=rotation, on_chunk=on_chunk)
-    print_tables(stream_tables(_streams(source)), to_stderr=is_device(log))
+    streams = _streams(source)
+    print_tables(stream_tables(streams), to_stderr=is_device(log))
+    print_warnings([text for stream in streams for text in stream.decoder.counts.warnings])
     return recording
 
 

@@ -1,8 +1,9 @@
-"""Counts of what a stream received: packets by kind, and rejected packets by reason."""
+"""Counts of what a stream received: packets by kind, rejected ones by reason, and warnings."""
 
 from collections import Counter
 from collections.abc import Mapping
 
+MAX_WARNINGS = 100
 MAX_KINDS = 256  # names come from the wire; more than these are counted together
 _OTHER = "other kinds"
 
@@ -23,6 +24,10 @@ class StreamCounts:
         self._accepted: Counter[str] = Counter()
         self._rejected: Counter[str] = Counter()
         self._unused: Counter[str] = Counter()
+        self._flagged: Counter[str] = Counter()
+        self._notes: dict[str, str] = {}
+        self._warnings: list[tuple[int | None, str]] = []
+        self._taken = 0
 
     @property
     def accepted(self) -> Mapping[str, int]:
@@ -39,6 +44,21 @@ class StreamCounts:
         """The number of valid packets of a kind that is not decoded, or of no value, by kind."""
         return self._unused
 
+    @property
+    def flagged(self) -> Mapping[str, int]:
+        """The number of accepted packets with values that the sender marks as invalid, by kind."""
+        return self._flagged
+
+    @property
+    def notes(self) -> Mapping[str, str]:
+        """What else is known of the stream, as texts by key, for the metadata of the log."""
+        return self._notes
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful about the stream, one line each; the first `MAX_WARNINGS` of them."""
+        return tuple(text for _, text in self._warnings)
+
     def accept(self, kind: str) -> None:
         """Count a packet from which samples were decoded."""
         _count(self._accepted, kind)
@@ -50,6 +70,25 @@ class StreamCounts:
     def skip(self, kind: str) -> None:
         """Count a valid packet that is not decoded."""
         _count(self._unused, kind)
+
+    def flag(self, kind: str) -> None:
+        """Count an accepted packet with values that its sender marks as invalid."""
+        _count(self._flagged, kind)
+
+    def note(self, key: str, text: str) -> None:
+        """Keep a text for the metadata of the log; a later one of the same key replaces it."""
+        if key in self._notes or len(self._notes) < MAX_KINDS:
+            self._notes[key] = text
+
+    def warn(self, text: str, time_ns: int | None = None) -> None:
+        """Keep a warning, with its time where it has one; it becomes an event of the log."""
+        if len(self._warnings) < MAX_WARNINGS:
+            self._warnings.append((time_ns, text))
+
+    def take_warnings(self) -> list[tuple[int | None, str]]:
+        """Return the warnings since the last call, with their times."""
+        new, self._taken = self._warnings[self._taken :], len(self._warnings)
+        return new
 
 
 def _count(counter: Counter[str], kind: str) -> None:

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from recorders.streams.files import read_lines
 from recorders.streams.format import StreamFormat
+from recorders.streams.line_files import read_lines
 from recorders.streams.pace import paced
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.streams.sample_buffer import SampleBuffer

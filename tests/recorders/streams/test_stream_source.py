@@ -6,7 +6,7 @@ from recorders.streams.counts import StreamCounts
 from recorders.streams.packets import Packet
 from recorders.streams.sample_buffer import SampleBuffer
 from recorders.streams.stream_source import StreamSource
-from shiplog.types import Channel, RawPackets
+from shiplog.types import Channel, Event, RawPackets
 
 
 class _Numbers:
@@ -58,3 +58,25 @@ def test_metadata_at_the_end_count_the_rejected_packets() -> None:
         "origin": "numbers.txt",
         "rejected.not a number": "1",
     }
+
+
+def test_warnings_are_events_with_their_time_or_that_of_the_last_packet() -> None:
+    source = _source()
+    source.decoder.counts.warn("the receiver was set", 7)
+    chunks = source.chunks()
+    first = next(chunks)
+    source.decoder.counts.warn("no date")
+    events = [item for chunk in (first, *chunks) for item in chunk if isinstance(item, Event)]
+    assert [(event.text, event.time_ns) for event in events] == [
+        ("the receiver was set", 7),
+        ("no date", 2),
+    ]
+    assert source.decoder.counts.warnings == ("the receiver was set", "no date")
+
+
+def test_notes_and_invalid_values_are_metadata() -> None:
+    source = _source()
+    source.decoder.counts.note("latency_s.GP.RMC", "0.30")
+    source.decoder.counts.flag("HETHS")
+    assert source.metadata["latency_s.GP.RMC"] == "0.30"
+    assert source.metadata["invalid.HETHS"] == "1"
