@@ -12,14 +12,11 @@ from shiplog.types import FloatArray, TimeArray, is_sorted
 from .clock_steps import (
     ChannelTimes,
     ClockStep,
-    backward_rows,
-    common_steps,
     continued_times,
-    is_steady,
-    pause_rows,
-    sampling_interval,
     steps_back,
 )
+from .forward_steps import returned_steps
+from .sensor_clocks import LAG_SAMPLES, without_steps
 
 MAX_DISTANCE_NS = 365 * 86_400 * 10**9  # of a time from the median of the log
 MAX_DROPPED_SHARE = 0.05  # of a channel's samples; more are another clock
@@ -115,8 +112,6 @@ class ClockRepair:
     ----------
     columns
         The messages by channel id, with times that go on at the sampling rate.
-    change_ns
-        The sum of the removed steps of the recorder's clock, ns.
     warnings
         What was repaired.
     mixed
@@ -124,7 +119,6 @@ class ClockRepair:
     """
 
     columns: dict[int, MessageColumns]
-    change_ns: int
     warnings: list[str]
     mixed: list[MixedTimes]
 
@@ -133,7 +127,7 @@ def repair_clock_steps(file: str, columns: Mapping[int, MessageColumns]) -> Cloc
     """Remove the steps of the recorder's and the sensors' clocks.
 
     A step back in some channels only, and one at a restart of the recorder, after a pause of
-    unknown length, are not removed.
+    unknown length, are not removed; nor is a step forward that no step back returns.
 
     Parameters
     ----------
@@ -143,19 +137,26 @@ def repair_clock_steps(file: str, columns: Mapping[int, MessageColumns]) -> Cloc
         The messages by channel id.
     """
     channels = dict(columns)
-    change, mixed, warnings = 0, [], []
+    mixed, warnings = [], []
     if not _in_order_of_reception(channels.values()):
-        steps = steps_back(_times_by_topic(channels.values()))
-        refused = [s for s in steps if s.steady_names or _is_restart(s, channels.values())]
-        steps = [step for step in steps if step not in refused]
-        warnings += [_step_warning(step, channels.values()) for step in steps]
-        change = sum(step.size_ns for step in steps)
+        times = _times_by_topic(channels.values())
+        pairs = returned_steps(times)
+        returned = {step.position for _, step in pairs}
+        back = [step for step in steps_back(times) if step.position not in returned]
+        refused = [s for s in back if s.steady_names or _is_restart(s, channels.values())]
+        back = [step for step in back if step not in refused]
+        warnings += [_step_warning(step, channels.values()) for step in back]
+        warnings += [_pair_warning(*pair, channels.values()) for pair in pairs]
+        steps = sorted(
+            [*back, *(step for pair in pairs for step in pair)], key=lambda step: step.position
+        )
         channels = {id_: _continued(channel, steps) for id_, channel in channels.items()}
         mixed = [_mixed_times(file, step, channels.values()) for step in refused]
-    for id_, channel in channels.items():
-        channels[id_], warning = _repair_measured(channel)
+    for id_, c in channels.items():
+        measured, warning = without_steps(c.topic, c.measured_ns, c.received_ns)
+        channels[id_] = replace(c, measured_ns=measured) if warning else c
         warnings += warning
-    return ClockRepair(channels, change, warnings, mixed)
+    return ClockRepair(channels, warnings, mixed)
 
 
 def refuse_mixed_times(mixed: Collection[MixedTimes], span_ns: tuple[int, int]) -> None:
@@ -180,29 +181,6 @@ def refuse_mixed_times(mixed: Collection[MixedTimes], span_ns: tuple[int, int]) 
 def mixed_times_in(mixed: Collection[MixedTimes], span_ns: tuple[int, int]) -> list[MixedTimes]:
     """Return the spans of mixed times that a part of a log includes; `span_ns` is its span."""
     return [s for s in mixed if span_ns[0] <= s.end_ns and span_ns[1] >= s.start_ns]
-
-
-def pause_warnings(channels: Collection[MessageColumns]) -> list[str]:
-    """Report gaps in all channels at once: a pause of the recorder, or its clock set forward.
-
-    Parameters
-    ----------
-    channels
-        The messages with repaired times.
-    """
-    times = [ChannelTimes(c.topic, c.positions, c.received_ns) for c in channels]
-    times = [channel for channel in times if is_steady(channel)]
-    rows = [pause_rows(channel.times_ns) for channel in times]
-    if len(times) < 2 or not all(rows):
-        return []
-    return [
-        f"times: all channels have no samples for {step.size_ns / _SECOND_NS:.1f} s, "
-        f"{(step.before_ns - int(min(c.times_ns[0] for c in times))) / _SECOND_NS:.1f} s after the "
-        "start; the recorder paused, or its clock was set forward: times were not changed; if the "
-        "clock was set, evaluate the parts before and after separately"
-        for step in common_steps(times, rows)
-        if len(step.names) == len(times)
-    ]
 
 
 def max_faulty_times(count: int) -> float:
@@ -336,49 +314,35 @@ def _step_warning(step: ClockStep, channels: Collection[MessageColumns]) -> str:
     )
 
 
+def _pair_warning(forward: ClockStep, back: ClockStep, channels: Collection[MessageColumns]) -> str:
+    start = _start_ns(channels)
+    is_ahead = forward.position < back.position
+    first, last = (forward, back) if is_ahead else (back, forward)
+    return (
+        f"times: the clock of the recorder was set {'forward' if is_ahead else 'back'} by "
+        f"{forward.size_ns / _SECOND_NS:.3f} s, {(first.before_ns - start) / _SECOND_NS:.1f} s "
+        f"after the start, and {'back' if is_ahead else 'forward'} by the same "
+        f"{abs(last.before_ns - first.after_ns) / _SECOND_NS:.1f} s later, in the order of the "
+        f"file; the times in between were {'decreased' if is_ahead else 'increased'} by this: "
+        "compare the times with a clock of the ship if they matter"
+    )
+
+
 def _continued(channel: MessageColumns, steps: Sequence[ClockStep]) -> MessageColumns:
     """Return a channel without the steps, in its measured times too where these have them."""
     received, measured = channel.received_ns, channel.measured_ns
-    for step in steps:
-        row = int(np.searchsorted(channel.positions, step.position))
-        if row < len(measured):
-            lag = measured - received
-            before, after = lag[max(row - 32, 0) : row], lag[row : row + 32]
-            change = float(np.median(after) - np.median(before)) if len(before) else 0.0
-            if abs(change) < 0.5 * abs(step.size_ns):
-                measured = measured.copy()
-                measured[row:] -= step.size_ns
-        received = continued_times(ChannelTimes("", channel.positions, received), [step])
+    lag = measured - received
+    rows = [int(np.searchsorted(channel.positions, step.position)) for step in steps]
+    ends = [0, *rows, len(measured)]
+    for number, (row, step) in enumerate(zip(rows, steps, strict=True)):
+        before = lag[max(row - LAG_SAMPLES, ends[number]) : row]
+        after = lag[row : min(row + LAG_SAMPLES, ends[number + 2])]
+        change = float(np.median(after) - np.median(before)) if len(before) and len(after) else 0.0
+        if row < len(measured) and abs(change) < 0.5 * abs(step.size_ns):
+            measured = measured.copy()
+            measured[row:] -= step.size_ns
+    received = continued_times(ChannelTimes("", channel.positions, received), steps)
     return replace(channel, received_ns=received, measured_ns=measured)
-
-
-def _repair_measured(channel: MessageColumns) -> tuple[MessageColumns, list[str]]:
-    """Remove steps back of the sensor's clock, against the steady times of reception."""
-    measured = channel.measured_ns
-    if is_sorted(measured) or not is_sorted(channel.received_ns):
-        return channel, []
-    warnings = []
-    for row in backward_rows(measured):
-        lag = measured - channel.received_ns
-        before, after = lag[max(row - 32, 0) : row], lag[row : row + 32]
-        size = round(float(np.median(after) - np.median(before)))
-        interval, _ = sampling_interval(channel.received_ns)
-        if size >= -interval:
-            continue
-        measured = measured.copy()
-        if abs(np.median(after)) < abs(np.median(before)):
-            measured[:row] += size
-            part = "earlier"
-        else:
-            measured[row:] -= size
-            part = "later"
-        warnings.append(
-            f"{channel.topic}: the clock of the sensor was set back by {-size / _SECOND_NS:.3f} s, "
-            f"{(channel.received_ns[row] - channel.received_ns[0]) / _SECOND_NS:.1f} s after its "
-            f"start, the times of reception go on; its {part} times were shifted by this: check "
-            "the sensor's clock"
-        )
-    return replace(channel, measured_ns=measured), warnings
 
 
 def _start_ns(channels: Collection[MessageColumns]) -> int:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from shiplog.types import TimeArray
 
 LEVEL_SAMPLES = 8  # on each side of a step, for its size; longer bursts are not jitter
-MIN_PAUSE_INTERVALS = 8.0  # of a gap in all channels that may be a step forward
 MIN_SAMPLES_BESIDE_STEP = 3  # of a channel on each side; fewer do not show a step
 MIN_GAP_INTERVALS = 3.0  # in sorted times, by which a clock set back differs from another order
 MAX_DEVIATION_INTERVALS = 0.75  # of a smaller change of level, jitter is the cause
@@ -132,7 +131,7 @@ def backward_rows(times_ns: TimeArray) -> list[int]:
     >>> backward_rows(np.concatenate([clock[:10], clock[20:], clock[10:20]]))
     []
     """
-    rows, interval = _candidate_rows(times_ns)
+    rows, interval = falling_rows(times_ns)
     return _rows_with_repeated_times(times_ns, rows, interval)
 
 
@@ -155,7 +154,7 @@ def earlier_rows(times_ns: TimeArray) -> list[int]:
     >>> earlier_rows(np.concatenate([clock[20:], clock[:20]]))
     []
     """
-    rows, interval = _candidate_rows(times_ns)
+    rows, interval = falling_rows(times_ns)
     if not rows:
         return []
     _, spread = sampling_interval(times_ns)
@@ -218,26 +217,6 @@ def common_steps(channels: Sequence[ChannelTimes], rows: Sequence[list[int]]) ->
     return [_step_at(channels, rows, last) for _, last in places]
 
 
-def pause_rows(times_ns: TimeArray) -> list[int]:
-    """Return the rows of a channel after gaps of many sampling intervals.
-
-    Parameters
-    ----------
-    times_ns
-        (n,) times in the order of the file.
-
-    Examples
-    --------
-    >>> pause_rows(np.array([0, 10, 20, 30, 40, 200, 210, 220]))
-    [5]
-    """
-    interval, spread = sampling_interval(times_ns)
-    if not 0.0 < spread + 1.0 <= MAX_INTERVAL_SPREAD * interval:
-        return []
-    limit = MIN_PAUSE_INTERVALS * interval
-    return (np.flatnonzero(np.diff(times_ns) > limit) + 1).tolist()
-
-
 def is_steady(channel: ChannelTimes) -> bool:
     """Whether a channel is sampled at a steady rate, so that its intervals show a step."""
     interval, spread = sampling_interval(channel.times_ns)
@@ -265,7 +244,7 @@ def continued_times(channel: ChannelTimes, steps: Sequence[ClockStep]) -> TimeAr
     return times
 
 
-def _candidate_rows(times: TimeArray) -> tuple[list[int], float]:
+def falling_rows(times: TimeArray) -> tuple[list[int], float]:
     """Return the rows at which the level of the times falls, and the sampling interval."""
     interval, spread = sampling_interval(times)
     if interval == 0.0:

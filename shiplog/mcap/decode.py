@@ -27,6 +27,7 @@ from .locate import (
     locate_by_size,
     record_sizes,
 )
+from .pauses import Pauses
 from .records import MESSAGE_HEAD, RECORD_HEAD
 from .schema import (
     ENCODING,
@@ -134,14 +135,12 @@ class McapContents:
         One warning for each damaged part.
     data_blocks
         The number of MCAP chunks, and runs of messages outside of them, read so far.
-    clock_change_ns
-        The sum of the steps of the recorder's clock in the samples drained so far, ns.
     clock_warnings
         Warnings about times of messages in the samples drained so far.
     mixed_times
         Steps of clocks that were not repaired in the samples drained so far.
-    pause_warnings
-        Warnings about gaps in all channels in the samples drained so far.
+    pauses
+        Gaps in all channels in the samples drained so far.
     """
 
     schemas: dict[int, records.Schema] = field(default_factory=dict)
@@ -163,10 +162,9 @@ class McapContents:
     truncated: bool = False
     damage: list[str] = field(default_factory=list)
     data_blocks: int = 0
-    clock_change_ns: int = 0
     clock_warnings: list[str] = field(default_factory=list)
     mixed_times: list[MixedTimes] = field(default_factory=list)
-    pause_warnings: list[str] = field(default_factory=list)
+    pauses: Pauses = field(default_factory=Pauses)
 
     def drain(self) -> dict[int, list[SampleBlock]]:
         """Return the blocks collected so far, by channel id, and release them."""

@@ -14,9 +14,11 @@ from shiplog.types import TimeArray, TrialLog
 
 from .clock_repair import MixedTimes, refuse_mixed_times
 from .decode import McapContents
+from .index_times import received_in_order
 from .records import MAGIC
 from .scan import scan
-from .summary import McapSummary, are_in_order, read_summary
+from .summary import McapChunkLocation, McapSummary, are_in_order, read_summary
+from .times_check import TimesCheck
 from .trial_log import build_trial_log, channels_by_id, merge_by_topic
 
 
@@ -88,7 +90,9 @@ def read(
     log
         The trial. Where a part was requested, MCAP chunks that contain nothing of it according to
         the summary of the file are not read: damage in them is not noticed, and the checksum of the
-        data section is not verified. A file without a summary is read whole.
+        data section is not verified. Their message indexes, and the MCAP chunks at the ends of the
+        file, show whether times need a repair; such a file, and one without a summary, is read
+        whole, so that the part has the times that it has in the whole log.
 
     Raises
     ------
@@ -124,7 +128,6 @@ def read_unchecked(
         The trial, and the spans for which the caller has to call `refuse_mixed_times`.
     """
     path = Path(path)
-    contents, skip = McapContents(), frozenset[int]()
     if isinstance(channels, str):
         channels = (channels,)
     keys = None if channels is None else tuple(channels)
@@ -135,15 +138,51 @@ def read_unchecked(
     span = ReceptionSpan(start_ns, end_ns)
     is_part = keys is not None or span != ReceptionSpan()
     with open_mcap(path) as stream:
-        summary = read_summary(stream) if is_part else None
-        if summary is not None:
-            contents = contents_described_by(summary)
-            contents.selected = _selected_ids(path, contents, keys)
-            skip = _mcap_chunks_to_skip(summary, contents.selected, span)
-        for _ in scan(stream, contents, skip):
-            pass
+        contents = _contents_of_part(path, stream, keys, span) if is_part else None
+        if contents is None:
+            contents = McapContents()
+            for _ in scan(stream, contents):
+                pass
     log = build_trial_log(path, contents)
     return _selected_part(log, keys, span) if is_part else log, contents.mixed_times
+
+
+def _contents_of_part(
+    path: Path, stream: IO[bytes], keys: Collection[str] | None, span: ReceptionSpan
+) -> McapContents | None:
+    """Return the contents of the MCAP chunks that have something of a part.
+
+    None where the summary does not describe them, or where some times may need a repair: what is
+    repaired depends on the whole file.
+    """
+    summary = read_summary(stream)
+    if summary is None:
+        return None
+    contents = contents_described_by(summary)
+    contents.selected = _selected_ids(path, contents, keys)
+    mcap_chunks = summary.mcap_chunk_locations() or ()
+    skip = _mcap_chunks_to_skip(mcap_chunks, contents.selected, span)
+    if not skip or not received_in_order(stream, summary):
+        return None
+    check = TimesCheck()
+    offsets = frozenset(mcap_chunk.offset for mcap_chunk in mcap_chunks)
+    first, last = min(offsets), max(offsets)
+    _check_skipped(stream, summary, offsets - ({first} & skip), check)
+    for _ in scan(stream, contents, skip):
+        pass
+    check.add(contents.blocks, contents)
+    _check_skipped(stream, summary, offsets - ({last} & skip - {first}), check)
+    return None if check.need_repair() else contents
+
+
+def _check_skipped(
+    stream: IO[bytes], summary: McapSummary, skip: frozenset[int], check: TimesCheck
+) -> None:
+    """Check the times in the MCAP chunks at the ends of a file that are not in the part."""
+    contents = contents_described_by(summary)
+    for _ in scan(stream, contents, skip):
+        pass
+    check.add(contents.blocks, contents)
 
 
 @contextmanager
@@ -194,13 +233,12 @@ def _selected_ids(
 
 
 def _mcap_chunks_to_skip(
-    summary: McapSummary, ids: frozenset[int], span: ReceptionSpan
+    mcap_chunks: Collection[McapChunkLocation], ids: frozenset[int], span: ReceptionSpan
 ) -> frozenset[int]:
     """Return the offsets of the MCAP chunks that have nothing of these channels and this span.
 
     None is skipped where they are not in the order of reception: a clock may have been set back.
     """
-    mcap_chunks = summary.mcap_chunk_locations() or ()
     if not are_in_order(mcap_chunks):
         return frozenset()
     return frozenset(

@@ -17,8 +17,8 @@ from .decode import McapContents
 from .reader import contents_described_by, open_mcap, read_unchecked
 from .scan import scan
 from .summary import are_in_order, read_summary
+from .times_check import TimesCheck
 from .trial_log import build_trial_log
-from .unset_times import are_set
 
 MAX_SAMPLES_IN_MEMORY = 16_000_000  # 400 MB of samples; a filter of them needs more
 FILE_CHUNK_SAMPLES = 1 << 20  # of all channels together, about
@@ -129,7 +129,7 @@ class LogFile:
             return self
         spans = [
             (int(channel.measured_ns.min()), int(channel.measured_ns.max()))
-            for chunk, _ in self._unchecked_chunks()
+            for chunk in self.chunks()
             for channel in chunk
             if len(channel)
         ] or [(0, 0)]
@@ -140,7 +140,7 @@ class LogFile:
             raise empty_cut_error(start, end, span_ns, self.name)
         if cut.start_ns == span_ns[0]:
             return part
-        samples = inputs_in_force((c for c, _ in self._unchecked_chunks()), cut.start_ns)
+        samples = inputs_in_force(self.chunks(), cut.start_ns)
         return replace(self, cuts=(*self.cuts, replace(cut, in_force=samples)))
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
@@ -157,16 +157,6 @@ class LogFile:
         LogError
             Reading fails, as in `read`.
         """
-        span_ns = (
-            max((cut.start_ns for cut in self.cuts), default=-(2**63)),
-            min((cut.end_ns - 1 for cut in self.cuts), default=2**63),
-        )
-        for channels, mixed in self._unchecked_chunks():
-            refuse_mixed_times(mixed, span_ns)
-            yield channels
-
-    def _unchecked_chunks(self) -> Iterator[tuple[tuple[Channel, ...], list[MixedTimes]]]:
-        """Iterate over the chunks, with the spans of mixed times so far."""
         contents = McapContents(
             dict(self.schemas), dict(self.channel_records), keep_undescribed=False
         )
@@ -175,10 +165,10 @@ class LogFile:
             for _ in scan(stream, contents):
                 if contents.pending_samples >= FILE_CHUNK_SAMPLES:
                     chunk = build_trial_log(self.path, contents)
-                    yield self._selected(chunk, is_first=is_first), contents.mixed_times
+                    yield self._selected(chunk, is_first=is_first)
                     is_first = False
         rest = build_trial_log(self.path, contents)
-        yield self._selected(rest, is_first=is_first), contents.mixed_times
+        yield self._selected(rest, is_first=is_first)
         self.outline = replace(rest, channels=self.outline.channels)
 
     def _selected(self, chunk: TrialLog, *, is_first: bool) -> tuple[Channel, ...]:
@@ -199,10 +189,10 @@ def open_log(
 ) -> TrialLog | LogFile:
     """Open a log: in memory if it has at most 16 million samples, else in its file.
 
-    A file without a valid summary is scanned once to learn its content. A file whose MCAP chunks
-    are not in the order of reception, or with times that were not set or are impossible, is read
-    into memory whatever its size: which times are replaced depends on all of them. One pass over a
-    file that is not read into memory computes the span of its times.
+    A file without a valid summary is scanned once to learn its content. A file in which some times
+    may need a repair, since they run back, step, were not set or are impossible, is read into
+    memory whatever its size: what is repaired depends on all of them. One pass over a longer file
+    checks this.
 
     Parameters
     ----------
@@ -256,26 +246,25 @@ def _open_unchecked(path: Path) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
 
 
 def _log_file(path: Path, contents: McapContents) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
-    """Return a log in its file, or in memory where some times were not set or are impossible."""
+    """Return a log in its file, or in memory where some times may need a repair."""
     outline = build_trial_log(path, contents)
-    if not _are_all_set(path, contents):
+    if _need_repair(path, contents):
         return read_unchecked(path)
     return LogFile(path, outline, contents.schemas, contents.channels), []
 
 
-def _are_all_set(path: Path, described: McapContents) -> bool:
-    """Whether no time of a file is to be replaced, shifted or dropped, by one pass over it."""
+def _need_repair(path: Path, described: McapContents) -> bool:
+    """Whether some times of a file may have to be changed or dropped, by one pass over it."""
     contents = McapContents(
         dict(described.schemas), dict(described.channels), keep_undescribed=False
     )
-    first_ns, last_ns = 2**63 - 1, -(2**63)
+    check = TimesCheck()
     with open_mcap(path) as stream:
         for _ in scan(stream, contents):
-            for blocks in contents.drain().values():
-                for times in (t for b in blocks for t in (b.received, b.measured)):
-                    first_ns = min(first_ns, int(times.min(initial=first_ns)))
-                    last_ns = max(last_ns, int(times.max(initial=last_ns)))
-    return first_ns > last_ns or are_set(first_ns, last_ns)
+            check.add(contents.drain(), contents)
+            if check.need_repair():
+                return True
+    return False
 
 
 def _open_by_scan(path: Path, stream: IO[bytes]) -> tuple[TrialLog | LogFile, list[MixedTimes]]:

@@ -1,7 +1,6 @@
 """Conversion of a file's scanned contents to a `TrialLog`."""
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from shiplog.types import (
 )
 from shiplog.units import CATALOGUE, conversion_factor
 
-from .clock_repair import MessageColumns, drop_impossible_times, pause_warnings, repair_clock_steps
+from .clock_repair import MessageColumns, drop_impossible_times, repair_clock_steps
 from .decode import McapContents, SampleBlock, is_foreign, schema_of
 from .schema import FORMAT_VERSION, Schema
 from .unset_times import replace_unset_times
@@ -48,6 +47,7 @@ def build_trial_log(path: Path, contents: McapContents) -> TrialLog:
             f"install a newer shiplog: {path}"
         )
     channels = merge_by_topic(channels_by_id(path, contents).values())
+    contents.pauses.add(channels)
     return TrialLog(
         path.name,
         channels,
@@ -98,24 +98,13 @@ def _with_repaired_times(
     columns, replaced = replace_unset_times(columns)
     columns, dropped = drop_impossible_times(columns)
     repair = repair_clock_steps(path.name, columns)
-    before = contents.clock_change_ns  # steps in samples drained before
-    contents.clock_change_ns += repair.change_ns
     contents.clock_warnings += replaced + dropped + repair.warnings
-    contents.pause_warnings += pause_warnings(repair.columns.values())
-    contents.mixed_times += [
-        replace(span, start_ns=span.start_ns - before, end_ns=span.end_ns - before)
-        for span in repair.mixed
-    ]
-    if not before:
-        return repair.columns
-    return {
-        id_: replace(c, received_ns=c.received_ns - before, measured_ns=c.measured_ns - before)
-        for id_, c in repair.columns.items()
-    }
+    contents.mixed_times += repair.mixed
+    return repair.columns
 
 
 def _warnings(contents: McapContents) -> list[str]:
-    pauses = [] if contents.damage else contents.pause_warnings  # else of the lost samples
+    pauses = [] if contents.damage else contents.pauses.warnings()  # else of the lost samples
     warnings = [*contents.damage, *contents.clock_warnings, *pauses]
     if not contents.finished:
         warnings.append(

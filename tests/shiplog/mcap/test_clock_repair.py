@@ -9,13 +9,15 @@ import pytest
 from mcap.writer import Writer
 from mcap_files import scalar
 
+import shiplog.mcap.stream
 from shiplog import LogError, TrialLog
 from shiplog.checks.info import read_log_info
 from shiplog.mcap.messages import descriptor_set
 from shiplog.mcap.reader import read
 from shiplog.mcap.schema import schema_for
-from shiplog.mcap.stream import open_log
+from shiplog.mcap.stream import LogFile, open_log
 from shiplog.mcap.writer import write
+from shiplog.types import concatenate_channels
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
@@ -202,3 +204,108 @@ def test_a_channel_of_another_epoch_is_kept_and_reported(tmp_path: Path) -> None
     (warning,) = log.warnings
     assert warning.startswith("/rudder/test: 200 of 200 samples have times from 2004-")
     assert "1024 weeks" in warning
+
+
+@pytest.mark.parametrize("size_secs", [-3600, -20, 20, 3600])
+def test_a_clock_that_is_set_and_returned_is_repaired_and_reported(
+    tmp_path: Path, size_secs: int
+) -> None:
+    def clock(_name: str, time_ns: int) -> int:
+        return time_ns + (30 * SECOND <= time_ns < 60 * SECOND) * size_secs * SECOND
+
+    log = read(record(tmp_path / "log.mcap", clock, clock))
+    (warning,) = log.warnings
+    assert f"set {'forward' if size_secs > 0 else 'back'} by {abs(size_secs)}.000 s" in warning
+    assert "29.5 s after the start" in warning
+    assert "by the same 29.5 s later" in warning
+    for channel in log:
+        np.testing.assert_array_equal(channel.measured_ns - START, channel.values * SECOND)
+        np.testing.assert_array_equal(channel.measured_ns, channel.received_ns)
+
+
+def test_two_steps_back_are_repaired(tmp_path: Path) -> None:
+    def clock(_name: str, time_ns: int) -> int:
+        return time_ns - (5 * (time_ns >= 30 * SECOND) + 7 * (time_ns >= 60 * SECOND)) * SECOND
+
+    log = read(record(tmp_path / "log.mcap", clock, clock))
+    assert [" 5.000 s" in w or " 7.000 s" in w for w in log.warnings] == [True, True]
+    for channel in log:
+        np.testing.assert_allclose((channel.measured_ns - START) / SECOND, channel.values)
+
+
+def test_the_clocks_of_all_sensors_set_forward_are_repaired_from_reception(tmp_path: Path) -> None:
+    def set_forward(_name: str, time_ns: int) -> int:
+        return time_ns + (time_ns >= 50 * SECOND) * 3600 * SECOND
+
+    log = read(record(tmp_path / "log.mcap", measured=set_forward))
+    assert len(log.warnings) == 2
+    assert all("sensor was set forward by 3600.000 s" in warning for warning in log.warnings)
+    for channel in log:
+        np.testing.assert_array_equal(channel.measured_ns, channel.received_ns)
+
+
+def test_a_recorder_clock_set_forward_alone_leaves_the_measured_times(tmp_path: Path) -> None:
+    def set_forward(_name: str, time_ns: int) -> int:
+        return time_ns + (time_ns >= 50 * SECOND) * 3600 * SECOND
+
+    log = read(record(tmp_path / "log.mcap", received=set_forward))
+    assert log.warnings == ()
+    for channel in log:
+        np.testing.assert_array_equal(channel.measured_ns - START, channel.values * SECOND)
+
+
+def _stepped(steps: str) -> tuple[Clock, Clock]:
+    """Return the clocks of reception and measurement of one kind of step."""
+    both = {
+        "set back": set_back,
+        "ahead for a while": lambda _, t: t + (30 * SECOND <= t < 60 * SECOND) * 20 * SECOND,
+        "set forward": lambda _, t: t + (t >= 50 * SECOND) * 30 * SECOND,
+    }
+    if steps in both:
+        return both[steps], both[steps]
+    return unchanged, lambda name, t: t - (t >= 50 * SECOND and name == "rudder") * 40 * SECOND
+
+
+@pytest.mark.parametrize(
+    "steps", ["set back", "ahead for a while", "set forward", "one sensor set back"]
+)
+@pytest.mark.parametrize("keys", [None, ("rudder",)])
+def test_a_part_read_alone_is_that_part_of_the_log(
+    tmp_path: Path, steps: str, keys: tuple[str, ...] | None
+) -> None:
+    path = record(tmp_path / "log.mcap", *_stepped(steps))
+    log = read(path)
+    received = log["rudder"].received_ns
+    for first, last in ((0, 40), (40, 90), (95, 120), (150, 190), (130, 199)):
+        start, end = int(received[first]), int(received[last])
+        part = read(path, channels=keys, start_ns=start, end_ns=end)
+        assert [channel.name for channel in part] == list(keys or NAMES)
+        for channel in part:
+            whole = log[channel.name]
+            rows = slice(*np.searchsorted(whole.received_ns, [start, end]))
+            np.testing.assert_array_equal(channel.measured_ns, whole.measured_ns[rows])
+            np.testing.assert_array_equal(channel.values, whole.values[rows])
+        if steps != "set forward":
+            assert part.warnings == log.warnings
+
+
+@pytest.mark.parametrize("chunk_samples", [7, 50, 110, 1000])
+@pytest.mark.parametrize(
+    "steps", ["set back", "ahead for a while", "set forward", "one sensor set back"]
+)
+def test_a_log_longer_than_memory_has_the_times_of_one_in_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, steps: str, chunk_samples: int
+) -> None:
+    monkeypatch.setattr(shiplog.mcap.stream, "MAX_SAMPLES_IN_MEMORY", 10)
+    monkeypatch.setattr(shiplog.mcap.stream, "FILE_CHUNK_SAMPLES", chunk_samples)
+    path = record(tmp_path / "log.mcap", *_stepped(steps))
+    expected, log = read(path), open_log(path)
+    assert isinstance(log, LogFile) == (steps == "set forward")
+    for _ in range(2):
+        chunks = list(log.chunks())
+        for number, whole in enumerate(expected):
+            channel = concatenate_channels([chunk[number] for chunk in chunks])
+            assert channel.measured_ns.tobytes() == whole.measured_ns.tobytes()
+            assert channel.received_ns.tobytes() == whole.received_ns.tobytes()
+            assert channel.values.tobytes() == whole.values.tobytes()
+        assert log.warnings == expected.warnings

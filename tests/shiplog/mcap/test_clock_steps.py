@@ -9,9 +9,9 @@ from shiplog.mcap.clock_steps import (
     common_steps,
     continued_times,
     earlier_rows,
-    pause_rows,
     steps_back,
 )
+from shiplog.mcap.forward_steps import pause_rows
 
 SECOND = 1_000_000_000
 INTERVALS = {"yaw_rate": 0.1, "rudder": 0.25, "position": 1.0}

@@ -195,7 +195,7 @@ def test_a_part_is_the_same_part_of_the_whole_log(
         assert part.warnings == log.warnings
 
 
-def test_only_the_mcap_chunks_of_the_part_are_decompressed(
+def test_only_the_mcap_chunks_of_the_part_and_those_at_the_ends_are_decompressed(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     names = ("yaw_rate", "speed") * 5
@@ -210,15 +210,15 @@ def test_only_the_mcap_chunks_of_the_part_are_decompressed(
         shiplog.mcap.decompress, "_decompress", lambda *of: inflated.append(of[2]) or inflate(*of)
     )
     speed = read(path, channels=["speed"])["speed"]
-    assert len(inflated) == 5
+    assert len(inflated) == 5 + 1
     assert np.unique(speed.values).tolist() == [1, 3, 5, 7, 9]
     inflated.clear()
     later = read(path, channels=["speed"], start_ns=START + 3099, end_ns=START + 7000)["speed"]
-    assert len(inflated) == 2
+    assert len(inflated) == 2 + 2
     assert later.values.tolist() == [3, *[5] * 100]
     inflated.clear()
     assert len(read(path, start_ns=START + 2000, end_ns=START + 4000)["yaw_rate"]) == 100
-    assert len(inflated) == 2
+    assert len(inflated) == 2 + 2
 
 
 def test_the_index_of_a_skipped_mcap_chunk_is_not_used_for_another(
