@@ -1,0 +1,93 @@
+"""The library nmea2000: assembly of fast packets, and the fields of messages in SI units.
+
+Its decoder for lines stamps some formats with the time of decoding and drops what it cannot read
+without a count, so that only its parts below the lines are used. They are in private modules: the
+dependency is pinned to one year's releases, and the tests compare with its public decoder.
+"""
+
+from collections.abc import Mapping
+
+from shiplog.errors import UsageError
+
+try:
+    from nmea2000 import _canboat, backend
+except ImportError as error:
+    raise UsageError(
+        f"NMEA 2000 needs more libraries ({error}); "
+        "install them with `pip install 'shiplog[nmea2000]'`"
+    ) from error
+
+Field = int | float | None
+
+
+class FrameError(ValueError):
+    """A line, frame or message that is rejected; the text is the reason, from a fixed set."""
+
+
+class FastPacketAssembly:
+    """Assembly of the messages of several senders from their frames.
+
+    What waits is bounded by the number of senders, PGNs and the 8 sequence numbers of each.
+    """
+
+    def __init__(self) -> None:
+        self._assembly = _canboat.Reassembler()
+
+    def push(self, pgn: int, data: bytes, source: int, destination: int) -> bytes | None:
+        """Return the data of the message that a frame completes, or None.
+
+        Raises
+        ------
+        FrameError
+            The frame is none of a fast packet.
+        """
+        try:
+            message: bytes | None = self._assembly.push(pgn, data, source, destination)
+        except _canboat.ReassemblyError as error:
+            raise FrameError("frame that is none of a fast packet") from error
+        return message
+
+
+def is_fast(pgn: int) -> bool:
+    """Whether the messages of a PGN are longer than one frame, as fast packets."""
+    return bool(backend.is_fast_pgn(pgn))
+
+
+def split_identifier(identifier: int) -> tuple[int, int, int]:
+    """Return PGN, source address and destination of a 29-bit CAN identifier.
+
+    Examples
+    --------
+    >>> split_identifier(0x19F51323)
+    (128275, 35, 255)
+    """
+    _, pgn, source, destination = _canboat.can_id_decompose(identifier)
+    return pgn, source, destination
+
+
+def fields(pgn: int, data: bytes) -> Mapping[str, Field]:
+    """Return the numbers of a message by their names in canboat's database.
+
+    Parameters
+    ----------
+    pgn
+        The parameter group number.
+    data
+        The whole message; a short one has no values behind its end.
+
+    Returns
+    -------
+    fields
+        Numbers in SI units; codes of enumerations; dates in days since 1970-01-01 and times in
+        seconds since midnight. None means not available, or reported as faulty by the sensor.
+        Empty where the message cannot be decoded.
+
+    Examples
+    --------
+    >>> fields(127251, bytes.fromhex("00 00 00 00 01 ff ff ff"))["rate"]
+    0.524288
+    """
+    message = backend.decode(pgn, data, units="si")
+    if message is None:
+        return {}
+    return {field.id: field.raw_value for field in message.fields}

@@ -1,0 +1,114 @@
+"""Decoder of NMEA 2000: frames, assembled to messages where they are parts, to samples."""
+
+from collections.abc import Sequence
+
+from recorders.streams.counts import StreamCounts
+from recorders.streams.packets import Packet
+from recorders.streams.sample_buffer import SampleBuffer
+
+from .library import FastPacketAssembly, FrameError, fields, is_fast
+from .line_formats import FRAME_BYTES, Frame, LineFormat, detect_format, is_assembled
+from .pgns import READINGS
+
+FAST_PGNS = frozenset(pgn for pgn in READINGS if is_fast(pgn))
+
+
+class PgnDecoder:
+    """Samples of the messages that hold a channel; the source is the address of their sender.
+
+    Only fast packets of these messages are assembled, so that what a hostile bus can make wait is
+    bounded: 8 sequences of 223 bytes for each address and message.
+
+    Parameters
+    ----------
+    line_format
+        The format of the lines; None to take that of the first line which is of one.
+
+    Attributes
+    ----------
+    line_format
+        The format of the lines, or None while it is not known.
+    """
+
+    def __init__(self, line_format: LineFormat | None = None) -> None:
+        self._counts = StreamCounts()
+        self.line_format = line_format
+        self._assembled = line_format is not None and bool(line_format.assembled)
+        self._assembly = FastPacketAssembly()
+        self._kinds: dict[tuple[int, int], str] = {}
+
+    @property
+    def counts(self) -> StreamCounts:
+        """What was decoded, skipped and rejected so far."""
+        return self._counts
+
+    def set_format(self, line_format: LineFormat, lines: Sequence[bytes]) -> None:
+        """Set the format, and whether a line holds a whole message, from the first lines."""
+        self.line_format = line_format
+        self._assembled = (
+            is_assembled(lines) if line_format.assembled is None else line_format.assembled
+        )
+
+    def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
+        """Decode lines; a datagram may hold several."""
+        for packet in batch:
+            lines = packet.data.splitlines() if b"\n" in packet.data else [packet.data]
+            for line in lines:
+                self._decode_line(line, packet.received_ns, samples)
+
+    def finish(self, samples: SampleBuffer) -> None:
+        """Do nothing: what waits are parts of messages, of no value without the others."""
+
+    def _decode_line(self, line: bytes, received_ns: int, samples: SampleBuffer) -> None:
+        line_format = self.line_format
+        if line_format is None:
+            line_format = detect_format([line])
+            if line_format is None:
+                self._counts.reject("line of no known format")
+                return
+            self.set_format(line_format, [line])
+        try:
+            frame = line_format.frame(line)
+            if frame is None:
+                self._counts.skip("comment or status")
+            elif frame.pgn not in READINGS:
+                self._counts.skip(str(frame.pgn))
+            elif (data := self._message(frame)) is not None:
+                self._add(frame, data, received_ns, samples)
+        except FrameError as error:
+            self._counts.reject(str(error))
+
+    def _message(self, frame: Frame) -> bytes | None:
+        """Return the data of the whole message, or None where frames of it are still missing."""
+        if frame.pgn not in FAST_PGNS:
+            return frame.data
+        if len(frame.data) > FRAME_BYTES:
+            self._assembled = True
+        if self._assembled:
+            return frame.data
+        return self._assembly.push(frame.pgn, frame.data, frame.source, frame.destination)
+
+    def _add(self, frame: Frame, data: bytes, received_ns: int, samples: SampleBuffer) -> None:
+        """Add the samples of a message."""
+        values = fields(frame.pgn, data)
+        readings = READINGS[frame.pgn](values) if values else []
+        added = 0
+        for channel, value, part in readings:
+            if value is None:
+                continue
+            source = f"{frame.source}.{part}" if part else str(frame.source)
+            if isinstance(value, tuple):
+                added += samples.add_position(source, value, received_ns)
+            else:
+                added += samples.add(channel, source, value, received_ns)
+        if added:
+            self._counts.accept(self._kind(frame))
+        else:
+            self._counts.skip(f"{frame.pgn} without a value")
+
+    def _kind(self, frame: Frame) -> str:
+        """Return the text by which the messages of one sender and PGN are counted."""
+        key = frame.source, frame.pgn
+        if key not in self._kinds:
+            self._kinds[key] = f"{frame.pgn} of {frame.source}"
+        return self._kinds[key]

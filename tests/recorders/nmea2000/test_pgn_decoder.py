@@ -1,0 +1,182 @@
+"""Tests of recorders.nmea2000.pgn_decoder."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from decoded_streams import damaged, decode, decode_file, decode_live, live_batches, options_of
+from nmea2000 import NMEA2000Decoder, _canboat
+
+from recorders.nmea2000.cli import NMEA2000
+from recorders.nmea2000.pgn_decoder import FAST_PGNS
+from shiplog.errors import LogError, UsageError
+
+FIX = (
+    struct.pack("<BHI", 1, 20_000, 432_000_000)
+    + struct.pack("<qqq", 54 * 10**16, 10 * 10**16, 12 * 10**6)
+    + struct.pack("<BBBhhiBHh", 0x10, 0xFC, 9, 80, 120, 0, 0, 0xFFFF, 0x7FFF)[:12]
+)
+
+
+def candump(pgn: int, data: bytes, source: int = 27, time: float = 1.7e9) -> bytes:
+    identifier = _canboat.can_id_compose(2, pgn, source, 255)
+    return b"(%.6f) can0 %08X#%s" % (time, identifier, data.hex().upper().encode())
+
+
+def fix_frames(sequence: int = 0, source: int = 27) -> list[bytes]:
+    frames = _canboat.fast_packet_fragment(sequence, FIX)
+    return [candump(129029, frame, source, 1.7e9 + 0.001 * n) for n, frame in enumerate(frames)]
+
+
+def canboat(pgn: int, data: bytes, source: int = 27) -> bytes:
+    return (
+        b"2026-11-29T08:00:00.125Z,2,%d,%d,255,%d," % (pgn, source, len(data))
+        + data.hex(",").encode()
+    )
+
+
+def test_the_frames_of_a_fast_packet_are_assembled_and_stamped_by_the_last_one() -> None:
+    decoded = decode_file(NMEA2000, fix_frames())
+    position = decoded.channels["/position/27.gnss"]
+    np.testing.assert_allclose(position.values, [[54.0, 10.0, 12.0]])
+    assert position.received_ns[0] == pytest.approx(1.7e18 + 6e6, abs=2000)
+    assert decoded.counts.accepted == {"129029 of 27": 1}
+
+
+def test_frames_of_several_senders_may_alternate() -> None:
+    pairs = zip(fix_frames(source=1), fix_frames(source=2), strict=True)
+    decoded = decode_file(NMEA2000, [frame for pair in pairs for frame in pair])
+    assert {"/position/1.gnss", "/position/2.gnss"} <= set(decoded.channels)
+
+
+def test_a_fast_packet_that_lacks_a_frame_gives_nothing() -> None:
+    decoded = decode_file(NMEA2000, fix_frames()[:3] + fix_frames()[4:])
+    assert decoded.channels == {}
+
+
+def test_a_line_with_a_whole_fast_packet_is_not_assembled_again() -> None:
+    assert "/position/27.gnss" in decode_file(NMEA2000, [canboat(129029, FIX)]).channels
+
+
+def test_lines_with_single_frames_of_canboat_are_assembled() -> None:
+    frames = _canboat.fast_packet_fragment(0, FIX)
+    lines = [canboat(129029, frame) for frame in frames]
+    assert "/position/27.gnss" in decode_file(NMEA2000, lines).channels
+
+
+def test_sources_and_instances_are_kept_apart() -> None:
+    lines = [
+        candump(127245, struct.pack("<BBhhH", instance, 0xFF, 0x7FFF, angle, 0xFFFF), source)
+        for source, instance, angle in ((14, 0, 100), (14, 1, 200), (26, 0, 300))
+    ]
+    decoded = decode_file(NMEA2000, lines)
+    values = {topic: channel.values[0] for topic, channel in decoded.channels.items()}
+    assert values == pytest.approx({"/rudder/14": 0.01, "/rudder/14.1": 0.02, "/rudder/26": 0.03})
+
+
+def test_what_is_not_decoded_or_without_a_value_is_counted_as_unused() -> None:
+    lines = [
+        candump(60928, bytes(8)),
+        candump(127251, bytes.fromhex("ffffffff7fffffff")),
+        candump(130306, bytes.fromhex("ff00010001fbffff")),
+    ]
+    decoded = decode_file(NMEA2000, lines)
+    assert decoded.channels == {}
+    assert decoded.counts.unused == {
+        "60928": 1,
+        "127251 without a value": 1,
+        "130306 without a value": 1,
+    }
+
+
+def test_a_datagram_of_a_gateway_may_hold_several_lines() -> None:
+    line = b"17:33:21.107 R 09F1121B FF 10 27 FF 7F FF 7F FC\r\n"
+    decoded = decode_live(NMEA2000, [b"cut off", line + line, line])
+    channel = decoded.channels["/heading/27"]
+    assert channel.received_ns.tolist() == [10**8, 10**8, 2 * 10**8]
+    assert decoded.counts.rejected == {"line of no known format": 1}
+
+
+def test_a_stated_format_is_used() -> None:
+    line = b"17:33:21.107 R 09F1121B FF 10 27 FF 7F FF 7F FC"
+    decoded = decode_live(NMEA2000, [line], "--line-format", "candump")
+    assert decoded.counts.rejected == {"malformed line": 1}
+
+
+def test_a_file_of_no_known_format_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(LogError, match=r"none of the first 1 lines.*canboat, candump"):
+        decode_file(NMEA2000, [b"$HEHDT,123.4,T*12"])
+
+
+def test_a_start_is_of_files_and_a_date() -> None:
+    with pytest.raises(UsageError, match="--start is for files"):
+        decode_live(NMEA2000, [], "--start", "2026-11-29")
+    with pytest.raises(UsageError, match="takes a date"):
+        decode_file(NMEA2000, [b"17:33:21.107 R 09F1121B FF"], "--start", "29.11.2026")
+
+
+def test_a_start_dates_the_stamps() -> None:
+    line = b"08:00:00.000 R 09F1121B FF 10 27 FF 7F FF 7F FC"
+    decoded = decode_file(NMEA2000, [line], "--start", "1970-01-03")
+    assert decoded.channels["/heading/27"].received_ns[0] == (2 * 24 + 8) * 3600 * 10**9
+
+
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_where_batches_are_cut_changes_no_sample(size: int) -> None:
+    lines = [line for n in range(20) for line in fix_frames(n % 8)]
+    decoded = decode_file(NMEA2000, lines, size=size)
+    whole = decode_file(NMEA2000, lines)
+    assert {t: c.values.tobytes() for t, c in decoded.channels.items()} == {
+        t: c.values.tobytes() for t, c in whole.channels.items()
+    }
+
+
+def test_our_values_are_those_of_the_librarys_own_decoder() -> None:
+    library = NMEA2000Decoder(units="si")
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        data = rng.bytes(8)
+        line = candump(127251, data)
+        message = library.decode(line.decode())
+        rate = message.get_field_by_id("rate").value
+        values = decode_file(NMEA2000, [line]).values("/yaw_rate/27")
+        assert values == ([] if rate is None else [rate])
+
+
+def test_no_damaged_frame_raises_an_exception_and_every_line_is_counted() -> None:
+    lines = fix_frames() + [
+        candump(pgn, bytes(range(8))) for pgn in (127245, 127250, 128259, 129025, 129026, 130306)
+    ]
+    packets = list(damaged(lines, 20_000, seed=2))
+    decoded = decode_live(NMEA2000, packets, "--line-format", "candump")
+    counts = decoded.counts
+    counted = sum(sum(c.values()) for c in (counts.accepted, counts.rejected, counts.unused))
+    lines_of_packets = sum(len(p.splitlines()) if b"\n" in p else 1 for p in packets)
+    parts = sum(p.count(b"#") > 0 for p in packets)  # frames of fast packets that wait
+    assert lines_of_packets - parts <= counted <= lines_of_packets
+    assert counts.rejected["malformed line"] > 1000
+    assert len(counts.rejected) < 12
+
+
+def _resident_bytes() -> int:
+    statm = Path("/proc/self/statm")
+    if not statm.exists():
+        pytest.skip("the memory of the process is read from /proc")
+    return int(statm.read_text().split()[1]) * 4096
+
+
+def test_a_flood_of_first_frames_needs_bounded_memory() -> None:
+    first = [
+        candump(pgn, bytes([sequence << 5, 223]) + b"123456", source)
+        for pgn in (*FAST_PGNS, 126720, 126996, 130820)
+        for source in range(254)
+        for sequence in range(8)
+    ]
+    decoder = NMEA2000.make_decoder(options_of(NMEA2000))
+    decode(live_batches(first), decoder)
+    before = _resident_bytes()
+    for _ in range(20):
+        decode(live_batches(first), decoder)
+    assert _resident_bytes() - before < 10e6
+    assert len(decoder.counts.unused) == 3
