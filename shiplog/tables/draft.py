@@ -68,10 +68,10 @@ def draft_layout(path: Path) -> Draft:
     remarks = list(time.remarks)
     taken = [time.entries[key] for key in ("column", "date") if key in time.entries]
     roles = recognise({name: text for name, (text, _) in words.items()}, taken)
-    position = {role: roles.pop(role) for role in POSITION if role in roles}
-    if {"latitude", "longitude"} <= set(position):
-        lines += _position_section(position, columns, remarks)
+    for source, position in _receivers(roles).items():
+        lines += _position_section(source, position, columns, remarks)
         taken += position.values()
+    roles = {role: name for role, name in roles.items() if role.partition(".")[0] not in POSITION}
     for role, name in roles.items():
         unit, basis = _unit(role.partition(".")[0], columns[name], words[name][1], comma)
         lines += ["", f"[{role}]", f"column = {_toml(name)}", f"unit = {_toml(unit)}"]
@@ -132,20 +132,31 @@ def _toml(value: object) -> str:
     return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
 
 
+def _receivers(roles: dict[str, str]) -> dict[str, dict[str, str]]:
+    """Return the columns of each position that has latitude and longitude, by its source."""
+    receivers: dict[str, dict[str, str]] = {}
+    for role, column in roles.items():
+        name, _, source = role.partition(".")
+        if name in POSITION:
+            receivers.setdefault(source, {})[name] = column
+    return {s: names for s, names in receivers.items() if {"latitude", "longitude"} <= set(names)}
+
+
 def _position_section(
-    roles: dict[str, str], columns: dict[str, list[str]], remarks: list[str]
+    source: str, roles: dict[str, str], columns: dict[str, list[str]], remarks: list[str]
 ) -> list[str]:
-    """Return the section of the position."""
+    """Return the section of the position from one source."""
     pair = [(role, roles[role]) for role in ("latitude", "longitude")]
     packed = any(looks_packed(columns[name], role) for role, name in pair)
     for (_, name), limit in zip(pair, (91, 361), strict=True):
         packed |= bool(np.nanmedian(np.abs(sample_numbers(columns[name], comma=True))) > limit)
     unit = "ddmm.mmmm" if packed else "deg"
-    remarks.append(f"{pair[0][1]!r} and {pair[1][1]!r}: position in {unit} (header and cells)")
+    section = f"position.{source}" if source else "position"
+    remarks.append(f"{pair[0][1]!r} and {pair[1][1]!r}: {section} in {unit} (header and cells)")
     if not set(HEMISPHERES) <= set(roles):
         roles = dict(pair)
     places = [f"{role} = {_toml(name)}" for role, name in roles.items()]
-    return ["", "[position]", *places, f"unit = {_toml(unit)}"]
+    return ["", f"[{section}]", *places, f"unit = {_toml(unit)}"]
 
 
 def _unit(role: str, cells: list[str], stated: str, comma: bool) -> tuple[str, str]:

@@ -56,10 +56,10 @@ def read_table(path: str | os.PathLike[str], layout: Layout) -> TrialLog:
     values = {
         role: _column_values(table, layout, role, texts[role])
         for role in layout.columns
-        if role not in ("time", "date", *GEOGRAPHIC[:2], *HEMISPHERES)
+        if role.partition(".")[0] not in ("time", "date", *GEOGRAPHIC[:2], *HEMISPHERES)
     }
-    if "latitude" in texts:
-        values |= _geographic(table, layout, texts)
+    for source in layout.receivers:
+        _join_position(table, layout, f".{source}" if source else "", texts, values)
     notes: dict[str, dict[str, str]] = {}
     if layout.rebuild_heading:
         time_secs = (measured_ns - measured_ns[0]) * 1e-9
@@ -102,16 +102,15 @@ def _channels(
     notes: dict[str, dict[str, str]],
 ) -> list[Channel]:
     """Make the channels, in the order of the catalogue; further ones follow."""
-    fields, unit = _position_fields(values)
-    if fields:
-        values["position"] = np.column_stack([values[name] for name in fields])
     order = {name: number for number, name in enumerate(CATALOGUE)}
-    roles = [role for role in values if role not in NOT_CHANNELS]
+    roles = [role for role in values if role.partition(".")[0] not in NOT_CHANNELS]
     channels = []
     for role in sorted(roles, key=lambda role: order.get(role.partition(".")[0], len(order))):
         name, _, source = role.partition(".")
         column = layout.columns.get(role)
         metadata = dict(column.metadata) if column else {}
+        geographic = f"latitude{role.removeprefix('position')}" in layout.columns
+        fields, unit = (GEOGRAPHIC, "deg") if geographic else (("north", "east"), "m")
         channels.append(
             Channel(
                 name,
@@ -185,24 +184,46 @@ def _signed(text: str) -> str:
     return ("-" if side.startswith("P") else "") + (match["number"] or match["digits"])
 
 
+def _join_position(
+    table: CellTable,
+    layout: Layout,
+    suffix: str,
+    texts: dict[str, list[str]],
+    values: dict[str, FloatArray],
+) -> None:
+    """Replace the components of one receiver's position, with a suffix, by the position (n, k)."""
+    if f"latitude{suffix}" in texts:
+        values |= _geographic(table, layout, suffix, texts)
+        unknown = np.full(len(table.rows), np.nan)
+        values.setdefault(f"altitude{suffix}", unknown)
+        fields: tuple[str, ...] = GEOGRAPHIC
+    else:
+        fields = ("north", "east")
+    values[f"position{suffix}"] = np.column_stack([values[f"{name}{suffix}"] for name in fields])
+
+
 def _geographic(
-    table: CellTable, layout: Layout, texts: dict[str, list[str]]
+    table: CellTable, layout: Layout, suffix: str, texts: dict[str, list[str]]
 ) -> dict[str, FloatArray]:
     """Latitude and longitude, (n,) deg each, from numbers or from texts with hemispheres."""
-    names = GEOGRAPHIC[:2]
-    unit = layout.columns["latitude"].unit
+    roles = [f"{name}{suffix}" for name in GEOGRAPHIC[:2]]
+    unit = layout.columns[roles[0]].unit
     if layout.decimal_comma:
-        texts = {name: [t.replace(",", ".") for t in cells] for name, cells in texts.items()}
-    packed = unit == DEGREES_MINUTES or any(looks_packed(texts[name], name) for name in names)
+        texts = {role: [t.replace(",", ".") for t in cells] for role, cells in texts.items()}
+    packed = unit == DEGREES_MINUTES or any(
+        looks_packed(texts[role], name) for name, role in zip(GEOGRAPHIC, roles, strict=False)
+    )
     values = {}
-    for name, letters in zip(names, HEMISPHERES, strict=True):
+    for name, role, letters in zip(GEOGRAPHIC[:2], roles, HEMISPHERES, strict=True):
         if unit == "rad":
-            values[name] = np.degrees(_numbers(table, layout, name, texts[name]))
+            values[role] = np.degrees(_numbers(table, layout, role, texts[role]))
             continue
         try:
-            values[name] = parse_degrees(texts[name], name, texts.get(letters), packed=packed)
+            values[role] = parse_degrees(
+                texts[role], name, texts.get(f"{letters}{suffix}"), packed=packed
+            )
         except PositionTextError as error:
-            line, at = table.lines[error.row], _column_index(table, layout, name) + 1
+            line, at = table.lines[error.row], _column_index(table, layout, role) + 1
             raise LayoutError(f"line {line}, column {at}: {error.reason}: {table.path}") from None
     return values
 
@@ -360,11 +381,3 @@ def _rotate_velocities(values: dict[str, FloatArray], notes: dict[str, dict[str,
     values["speed"], values["sway"] = north * cos + east * sin, east * cos - north * sin
     note = {"computed_from": "velocity_north, velocity_east and heading: over the ground"}
     notes["speed"] = notes["sway"] = note
-
-
-def _position_fields(values: dict[str, FloatArray]) -> tuple[tuple[str, ...], str]:
-    """Components of the position among the columns, if any, and its unit."""
-    if "latitude" in values:
-        values.setdefault("altitude", np.full_like(values["latitude"], np.nan))
-        return GEOGRAPHIC, "deg"
-    return (("north", "east") if "north" in values else ()), "m"

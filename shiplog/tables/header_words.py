@@ -29,6 +29,11 @@ _QUANTITIES = (
 )
 _SIDES = {"port": "port", "ps": "port", "starboard": "starboard", "stbd": "starboard",
           "sb": "starboard", "stb": "starboard", "bb": "port"}  # fmt: skip
+_RECEIVER = (  # words that name a receiver of positions
+    r"(d?gps|gnss|receiver|rx|antenna|ant|bow|stern|fore|forward|aft|mid|main|backup|primary|"
+    r"secondary|master|port|starboard|[ab]|)\d*"
+)
+_POSITION = ("latitude", "longitude", "north_south", "east_west")
 _UNIT_WORDS = {
     "°": "deg", "degrees": "deg", "degree": "deg", "°/min": "deg/min", "°/s": "deg/s",
     "deg/sec": "deg/s", "dps": "deg/s", "knots": "kn", "knot": "kn", "kt": "kn", "kts": "kn",
@@ -97,7 +102,8 @@ def recognise(words: Mapping[str, str], taken: Sequence[str]) -> dict[str, str]:
     Returns
     -------
     dict
-        Column by quantity; with its side after a point where the header states one (`rpm.port`).
+        Column by quantity; with its side or, of a position, its receiver after a point where the
+        header states one (`rpm.port`, `latitude.gps1`).
     """
     roles: dict[str, str] = {}
     for name, text in words.items():
@@ -106,11 +112,35 @@ def recognise(words: Mapping[str, str], taken: Sequence[str]) -> dict[str, str]:
         parts = text.split("_")
         sides = [_SIDES[part] for part in parts if part in _SIDES]
         plain = "_".join(part for part in parts if part not in _SIDES)
-        quantity = next((role for pattern, role in _QUANTITIES if re.fullmatch(pattern, plain)), "")
+        quantity = _quantity(plain)
         role = f"{quantity}.{sides[0]}" if len(sides) == 1 else quantity
-        if quantity and role not in roles:
+        if not quantity or quantity in _POSITION:
+            role = _received(parts) or role
+        if role and role not in roles:
             roles[role] = name
     return roles
+
+
+def _quantity(words: str) -> str:
+    """Return the quantity that words joined by underscores name; empty if none."""
+    return next((role for pattern, role in _QUANTITIES if re.fullmatch(pattern, words)), "")
+
+
+def _received(parts: Sequence[str]) -> str:
+    """Return the component of a position and its receiver, such as `latitude.gps1`.
+
+    Empty where the words are no component of a position, or name no receiver.
+    """
+    words = [word for part in parts for word in re.findall(r"[^\W\d]+|\d+", part)]
+    for start in range(len(words)):
+        for end in range(len(words), start, -1):
+            quantity = _quantity("_".join(words[start:end]))
+            receiver = [*words[:start], *words[end:]]
+            if quantity in _POSITION and receiver:
+                named = [_SIDES.get(word, word) for word in receiver]
+                if all(re.fullmatch(_RECEIVER, word) for word in named):
+                    return f"{quantity}.{''.join(named)}"
+    return ""
 
 
 def is_units_row(row: Sequence[str], following: Sequence[str]) -> bool:

@@ -80,7 +80,8 @@ class Layout:
     columns
         Columns by role: the name of a channel, with its source after a point where one is stated
         (`rpm.port`); "time" and "date"; "velocity_north", "velocity_east"; or a component of the
-        position: "north" and "east", or "latitude", "longitude", "altitude" and `HEMISPHERES`.
+        position: "north" and "east", or "latitude", "longitude", "altitude" and `HEMISPHERES`,
+        with the source after a point where one is stated (`latitude.bow`).
     time
         How the times are printed.
     source
@@ -116,6 +117,12 @@ class Layout:
     header: bool = False
     froude_scale: float = 1.0
     rebuild_heading: bool = False
+
+    @property
+    def receivers(self) -> tuple[str, ...]:
+        """The sources of positions; an empty name for the one that states none."""
+        roles = [role.partition(".") for role in self.columns]
+        return tuple(source for name, _, source in roles if name in ("latitude", "north"))
 
 
 def load_layout(path: str | os.PathLike[str]) -> Layout:

@@ -4,7 +4,7 @@ import codecs
 import os
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from math import isfinite
 from pathlib import Path
@@ -117,8 +117,8 @@ class _LayoutParser:
                 )  # fmt: skip
             elif key == "time":
                 self._parse_time(value)
-            elif key == "position":
-                self._parse_position(value)
+            elif key.partition(".")[0] == "position":
+                self._parse_position(key, value)
             else:
                 self._parse_channel(key, value)
         self._find_contradictions()
@@ -198,15 +198,10 @@ class _LayoutParser:
             )
             return None
 
-    def _parse_channel(self, name: str, section: Mapping[str, Any]) -> None:
+    def _parse_channel(self, key: str, section: Mapping[str, Any]) -> None:
         """Parse the columns of a quantity: its own, and one for each source that is named."""
-        sources = {key: value for key, value in section.items() if isinstance(value, dict)}
-        own = {key: value for key, value in section.items() if key not in sources}
-        name, _, source = name.partition(".")  # of a quoted key such as ["rpm.port"]
-        if own or not sources:
-            self._parse_column(name, source, own)
-        for key, value in sources.items():
-            self._parse_column(name, f"{source}.{key}" if source else key, value)
+        for name, source, columns in _sources(key, section):
+            self._parse_column(name, source, columns)
 
     def _parse_column(self, name: str, source: str, section: Mapping[str, Any]) -> None:
         """Parse the column of one quantity from one source."""
@@ -239,22 +234,32 @@ class _LayoutParser:
         column = Column(0, str(unit), section.get("sign", 1), metadata)
         self._add(role, f"{role}.column", section.get("column"), column)
 
-    def _parse_position(self, section: Mapping[str, Any]) -> None:
+    def _parse_position(self, key: str, section: Mapping[str, Any]) -> None:
+        """Parse the columns of the positions: of one receiver, or of each that is named."""
+        for _, source, columns in _sources(key, section):
+            self._parse_receiver(source, columns)
+
+    def _parse_receiver(self, source: str, section: Mapping[str, Any]) -> None:
         """Parse the columns of a position: in metres, or geographic."""
         plane, globe = ("north", "east"), GEOGRAPHIC[:2]
-        self._check_keys("position", section, (*plane, "unit", *GEOGRAPHIC, *HEMISPHERES))
+        suffix = f".{source}" if source else ""
+        label = f"position{suffix}"
+        if "/" in source or not label.isprintable():
+            self._errors.append(f"[{label}] must have a name without '/'")
+        self._check_keys(label, section, (*plane, "unit", *GEOGRAPHIC, *HEMISPHERES))
         geographic = any(name in section for name in (*GEOGRAPHIC, *HEMISPHERES))
         if geographic and any(name in section for name in plane):
-            self._errors.append("[position] mixes north and east with latitude and longitude")
-        self._require("position", section, (*(globe if geographic else plane), "unit"))
+            self._errors.append(f"[{label}] mixes north and east with latitude and longitude")
+        self._require(label, section, (*(globe if geographic else plane), "unit"))
         unit = section.get("unit")
         if unit is not None and not (geographic and unit == DEGREES_MINUTES):
-            self._check_unit("position.unit", unit, "rad" if geographic else "m")
+            self._check_unit(f"{label}.unit", unit, "rad" if geographic else "m")
         if len([name for name in HEMISPHERES if name in section]) == 1:
-            self._errors.append(f"[position] needs both {' and '.join(HEMISPHERES)}")
+            self._errors.append(f"[{label}] needs both {' and '.join(HEMISPHERES)}")
         for name in (*GEOGRAPHIC, *HEMISPHERES) if geographic else plane:
             of_column = "m" if name == "altitude" else str(unit)
-            self._add(name, f"position.{name}", section.get(name), Column(0, of_column))
+            place = section.get(name)
+            self._add(f"{name}{suffix}", f"{label}.{name}", place, Column(0, of_column))
 
     # ---- checks
 
@@ -320,7 +325,8 @@ class _LayoutParser:
             errors.append("heading.rebuild needs a [yaw_rate]")
         if self._top.get("decimal_comma") is True and self._top.get("delimiter", ",") == ",":
             errors.append("decimal_comma cannot be combined with the delimiter ','")
-        if "latitude" in self._columns and "froude_scale" in self._top:
+        geographic = any(role.partition(".")[0] == "latitude" for role in self._columns)
+        if geographic and "froude_scale" in self._top:
             errors.append("froude_scale cannot be applied to latitude and longitude")
         self._find_shared_columns()
 
@@ -337,6 +343,17 @@ class _LayoutParser:
                     f"{role} and {taken[column.place]} name the same column {column.place}"
                 )
             taken[column.place] = role
+
+
+def _sources(key: str, section: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+    """Yield the name, the source and the keys of a section, and of each source within it."""
+    sources = {name: value for name, value in section.items() if isinstance(value, dict)}
+    own = {name: value for name, value in section.items() if name not in sources}
+    name, _, source = key.partition(".")  # of a quoted key such as ["rpm.port"]
+    if own or not sources:
+        yield name, source, own
+    for part, value in sources.items():
+        yield name, f"{source}.{part}" if source else part, value
 
 
 def _is_text_encoding(name: str) -> bool:

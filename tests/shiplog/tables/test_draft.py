@@ -122,6 +122,19 @@ def test_columns_of_port_and_starboard_are_sources(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+def test_two_receivers_of_positions_are_sources(tmp_path: Path) -> None:
+    rows = "Time,GPS1 Lat,GPS1 Lon,GPS2 Lat,GPS2 N/S,GPS2 Lon,GPS2 E/W,Lat port\n"
+    rows += "2026-03-29T00:00:00Z,54.5,10.1,5430.0,S,01006.0,E,1\n"
+    rows += "2026-03-29T00:00:01Z,54.6,10.2,5431.0,S,01007.0,E,2\n"
+    log = drafted(tmp_path, rows)
+    assert [c.topic for c in log] == ["/position/gps1", "/position/gps2"]
+    np.testing.assert_allclose(log["position/gps1"].values[0, :2], [54.5, 10.1])
+    np.testing.assert_allclose(log["position/gps2"].values[0, :2], [-54.5, 10.1])
+    remarks = draft_layout(tmp_path / "table.csv").remarks
+    assert "'GPS1 Lat' and 'GPS1 Lon': position.gps1 in deg (header and cells)" in remarks
+    assert "not recognised, comments in the draft: 'Lat port'" in remarks
+
+
 def test_an_assumed_date_order_is_a_warning_until_it_is_confirmed(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     path.write_text("Time,Heading\n03/04/2026 10:00:00,5\n03/04/2026 10:00:01,5\n")

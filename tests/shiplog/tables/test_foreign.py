@@ -239,6 +239,34 @@ def test_positions_with_hemispheres_in_columns_of_their_own(tmp_path: Path) -> N
     np.testing.assert_array_equal(log["position"].values[:, :2], [[-54.2, -0.5], [np.nan, np.nan]])
 
 
+@pytest.mark.parametrize("form", ["[position.{0}]", "['position.{0}']"])
+def test_positions_of_several_receivers_are_sources(tmp_path: Path, form: str) -> None:
+    text = (
+        "[time]\ncolumn = 1\nunit = 's'\n[position]\nnorth = 2\neast = 3\nunit = 'm'\n"
+        f"{form.format('bow')}\nlatitude = 4\nnorth_south = 5\nlongitude = 6\neast_west = 7\n"
+        "unit = 'ddmm.mmmm'\n"
+        f"{form.format('stern')}\nlatitude = 8\nlongitude = 9\naltitude = 10\nunit = 'deg'\n"
+    )
+    rows = "0,10,20,5430,S,01015,W,-54.4,-10.2,7\n1,11,21,5431,S,01016,W,-54.5,-10.3,8\n"
+    log = read_table(table(tmp_path, rows), layout(text))
+    assert [c.topic for c in log] == ["/position/table", "/position/bow", "/position/stern"]
+    np.testing.assert_array_equal(log["position/table"].values, [[10, 20], [11, 21]])
+    np.testing.assert_allclose(
+        log["position/bow"].values[:, :2], [[-54.5, -10.25], [-54 - 31 / 60, -10 - 16 / 60]]
+    )
+    np.testing.assert_array_equal(
+        log["position/stern"].values, [[-54.4, -10.2, 7], [-54.5, -10.3, 8]]
+    )
+
+
+def test_an_error_in_the_second_receiver_names_its_column(tmp_path: Path) -> None:
+    text = "[time]\ncolumn = 1\nunit = 's'\n"
+    for number, name in enumerate(("bow", "stern")):
+        places = f"latitude = {2 + 2 * number}\nlongitude = {3 + 2 * number}\n"
+        text += f"[position.{name}]\n{places}unit = 'deg'\n"
+    assert "line 1, column 4" in error_of(tmp_path, "0,1,2,x,4\n", layout(text))
+
+
 def test_a_position_in_radians_is_converted(tmp_path: Path) -> None:
     text = "[time]\ncolumn = 1\nunit = 's'\n[position]\nlatitude = 2\nlongitude = 3\nunit = 'rad'\n"
     position = read_table(table(tmp_path, "0,1,0.5\n"), layout(text))["position"]

@@ -12,6 +12,11 @@ from shiplog.tables.header_words import is_units_row, recognise, split_header
         ("Rudder (port)", "rudder.port", ""), ("Fahrt [kn]", "speed", "kn"),
         ("Shaft RPM Stbd", "rpm.starboard", ""), ("N/S", "north_south", ""),
         ("Drehzahl [1/min]", "rpm", "rpm"), ("Length", None, ""),
+        ("GPS1 Latitude", "latitude.gps1", ""), ("lon_2", "longitude.2", ""),
+        ("Lat1", "latitude.1", ""), ("Longitude (stern)", "longitude.stern", ""),
+        ("DGPS 2 Lat N/S", "north_south.dgps2", ""), ("lat port", "latitude.port", ""),
+        ("gps_speed", "speed_over_ground", ""), ("lat_error", None, ""),
+        ("lat_b", "latitude.b", ""),
     ],
 )  # fmt: skip
 def test_a_header_gives_quantity_side_and_unit(header: str, role: str | None, unit: str) -> None:

@@ -75,6 +75,10 @@ def test_all_errors_of_a_layout_are_reported_at_once_in_one_line() -> None:
         (f"{MINIMAL}[velocity_north]\ncolumn = 3\nunit = 'kn'", "needs the other component"),
         (f"{MINIMAL}[position]\nnorth = 3\nunit = 'm'", "[position] lacks east"),
         (f"{MINIMAL}[position]\nnorth = 3\nlatitude = 4\nunit = 'm'", "mixes north and east"),
+        (f"{MINIMAL}[position.bow]\nnorth = 3\nunit = 'm'", "[position.bow] lacks east"),
+        (f"{MINIMAL}[position.a]\nnorth = 3\nlatitude = 4\nunit = 'm'", "[position.a] mixes north"),
+        (f"{MINIMAL}[position.'a/b']\nnorth = 3\neast = 4\nunit = 'm'", "without '/'"),
+        (f"{MINIMAL}['position.a']\nnorth = 3\nunit = 'm'", "[position.a] lacks east"),
         (
             (
                 "[time]\ncolumn = 1\nunit = 's'\n[heading]\ncolumn = 3\nunit = 'deg'\n"
@@ -146,3 +150,20 @@ def test_no_text_of_a_layout_ends_in_another_exception() -> None:
     for text in ("a" + ".a" * 5000 + " = 1", "a = " + "[" * 500, "a = " + "9" * 5000, "\0"):
         with pytest.raises(LayoutError):
             parse_layout(text, "x.toml")
+
+
+def test_all_errors_of_several_receivers_are_reported_at_once() -> None:
+    text = (
+        f"froude_scale = 2\n{MINIMAL}[position.bow]\nlatitude = 3\nlongitude = 4\nunit = 'm'\n"
+        "[position.stern]\nlatitude = 4\nunit = 'deg'\nnorth_south = 6\nsign = -1\n"
+    )
+    errors = errors_of(text)
+    for part in (
+        "position.bow.unit: cannot convert 'm' to 'rad'",
+        "[position.stern] lacks longitude",
+        "[position.stern] needs both north_south and east_west",
+        "unknown key 'position.stern.sign'",
+        "latitude.stern and longitude.bow name the same column 4",
+        "froude_scale cannot be applied to latitude and longitude",
+    ):
+        assert part in errors
