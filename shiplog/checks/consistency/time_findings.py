@@ -18,6 +18,8 @@ MIN_DISTANCE = 50.0  # m, of the fixes
 MIN_TIME_FACTOR = 500.0  # of the yaw rate, from which its units do not explain it
 RAD_PER_DEG_MIN_FACTORS = 3000.0, 4000.0  # about 3438 of deg/min read as rad/s, and 3600 of hours
 MIN_CORRELATION = 0.9  # of the turns by yaw rate and heading
+# of their sizes where the yaw rate turns too little, as it may be reversed or fail for a while, too
+MIN_DEAD_CORRELATION = 0.5
 TRACK_LEGS = 40  # on which the distance is measured, so that the noise of the fixes is small in it
 FACTOR_TOLERANCE, DISTANCE_TOLERANCE = 0.25, 0.4  # of the logarithms of the factors
 
@@ -34,8 +36,8 @@ def time_findings(
     A wrong unit of the times makes the integral of the yaw rate wrong by the same factor as the
     integral of the speed, compared with the heading and with the fixes. Nothing is reported where
     the distances contradict the factor. Without fixes, only factors that no units of the yaw rate
-    explain are reported, those above 1 only where yaw rate and heading turn alike: the integral of
-    a biased yaw rate grows beyond all changes of the heading.
+    explain are reported, and only where yaw rate and heading turn alike: the integral of a biased
+    yaw rate grows beyond all changes of the heading, that of a dead or stuck one is unrelated.
 
     Parameters
     ----------
@@ -62,8 +64,8 @@ def time_findings(
         if abs(log(logged / fixed / factor)) > DISTANCE_TOLERANCE:
             return
         by_speed = f", and the speed makes {logged:.3g} m where the fixes are {fixed:.3g} m apart"
-    elif _explained_by_rate_units(factor) or (factor > 1 and not _turn_alike(turned, heading)):
-        return  # a bias makes the integral of the yaw rate too large, never too small
+    elif _explained_by_rate_units(factor) or not _turn_alike(turned, heading, factor):
+        return
     yield Finding(
         "unit",
         "time",
@@ -87,14 +89,17 @@ def _explained_by_rate_units(factor: float) -> bool:
     return larger < MIN_TIME_FACTOR or low < larger < high
 
 
-def _turn_alike(turned: FloatArray, heading: FloatArray) -> bool:
+def _turn_alike(turned: FloatArray, heading: FloatArray, factor: float) -> bool:
     """Whether the turns by yaw rate and heading on the legs are correlated."""
     legs = np.linspace(0, len(heading) - 1, TRACK_LEGS + 1).astype(int)
     turns = np.diff(np.stack((turned, heading))[:, legs])
     turns = turns[:, np.isfinite(turns).all(axis=0)]
     if turns.shape[1] < TRACK_LEGS / 2 or np.any(np.std(turns, axis=1) == 0):
         return False
-    return float(np.corrcoef(turns)[0, 1]) > MIN_CORRELATION
+    correlation = float(np.corrcoef(turns)[0, 1])
+    if factor > 1:  # a bias makes the integral of the yaw rate too large, never too small
+        return correlation > MIN_CORRELATION
+    return abs(correlation) > MIN_DEAD_CORRELATION
 
 
 def _distances(

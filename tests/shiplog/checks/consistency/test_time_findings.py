@@ -63,3 +63,25 @@ def test_a_biased_yaw_rate_on_a_straight_passage_is_not_taken_for_wrong_times(
 
 def test_fixes_that_contradict_wrong_times_are_not_ignored() -> None:
     assert list(time_findings(DT, 1e3 * HEADING, HEADING, SPEED, TRACK)) == []
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("noise", [0.0, 1e-9, 1e-7, 1e-6, 1e-5])
+@pytest.mark.parametrize("bias", [0.0, 1e-9, 1e-8])
+def test_a_dead_or_stuck_yaw_rate_is_no_sign_of_wrong_times(
+    seed: int, noise: float, bias: float
+) -> None:
+    rate = bias + noise * np.random.default_rng(seed).normal(size=len(TIMES))
+    turned = np.cumsum(rate) * DT
+    for track in (TRACK, NO_TRACK):
+        assert list(time_findings(DT, turned, HEADING, SPEED, track)) == []
+
+
+def test_a_yaw_rate_that_stuck_after_its_first_turn_is_no_sign_of_wrong_times() -> None:
+    turned = 1e-6 * np.where(TIMES < 10.0, HEADING, HEADING[100])
+    assert list(time_findings(DT, turned, HEADING, SPEED, NO_TRACK)) == []
+
+
+def test_wrong_times_are_reported_for_a_reversed_yaw_rate_too() -> None:
+    found = list(time_findings(DT * 1e-6, -1e-6 * HEADING, HEADING, SPEED, NO_TRACK))
+    assert "s read as us" in found[0].text
