@@ -1,0 +1,12 @@
+"""NMEA 0183 and IEC 61162-450: sentences of a ship's instruments, decoded to channels.
+
+`framing` cuts lines and datagrams into sentences and checks them, the modules `*_sentences` decode
+one group of sentences each, `sentence_decoder` joins them to a `recorders.streams.decoder.Decoder`,
+and `gnss_clock` compares the receivers' own times with the times of reception. A file without time
+stamps gets its times in `sentence_times`.
+
+No parser library is used at run time. pynmea2 1.19 takes about as long for a sentence as the whole
+path from the file to the log takes here, raises an exception for each kind it does not know (THS,
+ROR, HTC, HTD, DBS), and checks neither status nor numbers; pynmeagps takes several times as long
+(`python -m benchmarks.sentences`). Both are references of the tests.
+"""

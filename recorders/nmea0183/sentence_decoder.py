@@ -1,0 +1,160 @@
+"""Decoder of NMEA 0183: from lines and datagrams to samples of channels."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan
+
+from recorders.streams.counts import StreamCounts
+from recorders.streams.packets import Packet
+from recorders.streams.sample_buffer import MAX_TOPICS, SampleBuffer
+
+from .environment_sentences import ENVIRONMENT
+from .framing import FramingError, Sentence, parse_sentence, split_packet
+from .gnss_clock import GnssClock
+from .navigation_sentences import NAVIGATION
+from .steering_sentences import STEERING, Values
+from .transducer_sentences import TRANSDUCERS, MotionUnit
+from .utc_fields import TIMED, utc_of
+
+_USUAL_TIME = "ZDA"  # other sentences' times of a talker have a source of their own
+_LINES = 999  # a TAG block counts them from 1 to here, then from 1 again
+
+
+@dataclass(frozen=True)
+class DecodingOptions:
+    """How sentences are decoded.
+
+    Attributes
+    ----------
+    require_checksum
+        Whether a sentence without a checksum is rejected.
+    gnss_time
+        Whether the time of measurement of a GNSS receiver's samples is the receiver's own.
+    received_is_known
+        Whether the times of the packets are those of reception, rather than derived from the
+        sentences.
+    """
+
+    require_checksum: bool = True
+    gnss_time: bool = False
+    received_is_known: bool = True
+
+
+class SentenceDecoder:
+    """Decodes NMEA 0183 sentences; a `recorders.streams.decoder.Decoder`.
+
+    Parameters
+    ----------
+    options
+        How sentences are decoded.
+    counts
+        Counts of the stream, which earlier stages may have begun.
+
+    Attributes
+    ----------
+    counts
+        What was decoded, skipped and rejected so far.
+
+    Examples
+    --------
+    >>> decoder, samples = SentenceDecoder(), SampleBuffer()
+    >>> decoder.decode([Packet(b"$TIROT,-6.0,A*35", 10**18)], samples)
+    >>> samples.take()[0]
+    Channel(/yaw_rate/TI [rad/s], 1 samples)
+    """
+
+    def __init__(
+        self, options: DecodingOptions | None = None, counts: StreamCounts | None = None
+    ) -> None:
+        self.counts = StreamCounts() if counts is None else counts
+        self._options = options or DecodingOptions()
+        self._decoders = (
+            STEERING | NAVIGATION | ENVIRONMENT | TRANSDUCERS | {"PSXN": MotionUnit().decode}
+        )
+        self._clock = GnssClock(self.counts.warn, received_is_known=self._options.received_is_known)
+        self._lines: dict[str, int] = {}  # the last line count by sender
+
+    def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
+        """Decode a batch of lines or datagrams."""
+        for packet in batch:
+            for line in split_packet(packet.data):
+                self._decode_line(line, packet.received_ns, samples)
+
+    def finish(self, samples: SampleBuffer) -> None:  # noqa: ARG002 - of the protocol
+        """Report the latencies of the receivers."""
+        self._clock.finish()
+        for source, formatter, latency in self._clock.latencies():
+            middle, low, high = latency.quantiles()
+            self.counts.note(
+                f"latency_s.{source}.{formatter}",
+                f"{middle:.3f} (90 % from {low:.3f} to {high:.3f})",
+            )
+
+    def _decode_line(self, line: bytes, received_ns: int, samples: SampleBuffer) -> None:
+        try:
+            sentence = parse_sentence(line, require_checksum=self._options.require_checksum)
+        except FramingError as error:
+            self.counts.reject(str(error))
+            return
+        talker, formatter, fields, tag = sentence
+        kind = talker if talker == formatter else talker + formatter
+        if tag.line is not None:
+            self._count_lost_lines(tag.source, tag.line)
+        decode = self._decoders.get(kind) or self._decoders.get(formatter)
+        if decode is None and formatter not in TIMED:
+            self.counts.skip(kind)
+            return
+        source = f"{tag.source}.{talker}" if tag.source else talker
+        try:
+            values = decode(fields) if decode else ()
+            time_ns = self._gnss_time_ns(source, sentence, received_ns, samples)
+        except ValueError:
+            self.counts.reject(f"malformed field of {formatter}")
+            return
+        if not values and time_ns is None:
+            self.counts.skip(f"{kind} without a value")
+            return
+        self.counts.accept(kind)
+        measured_ns = received_ns
+        if self._options.gnss_time:
+            measured_ns = time_ns or self._clock.measured_ns(source, received_ns)
+        if not _add(samples, source, values, received_ns, measured_ns):
+            self.counts.flag(kind)
+
+    def _gnss_time_ns(
+        self, source: str, sentence: Sentence, received_ns: int, samples: SampleBuffer
+    ) -> int | None:
+        """Return the time in a sentence, ns; one with a date is a sample of ``gnss_time``."""
+        formatter = sentence.formatter
+        if formatter not in TIMED or (utc := utc_of(formatter, sentence.fields)) is None:
+            return None
+        time_ns = self._clock.set_time(source, formatter, utc, received_ns)
+        if time_ns is not None and utc.day is not None:
+            name = source if formatter == _USUAL_TIME else f"{source}.{formatter}"
+            samples.add("gnss_time", name, time_ns * 1e-9, received_ns)
+        return time_ns
+
+    def _count_lost_lines(self, sender: str, line: int) -> None:
+        """Count the lines that are missing between two line counts of a sender."""
+        last = self._lines.get(sender)
+        if last is None and len(self._lines) >= MAX_TOPICS:
+            return
+        self._lines[sender] = line
+        if last is not None and line not in (last, 1) and (lost := (line - last - 1) % _LINES):
+            self.counts.reject("lost before reception (TAG line counts)", lost)
+
+
+def _add(
+    samples: SampleBuffer, source: str, values: Values, received_ns: int, measured_ns: int
+) -> bool:
+    """Add the values of a sentence; return whether all of them are valid."""
+    valid = True
+    for channel, value, suffix in values:
+        topic = f"{source}.{suffix}" if suffix else source
+        if isinstance(value, tuple):
+            samples.add_position(topic, value, received_ns, measured_ns)
+            valid &= not isnan(value[0])
+        else:
+            samples.add(channel, topic, value, received_ns, measured_ns)
+            valid &= not isnan(value)
+    return valid

@@ -1,0 +1,100 @@
+"""Values in the fields of a sentence: numbers, validity and hemispheres."""
+
+from math import isfinite, nan
+from typing import NamedTuple
+
+Fix = tuple[float, float, float]
+"""Latitude and longitude in deg, altitude in m; NaN where not known."""
+
+
+class Value(NamedTuple):
+    """A measured value of a sentence.
+
+    Attributes
+    ----------
+    channel
+        The channel, of `shiplog.units.CATALOGUE`.
+    value
+        The value in the unit of the catalogue, or a fix; NaN where the sender marks it as invalid.
+    suffix
+        What distinguishes it from other values of this channel by the same talker: ``port`` of two
+        rudders, or the sentence where another one is the usual one of the channel; else empty.
+    """
+
+    channel: str
+    value: float | Fix
+    suffix: str = ""
+
+
+def text_at(fields: list[str], index: int) -> str:
+    """Return a field without padding; empty where the sentence is too short."""
+    return fields[index].strip() if index < len(fields) else ""
+
+
+def number_at(fields: list[str], index: int) -> float | None:
+    """Return the number in a field; None where it is empty.
+
+    Raises
+    ------
+    ValueError
+        The field is not a finite number.
+    """
+    text = fields[index] if index < len(fields) else ""
+    if not text or text.isspace():
+        return None
+    value = float(text)
+    if not isfinite(value) or "_" in text:
+        raise ValueError(text)
+    return value
+
+
+def is_valid(fields: list[str], index: int, valid: str = "A") -> bool:
+    """Whether a status is one of the letters for valid data.
+
+    Sentences of old devices end before the status; a sentence without it is taken as valid.
+    """
+    status = text_at(fields, index)
+    return not status or status in valid
+
+
+def measured(
+    channel: str,
+    number: float | None,
+    factor: float = 1.0,
+    *,
+    valid: bool = True,
+    suffix: str = "",
+) -> tuple[Value, ...]:
+    """Return a value in the unit of its channel; nothing where it was not measured.
+
+    Parameters
+    ----------
+    channel
+        The channel.
+    number
+        The number in the sentence.
+    factor
+        Converts it to the unit of the channel.
+    valid
+        Whether the sender marks it as valid; if not, the value is NaN.
+    suffix
+        The suffix of the source.
+    """
+    if number is None:
+        return ()
+    return (Value(channel, number * factor if valid else nan, suffix),)
+
+
+def signed(number: float | None, letter: str, positive: str, negative: str) -> float | None:
+    """Return a number with the sign that a letter gives it, such as E and W of a variation.
+
+    Raises
+    ------
+    ValueError
+        The letter is neither of them.
+    """
+    if number is None:
+        return None
+    if letter not in (positive, negative):
+        raise ValueError(letter)
+    return number if letter == positive else -number

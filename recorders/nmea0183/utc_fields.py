@@ -1,0 +1,108 @@
+"""Date and time of day in sentences of GNSS receivers."""
+
+from collections.abc import Callable
+from datetime import date
+from typing import NamedTuple
+
+from shiplog.tables.printed_times import DAY_NS, HALF_DAY_NS
+
+from .navigation_sentences import FIX_MODES, has_fix, has_mode, has_valid_rmc
+from .sentence_values import is_valid, text_at
+
+_EPOCH = date(1970, 1, 1).toordinal()
+_CENTURY_BREAK = 80  # years of two digits from here on are of the 20th century: GPS began in 1980
+
+
+class Utc(NamedTuple):
+    """Time in a sentence.
+
+    Attributes
+    ----------
+    clock_ns
+        The time of day, ns.
+    day
+        The date, days since 1970-01-01; None where the sentence has none.
+    """
+
+    clock_ns: int
+    day: int | None
+
+
+def utc_of(formatter: str, fields: list[str]) -> Utc | None:
+    """Return the time in a sentence; None without a valid one.
+
+    A time without a fix may be that of a receiver's unset clock, and is not used.
+
+    Raises
+    ------
+    ValueError
+        The time or the date is malformed.
+
+    Examples
+    --------
+    >>> utc_of("ZDA", "000000.17,01,08,2014,,".split(","))
+    Utc(clock_ns=170000000, day=16283)
+    """
+    reader = _READERS.get(formatter)
+    return None if reader is None else reader(fields)
+
+
+def nearest_ns(clock_ns: int, reference_ns: int) -> int:
+    """Return the time with this time of day that is nearest to a reference, ns."""
+    return reference_ns + (clock_ns - reference_ns + HALF_DAY_NS) % DAY_NS - HALF_DAY_NS
+
+
+def _clock(text: str) -> int | None:
+    """Return the time of day of ``hhmmss.ss``, ns; None where it is empty."""
+    if not text:
+        return None
+    whole, _, fraction = text.partition(".")
+    if len(whole) != 6 or not whole.isdecimal() or (fraction and not fraction.isdecimal()):
+        raise ValueError(text)
+    hour, minute, second = int(whole[:2]), int(whole[2:4]), int(whole[4:])
+    if hour > 23 or minute > 59 or second > 60:  # 60 in a leap second
+        raise ValueError(text)
+    return (hour * 3600 + minute * 60 + second) * 10**9 + int(fraction[:9].ljust(9, "0"))
+
+
+def _days(year: int, month: int, day: int) -> int:
+    return date(year, month, day).toordinal() - _EPOCH
+
+
+def _only_clock(text: str, *, valid: bool) -> Utc | None:
+    clock_ns = _clock(text)
+    return Utc(clock_ns, None) if valid and clock_ns is not None else None
+
+
+def _rmc(fields: list[str]) -> Utc | None:
+    clock_ns, text = _clock(text_at(fields, 0)), text_at(fields, 8)
+    if clock_ns is None or not has_valid_rmc(fields):
+        return None
+    if not text:
+        return Utc(clock_ns, None)
+    if len(text) != 6 or not text.isdecimal():
+        raise ValueError(text)
+    year = int(text[4:])
+    century = 1900 if year >= _CENTURY_BREAK else 2000
+    return Utc(clock_ns, _days(century + year, int(text[2:4]), int(text[:2])))
+
+
+def _zda(fields: list[str]) -> Utc | None:
+    clock_ns, parts = _clock(text_at(fields, 0)), [text_at(fields, i) for i in (1, 2, 3)]
+    if clock_ns is None:
+        return None
+    if not all(parts):
+        return Utc(clock_ns, None)
+    day, month, year = (int(part) if part.isdecimal() and len(part) <= 4 else 0 for part in parts)
+    return Utc(clock_ns, _days(year, month, day))
+
+
+_READERS: dict[str, Callable[[list[str]], Utc | None]] = {
+    "RMC": _rmc,
+    "ZDA": _zda,
+    "GGA": lambda f: _only_clock(text_at(f, 0), valid=has_fix(f[5:])),
+    "GNS": lambda f: _only_clock(text_at(f, 0), valid=has_mode(f)),
+    "GLL": lambda f: _only_clock(text_at(f, 4), valid=is_valid(f, 5) and is_valid(f, 6, FIX_MODES)),
+}
+TIMED = frozenset(_READERS)
+"""The formatters of sentences that bear a time."""
