@@ -280,12 +280,16 @@ def _estimate_instant(blocks: Blocks, columns: tuple[int, ...]) -> tuple[int, fl
 def _is_long_enough(blocks: Blocks) -> NDArray[np.bool_]:
     """Return whether both sides of each edge between blocks are long enough, (k - 1,).
 
-    Beside the rows that are ignored around a change, each side needs `MIN_SIDE_BUMPS` bumps.
+    Beside the rows that are ignored around a change, each side needs `MIN_SIDE_BUMPS` bumps in
+    which the excitation differs from its median: on a straight approach the regressors are mostly
+    noise, and so are the coefficients.
     """
-    known = (blocks.tallies[:, 0] > 0).astype(int)
-    before = np.cumsum(known)[:-1]
+    count, low, high = blocks.tallies.T
+    middle = np.median((low[count > 0] + high[count > 0]) / 2)
+    excited = np.maximum(high - middle, middle - low) >= blocks.min_excitation / 2
+    before = np.cumsum(excited)[:-1]
     least = blocks.guard_blocks + MIN_SIDE_BUMPS * blocks.overlap_blocks
-    return np.asarray(np.minimum(before, known.sum() - before) >= least)
+    return np.asarray(np.minimum(before, excited.sum() - before) >= least)
 
 
 def _is_excited(blocks: Blocks) -> NDArray[np.bool_]:

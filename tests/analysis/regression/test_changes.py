@@ -26,6 +26,7 @@ from analysis.view.replay_panels import history_panels
 from analysis.view.series_builder import SeriesBuilder
 from benchmarks.changed_ship import changed_trial
 from benchmarks.changes import Case, halfway, reported_changes, unchanged
+from benchmarks.undistorted import Condition, undistorted_log, with_long_approach
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import Gust, RandomForcing
@@ -83,6 +84,15 @@ def test_the_onset_of_a_steady_moment_is_not_a_change(vessel: Vessel) -> None:
             gusts=gusts,
         )  # fmt: skip
         assert reported_changes(TrialLog("gust", trial.channels), ZIGZAG) == ()
+
+
+@pytest.mark.parametrize("seed", [3, 12, 13, 19])
+def test_a_manoeuvre_after_a_long_straight_approach_is_not_a_change(
+    vessel: Vessel, seed: int
+) -> None:
+    """On the approach the regressors are noise, so that the coefficients there tend to zero."""
+    log = undistorted_log(Condition("approach", with_long_approach, noise="white"), seed)
+    assert analyse(log, vessel).findings.changes == ()
 
 
 def test_two_coefficients_that_change_together_are_both_reported(vessel: Vessel) -> None:
