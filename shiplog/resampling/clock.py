@@ -132,6 +132,12 @@ def _require_samples(log: Log, name: str, channel: ChannelStats) -> None:
             f"channel {name!r} has components ({', '.join(channel.fields)}) and cannot be "
             f"resampled; name channels with one value per sample: {log.name}"
         )
+    if channel.valid < 1 and channel.impossible.count:
+        raise LogError(
+            f"channel {name!r} has no possible value, {channel.impossible.count} of "
+            f"{channel.samples} samples are impossible, up to {channel.impossible.extent:.4g} "
+            f"{channel.unit}; correct its unit in the layout, or choose another log: {log.name}"
+        )
     if channel.valid < 1 or not (channel.hold or channel.interval_secs > 0):
         content = {0: "no measured value", 1: "one sample"}.get(
             channel.valid, "all its samples at one instant"

@@ -85,12 +85,12 @@ def parse_times(
     times_ns
         (n,) times.
     warnings
-        One line each: a zone or a date that had to be assumed.
+        One line each: a zone or a date that had to be assumed, a zone that the times contradict.
 
     Raises
     ------
     TimeTextError
-        A text is not a time, its day and month are ambiguous, or its zone contradicts the layout.
+        A text is not a time, or its day and month are ambiguous.
 
     Examples
     --------
@@ -127,13 +127,30 @@ def parse_times(
     if np.any(stated):
         if not np.all(stated):
             raise TimeTextError(int(np.argmin(stated)), "has no time zone, though other rows do")
-        return local_ns - _offsets_ns(parts["zone"]), warnings
+        times_ns = local_ns - _offsets_ns(parts["zone"])
+        warnings += _zone_warnings(parts["zone"], local_ns - times_ns, times_ns, form.zone)
+        return times_ns, warnings
     if form.zone is None:
         warnings.append(
             "the times have no time zone, read as UTC; state time.zone, such as 'UTC' or "
             "'Europe/Berlin'"
         )
     return _to_utc(local_ns, form.zone or UTC), warnings
+
+
+def _zone_warnings(
+    stated: NDArray[np.str_], offsets_ns: TimeArray, times_ns: TimeArray, zone: tzinfo | None
+) -> list[str]:
+    """Compare the first printed offset from UTC with that of the zone in the layout."""
+    import pandas as pd  # noqa: PLC0415 - slow to import
+
+    if zone is None:
+        return []
+    local = pd.Timestamp(times_ns[0], tz="UTC").tz_convert(zone).tz_localize(None)
+    if local.value - times_ns[0] == offsets_ns[0]:
+        return []
+    text = f"the times state the zone {stated[0]}, which is used; time.zone = '{zone}' differs"
+    return [f"{text} from it: remove time.zone"]
 
 
 def excel_ns(days: FloatArray, zone: tzinfo | None) -> TimeArray:

@@ -18,11 +18,18 @@ from .speed_findings import (
     speed_lag_findings,
 )
 from .time_findings import time_findings
-from .turning_findings import Pair, sense_explanations, sense_findings, unit_findings
+from .turning_findings import (
+    Pair,
+    column_findings,
+    sense_explanations,
+    sense_findings,
+    unit_findings,
+)
 from .turning_ratio import TurningRatio, turning_ratio
 
 __all__ = ["COMPARED_CHANNELS", "ConsistencyCheck", "consistency_findings"]
 
+MIN_CORRELATION = 0.9  # of the turns of two channels that are compared
 MIN_COURSE_STD = np.radians(5.0)  # of the course, below which it is not compared with turns
 MIN_RUDDER_ERRORS = 3.0  # standard errors by which the rudder's effect must differ from zero
 MIN_LAG_SECS, LAG_ERRORS = 0.5, 6.0
@@ -79,7 +86,8 @@ class ConsistencyCheck:
         if self._record.dt_secs == 0:
             return findings
         signals = self._record.result()
-        ratios = _ratios(signals)
+        compared = _turning_ratios(signals)
+        ratios = _correlated(compared)
         explanations = sense_explanations(_senses(signals, ratios))
         turning = sense_findings(explanations, signals.topics)
         wrong_times = list(
@@ -94,6 +102,7 @@ class ConsistencyCheck:
         turning += wrong_times or unit_findings(ratios, signals.topics)
         velocity = None if turning else ground_velocity(signals)
         findings += turning
+        findings += column_findings(compared.get(("yaw_rate", "heading")), signals.topics)
         # exchanged latitudes and longitudes distort distances; the speed is compared once corrected
         if not wrong_times and not (
             signals.datum and explanations and "position" in explanations[0]
@@ -121,7 +130,7 @@ def _senses(signals: CoarseSignals, ratios: dict[Pair, TurningRatio]) -> dict[Pa
     return senses
 
 
-def _ratios(signals: CoarseSignals) -> dict[Pair, TurningRatio]:
+def _turning_ratios(signals: CoarseSignals) -> dict[Pair, TurningRatio]:
     """Compare each pair of the channels that turn."""
     series = {"yaw_rate": signals.yaw, "heading": signals.heading, "position": signals.course}
     known = signals.course[np.isfinite(signals.course)]
@@ -129,10 +138,15 @@ def _ratios(signals: CoarseSignals) -> dict[Pair, TurningRatio]:
     pairs = [("yaw_rate", "heading")]
     pairs += [("yaw_rate", "position"), ("heading", "position")] if course_turns else []
     ratios = {(x, y): turning_ratio(signals.dt_secs, series[x], series[y]) for x, y in pairs}
+    return {pair: ratio for pair, ratio in ratios.items() if ratio is not None}
+
+
+def _correlated(ratios: dict[Pair, TurningRatio]) -> dict[Pair, TurningRatio]:
+    """Return the ratios of channels that turn alike, which are determined."""
     return {
         pair: ratio
         for pair, ratio in ratios.items()
-        if ratio is not None and abs(ratio.ratio) > 4 * ratio.error
+        if abs(ratio.correlation) >= MIN_CORRELATION and abs(ratio.ratio) > 4 * ratio.error
     }
 
 

@@ -16,7 +16,7 @@ class Finding:
     Attributes
     ----------
     kind
-        "unit", "sign", "zero", "bias" or "lag".
+        "unit", "sign", "column", "zero", "bias" or "lag".
     channel
         The name of the channel that is likely wrong; "time" for the times of all.
     text

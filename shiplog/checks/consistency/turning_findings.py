@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from itertools import product
-from math import log, prod
+from math import log, prod, radians
 
 from .findings import Finding
 from .turning_ratio import TurningRatio
@@ -12,6 +12,10 @@ MIN_FACTOR = 1.07  # between yaw rate and heading
 MIN_COURSE_FACTOR = 1.6  # of the course, which differs from the heading by the drift
 # the cost of each channel's having the wrong sense; fixes are rarely mirrored
 COSTS = {"yaw_rate": 1.0, "heading": 1.0, "rudder": 0.95, "position": 1.6}
+# between the turns of yaw rate and heading: right channels have at least 0.99, rudder and heading
+# of a zig-zag at most 0.7
+MAX_FOREIGN_CORRELATION = 0.75
+MIN_TURNS = radians(3.0)  # standard deviation of a heading's turns that is more than noise
 AMBIGUITY = 1.1  # difference of the costs below which two explanations are stated
 
 Pair = tuple[str, str]
@@ -125,6 +129,28 @@ def unit_findings(
                 f"the fixes; likely {in_words(matches) or 'a wrong unit'}; change in the layout: "
                 f"{remedy}",
             )
+
+
+def column_findings(pair: TurningRatio | None, topics: Mapping[str, str]) -> Iterator[Finding]:
+    """Report a yaw rate and a heading that do not turn alike, whatever their units and signs.
+
+    Parameters
+    ----------
+    pair
+        The turns of the heading over those of the yaw rate; None where either does not turn.
+    topics
+        The topic of each channel, by name.
+    """
+    if pair is None or pair.turns < MIN_TURNS:
+        return
+    if abs(pair.correlation) < MAX_FOREIGN_CORRELATION:
+        yield Finding(
+            "column",
+            "yaw_rate",
+            f"{topics['yaw_rate']}: does not turn as {topics['heading']} does (correlation "
+            f"{pair.correlation:.2f}); likely one of them is another quantity, or is faulty for "
+            "much of the log; change in the layout: column of [yaw_rate] or of [heading]",
+        )
 
 
 def _differs(ratio: TurningRatio, factor: float) -> bool:

@@ -8,7 +8,6 @@ from shiplog.types import FloatArray
 
 from .window_fit import fit_windows
 
-MIN_CORRELATION = 0.9
 MIN_WINDOWS = 12  # independent ones
 MAX_ROWS = 4000
 
@@ -25,6 +24,8 @@ class TurningRatio:
         Its standard error.
     correlation
         Correlation of the two over the windows.
+    turns
+        Standard deviation of the second channel's turns over the windows, rad.
     lag_secs, lag_error_secs
         By how much the second channel lags the first, with its standard error.
     """
@@ -32,6 +33,7 @@ class TurningRatio:
     ratio: float
     error: float
     correlation: float
+    turns: float
     lag_secs: float
     lag_error_secs: float
 
@@ -50,7 +52,7 @@ def turning_ratio(dt: float, x: FloatArray, y: FloatArray) -> TurningRatio | Non
     -------
     TurningRatio or None
         The ratio k and the lag T, over the window W with the highest correlation; None where the
-        channels turn too little or are not correlated.
+        channels turn too little.
     """
     best: TurningRatio | None = None
     for window_secs in (10.0, 30.0, 90.0):
@@ -58,7 +60,7 @@ def turning_ratio(dt: float, x: FloatArray, y: FloatArray) -> TurningRatio | Non
         result = _over_windows(dt, x, y, length)
         if result and (best is None or abs(result.correlation) > abs(best.correlation) + 0.02):
             best = result
-    return best if best and abs(best.correlation) >= MIN_CORRELATION else None
+    return best
 
 
 def _over_windows(dt: float, x: FloatArray, y: FloatArray, length: int) -> TurningRatio | None:
@@ -82,7 +84,7 @@ def _over_windows(dt: float, x: FloatArray, y: FloatArray, length: int) -> Turni
     (ratio, product), errors = fit
     correlation = float(np.corrcoef(dx, dy)[0, 1])
     return TurningRatio(
-        float(ratio), float(errors[0]), correlation,
+        float(ratio), float(errors[0]), correlation, float(np.std(dy)),
         float(-product / ratio), float(errors[1] / abs(ratio)),
     )  # fmt: skip
 

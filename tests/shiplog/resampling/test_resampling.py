@@ -1,4 +1,5 @@
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import isnan, nan, pi
 
 import numpy as np
@@ -214,6 +215,14 @@ def test_positions_are_omitted_by_default_and_rejected_by_name() -> None:
         resample(log, channels=("position",))
     with pytest.raises(LogError, match="no channel to resample"):
         resample(log_of(position))
+
+
+def test_a_channel_whose_values_are_all_impossible_has_a_wrong_unit() -> None:
+    rpm = replace(channel("rpm", [0, 1, 2], [4800, 4810, 4790]), unit="rpm")
+    log = log_of(channel("speed", [0, 1], [1, 2]), rpm)
+    stats = compute_log_stats(log, strict=True)
+    with pytest.raises(LogError, match=r"'rpm' has no possible value.* up to 4810 rpm.*its unit"):
+        choose_clock(log, stats, channels=("speed", "rpm"))
 
 
 @pytest.mark.parametrize(

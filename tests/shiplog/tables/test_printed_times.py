@@ -1,6 +1,6 @@
 """Printed times: ISO 8601, date orders, midnight, and time zones."""
 
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, tzinfo
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -41,6 +41,26 @@ def test_iso_times_are_those_of_the_standard_library() -> None:
     expected = [round(i.timestamp() * 1e6) * 1000 for i in instants]
     np.testing.assert_allclose(times_ns - expected[0], np.array(expected) - expected[0], atol=1000)
     assert warnings == []
+
+
+@pytest.mark.parametrize(
+    ("text", "zone", "differs"),
+    [
+        ("2026-03-29T00:55:00Z", UTC, False),
+        ("2026-07-01T02:00:00+02:00", BERLIN, False),
+        ("2026-01-01T02:00:00+02:00", BERLIN, True),
+        ("2026-07-01T02:00:00+02:00", UTC, True),
+        ("2026-03-29T02:30:00+02:00", BERLIN, True),  # an hour that Berlin does not have
+    ],
+)
+def test_a_zone_that_contradicts_the_printed_offset_is_a_warning(
+    text: str, zone: tzinfo, *, differs: bool
+) -> None:
+    times_ns, warnings = parse_times([text], None, TimeForm(zone=zone))
+    assert times_ns[0] == round(datetime.fromisoformat(text).timestamp()) * 10**9
+    assert [("which is used" in each, "remove time.zone" in each) for each in warnings] == (
+        [(True, True)] if differs else []
+    )
 
 
 def test_a_time_without_a_zone_is_read_as_utc_with_a_warning() -> None:

@@ -101,6 +101,16 @@ def test_a_heading_from_east_is_found(trial: TrialLog) -> None:
     assert "from east" in findings[0].text
 
 
+@pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "pseudo-random", "turning-circle"])
+def test_a_rudder_in_the_column_of_the_yaw_rate_is_found(vessel: Vessel, manoeuvre: str) -> None:
+    log = simulated(vessel, manoeuvre, 0)
+    rudder = log["rudder"].values / 60
+    (finding,) = [
+        f for f in contradictions(changed(log, yaw_rate=lambda _: rudder)) if f.kind == "column"
+    ]
+    assert "/yaw_rate/simulated: does not turn as /heading/simulated does" in finding.text
+
+
 def test_a_wrong_unit_of_the_yaw_rate_does_not_hide_a_heading_from_east(trial: TrialLog) -> None:
     log = changed(trial, yaw_rate=scaled(60.0), heading=lambda values: values - np.pi / 2)
     findings = {(f.kind, f.channel) for f in contradictions(log)}
