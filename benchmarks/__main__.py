@@ -1,7 +1,8 @@
 """The time of each piece of work and of the whole replay, as a ratio to a peer in the same run.
 
-The theme `distortions` is not of times: it replays one trial distorted in 200 ways and counts the
-wrong results that are not reported.
+The theme `distortions` is not of times: it replays one trial distorted in 200 ways, identifies some
+of them, and counts the wrong results that are not reported; and it replays undistorted trials in
+many conditions with fifty seeds and counts their warnings.
 
 Each line times shiplog and a straightforward peer in turn, several rounds, and reports the median
 of the ratios: times differ between machines and moments, ratios within one run hardly do. Before,

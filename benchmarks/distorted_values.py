@@ -50,7 +50,7 @@ def unit_distortions() -> list[Distortion]:
     return [
         Distortion(
             "unit", f"{name} in {written} read as {taken}",
-            (f"{name} {written}", f"{name} constant unit"),
+            (f"{name} {written} read", f"{name} {written} unit", f"{name} constant unit"),
             scaled(name, by=factor),
         )
         for name, written, taken, factor in cases

@@ -190,5 +190,5 @@ def _distortion_grid(results: MatrixResults) -> _Grid:
         "trials."
     )
     remarks = (summary, *results.failures, *alarms)
-    title = f"A trial distorted in {sum(results.counts['total'])} ways"
+    title = f"{sum(results.counts['total'])} replays and identifications of a distorted trial"
     return _Grid(title, ("distortion", *OUTCOMES), rows, remarks)

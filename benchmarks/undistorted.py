@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from analysis.replay.reading_options import ReadingOptions
 from analysis.replay.replay import analyse
 from recorders.simulated.sensors import DEG, suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
@@ -89,10 +90,10 @@ def false_alarms(seeds: Iterable[int], among: Iterable[Condition] | None = None)
     among
         The conditions; by default all of `conditions`.
     """
-    vessel = load_vessel("table1")[0]
+    options = ReadingOptions(load_vessel("table1")[0])
     for condition in conditions() if among is None else among:
         for seed in seeds:
-            for warning in analyse(undistorted_log(condition, seed), vessel).findings.warnings:
+            for warning in analyse(undistorted_log(condition, seed), options).findings.warnings:
                 if not any(text in warning for text in condition.expected):
                     yield f"{condition.name}, seed {seed}: {warning}"
 

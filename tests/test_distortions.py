@@ -2,18 +2,22 @@
 
 import pytest
 
+from benchmarks.distorted_figures import judge_identification
 from benchmarks.distortion_matrix import (
+    NAMED,
     OTHER_REFUSAL,
     OTHER_WARNING,
+    REFUSED,
+    RIGHT_WITH_WARNINGS,
     SILENT,
     TRACEBACK,
     Outcome,
     counts_by_family,
-    false_alarms,
     run_case,
     run_matrix,
 )
-from benchmarks.distortions import CASES, Case, cases
+from benchmarks.distortions import CASES, Case, cases, identified_cases
+from benchmarks.undistorted import Condition, conditions, false_alarms
 
 pytestmark = pytest.mark.xdist_group("distortions")
 
@@ -31,7 +35,7 @@ def test_cases_are_distinct_and_of_all_families() -> None:
     names = [str(case) for case in cases()]
     assert len(set(names)) == len(names) == CASES
     assert {case.family for case in cases()} == {
-        "unit", "sign", "clock", "sampling", "sentinel", "source", "position", "pair",
+        "unit", "sign", "clock", "sampling", "sentinel", "source", "position", "table", "pair",
     }  # fmt: skip
 
 
@@ -53,5 +57,19 @@ def test_no_distortion_ends_in_a_traceback(outcomes: list[Outcome]) -> None:
     assert of_kind(outcomes, TRACEBACK) == []
 
 
-def test_undistorted_trials_of_other_seeds_give_no_warning() -> None:
-    assert list(false_alarms(range(8))) == []
+def test_an_identification_of_a_distorted_trial_is_right_or_names_the_cause() -> None:
+    chosen = identified_cases()[::3]  # the benchmark runs all
+    outcomes = list(run_matrix(chosen, judge_identification))
+    assert [str(each) for each in outcomes if not each.is_acceptable] == []
+    assert {each.kind for each in outcomes} >= {NAMED, REFUSED, RIGHT_WITH_WARNINGS}
+
+
+def test_the_cases_that_are_identified_are_of_all_families() -> None:
+    to_identify = identified_cases()
+    assert {case.family for case in to_identify} == {case.family for case in cases()}
+    assert len({str(case) for case in to_identify}) == len(to_identify) >= 30
+
+
+@pytest.mark.parametrize("condition", conditions(), ids=lambda condition: condition.name)
+def test_undistorted_trials_give_no_warning_in_any_condition(condition: Condition) -> None:
+    assert list(false_alarms((3, 13), [condition])) == []

@@ -18,6 +18,7 @@ from analysis.regression.weak_form import (
     weak_form,
     with_constant,
 )
+from analysis.replay.reading_options import ReadingOptions
 from analysis.replay.replay import analyse
 from analysis.replay.replay_results import Analysis
 from analysis.report.replay_json import replay_json
@@ -92,7 +93,7 @@ def test_a_manoeuvre_after_a_long_straight_approach_is_not_a_change(
 ) -> None:
     """On the approach the regressors are noise, so that the coefficients there tend to zero."""
     log = undistorted_log(Condition("approach", with_long_approach, noise="white"), seed)
-    assert analyse(log, vessel).findings.changes == ()
+    assert analyse(log, ReadingOptions(vessel)).findings.changes == ()
 
 
 def test_two_coefficients_that_change_together_are_both_reported(vessel: Vessel) -> None:
