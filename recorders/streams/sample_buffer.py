@@ -7,6 +7,7 @@ import numpy as np
 from shiplog.types import Channel, Event, EventLevel
 from shiplog.units import CATALOGUE, GEOGRAPHIC
 
+STREAM_KEY = "stream"  # of a channel's metadata: the stream from which it was decoded
 MAX_TOPICS = 256  # sources come from the wire; a ship has far fewer
 
 
@@ -46,6 +47,8 @@ class SampleBuffer:
     prefix
         Put before the source of each topic, such as ``gyro.``, so that two streams with the same
         talker have topics of their own.
+    stream
+        The name of the stream, for the metadata of each topic; none where it is empty.
 
     Examples
     --------
@@ -56,8 +59,8 @@ class SampleBuffer:
     (Channel(/heading/HE [rad], 1 samples),)
     """
 
-    def __init__(self, prefix: str = "") -> None:
-        self._prefix = prefix
+    def __init__(self, prefix: str = "", stream: str = "") -> None:
+        self._prefix, self._stream = prefix, stream
         self._columns: dict[tuple[str, str], _Column] = {}
         self._events: list[Event] = []
 
@@ -133,7 +136,7 @@ class SampleBuffer:
         if len(self._columns) >= MAX_TOPICS:
             return None
         unit = "deg" if fields else CATALOGUE[name].unit  # an altitude is in m
-        column = self._columns[name, source] = _Column(
-            name, self._prefix + source, unit, fields, {}
-        )
+        metadata = {STREAM_KEY: self._stream} if self._stream else {}
+        column = _Column(name, self._prefix + source, unit, fields, metadata)
+        self._columns[name, source] = column
         return column

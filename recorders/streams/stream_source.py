@@ -33,8 +33,10 @@ class StreamSource:
         Where the packets come from, for the metadata: a file name or an address.
     vessel_toml
         The text of the vessel file to keep in the log, or None.
-    samples
-        Collects what is decoded.
+    prefix
+        Put before the source of its topics.
+    options
+        The options of its format, as they stand on a command line.
     """
 
     name: str
@@ -44,34 +46,41 @@ class StreamSource:
     keep_raw: bool = False
     origin: str = ""
     vessel_toml: str | None = None
-    samples: SampleBuffer = field(default_factory=SampleBuffer, repr=False)
+    prefix: str = ""
+    options: str = ""
+    _samples: SampleBuffer = field(init=False, repr=False)
     _last_ns: int = field(default=0, init=False, repr=False)  # the last time of reception
+
+    def __post_init__(self) -> None:
+        self._samples = SampleBuffer(self.prefix, self.name)
 
     @property
     def metadata(self) -> Mapping[str, str]:
-        """The origin and format of the stream, and its rejected and invalid packets so far."""
+        """The origin, format and options, and the rejected and invalid packets so far."""
         counts = self.decoder.counts
+        decoding = {"options": self.options, "prefix": self.prefix}
+        origin = {"source": self.format, "origin": self.origin}
         rejected = {f"rejected.{reason}": str(n) for reason, n in counts.rejected.items()}
         invalid = {f"invalid.{kind}": str(n) for kind, n in counts.flagged.items()}
-        origin = {"source": self.format, "origin": self.origin}
-        return origin | dict(counts.notes) | rejected | invalid
+        known = {key: text for key, text in decoding.items() if text}
+        return origin | known | dict(counts.notes) | rejected | invalid
 
     def steps(self) -> Iterator[tuple[Recordable, ...]]:
         """Yield the samples, events and raw packets of each batch, or nothing, and of the end."""
         for batch in self.batches:
-            self.decoder.decode(batch, self.samples)
+            self.decoder.decode(batch, self._samples)
             if batch:
                 self._last_ns = batch[-1].received_ns
             self._add_warnings()
             raw = [self._raw(batch)] if self.keep_raw and batch else []
-            yield (*self.samples.take(), *raw)
+            yield (*self._samples.take(), *raw)
         yield self.finish()
 
     def finish(self) -> tuple[Recordable, ...]:
         """Return what the decoder still held after the last batch."""
-        self.decoder.finish(self.samples)
+        self.decoder.finish(self._samples)
         self._add_warnings()
-        return self.samples.take()
+        return self._samples.take()
 
     def chunks(self) -> Iterator[tuple[Recordable, ...]]:
         """Yield what the steps yield, without those that yield nothing."""
@@ -80,7 +89,7 @@ class StreamSource:
     def _add_warnings(self) -> None:
         """Add the new warnings of the stages and the decoder as events."""
         for time_ns, text in self.decoder.counts.take_warnings():
-            self.samples.add_event(self._last_ns if time_ns is None else time_ns, text, self.name)
+            self._samples.add_event(self._last_ns if time_ns is None else time_ns, text, self.name)
 
     def _raw(self, batch: Sequence[Packet]) -> RawPackets:
         times = np.array([packet.received_ns for packet in batch], np.int64)

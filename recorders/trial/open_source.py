@@ -10,9 +10,9 @@ from pathlib import Path
 
 from recorders.streams.format import StreamFormat
 from recorders.streams.line_files import read_lines
+from recorders.streams.options import options_text
 from recorders.streams.pace import paced
 from recorders.streams.reception_clock import ReceptionClock
-from recorders.streams.sample_buffer import SampleBuffer
 from recorders.streams.stream_source import StreamSource
 from recorders.transports.address import is_live, open_transport
 from recorders.transports.live_stream import LiveStream
@@ -148,7 +148,8 @@ def _live(request: StreamRequest, transport: Transport, clock: ReceptionClock) -
         request.format.make_decoder(request.options),
         keep_raw=request.keep_raw is not False,
         origin=transport.address,
-        samples=SampleBuffer(request.prefix),
+        prefix=request.prefix,
+        options=options_text(request.format, request.options),
     )
     return LiveInput(live, stream)
 
@@ -163,5 +164,6 @@ def _recorded(request: StreamRequest) -> StreamSource:
         opened.decoder,
         keep_raw=request.keep_raw is True,
         origin=Path(request.address).name,
-        samples=SampleBuffer(request.prefix),
+        prefix=request.prefix,
+        options=options_text(request.format, request.options),
     )

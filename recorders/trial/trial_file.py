@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from recorders.streams.format import GROUP, StreamFormat
+from recorders.streams.options import parse_options
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import load_extension
 from shiplog.types import ReadOnlyMapping
@@ -251,52 +252,7 @@ class _Parser:
         """Parse the further keys of a source as the options of its format."""
         given = {key: value for key, value in table.items() if key not in _SOURCE_KEYS}
         try:
-            return parse_options(stream_format, given, where)
+            return parse_options(stream_format, given, where, _SOURCE_KEYS)
         except UsageError as error:
             self._errors.append(str(error))
             return None
-
-
-class _OptionParser(argparse.ArgumentParser):
-    """A parser whose errors are exceptions."""
-
-    def error(self, message: str) -> Any:  # noqa: ANN401 - it never returns
-        raise UsageError(message)
-
-
-def parse_options(
-    stream_format: StreamFormat, given: Mapping[str, object], where: str
-) -> argparse.Namespace:
-    """Parse the options of a format that are given as keys and values.
-
-    Parameters
-    ----------
-    stream_format
-        The format.
-    given
-        Values by key; ``date = "2026-05-01"`` is ``--date 2026-05-01`` on the command line, and
-        true is an option without a value.
-    where
-        What the options belong to, for messages.
-
-    Raises
-    ------
-    UsageError
-        A key is unknown, or a value is not possible.
-    """
-    parser = _OptionParser(add_help=False, allow_abbrev=False)
-    stream_format.configure(parser)
-    known = [option.lstrip("-") for option in parser._option_string_actions]  # noqa: SLF001 - argparse has no public list
-    words = []
-    for key, value in given.items():
-        option = key.replace("_", "-")
-        if option not in known:
-            hint = did_you_mean(option, (*known, *_SOURCE_KEYS))
-            raise UsageError(f"{where}: unknown key {key!r}{hint}")
-        if value is False:
-            continue
-        words += [f"--{option}"] if value is True else [f"--{option}={value}"]
-    try:
-        return parser.parse_args(words)
-    except UsageError as error:
-        raise UsageError(f"{where}: {error}") from error

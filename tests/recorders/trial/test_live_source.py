@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import pytest
 from number_format import NUMBERS
 
+from recorders.streams.options import parse_options
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.trial import live_source
 from recorders.trial.live_source import LiveSource
 from recorders.trial.open_source import StreamRequest, open_streams
 from recorders.trial.recorded_source import RecordedSource
-from recorders.trial.trial_file import parse_options
 from shiplog.types import Channel, Event, RawPackets
 
 

@@ -7,10 +7,10 @@ import pytest
 from number_format import NUMBERS
 
 from recorders.record import record
+from recorders.streams.options import parse_options
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.trial.open_source import StreamRequest, open_streams
 from recorders.trial.recorded_source import RecordedSource
-from recorders.trial.trial_file import parse_options
 from shiplog import read
 from shiplog.errors import LogError, UsageError
 from shiplog.types import Channel
