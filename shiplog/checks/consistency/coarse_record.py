@@ -1,14 +1,12 @@
 """The channels of a log on one coarse clock, gathered chunk by chunk, for comparisons."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from shiplog.checks.channel_on_clock import ChannelOnClock, Transform, Unwrapped
 from shiplog.checks.channel_stats import ChannelStats, LogStats
-from shiplog.checks.interpolate import Interpolator
-from shiplog.geodesy.local_frame import LocalFrame
-from shiplog.geodesy.positions import positions_of
 from shiplog.types import Channel, FloatArray
 
 MIN_STEP_SECS = 0.1
@@ -81,7 +79,7 @@ class CoarseRecord:
     """
 
     def __init__(self, stats: LogStats) -> None:
-        self._series: dict[str, _Series] = {}
+        self._channels: dict[str, ChannelOnClock] = {}
         start, end = stats.span_ns
         span = (end - start) * 1e-9
         step_secs = max(min(MIN_STEP_SECS, span / MIN_INSTANTS), span / MAX_INSTANTS)
@@ -91,20 +89,17 @@ class CoarseRecord:
         for name in COMPARED_CHANNELS:
             channel = stats.get(name)
             if channel is not None and channel.valid >= (1 if channel.hold else MIN_SAMPLES):
-                self._series[name] = _Series(channel, at, start)
+                self._channels[name] = ChannelOnClock(channel, at, start, _transform(channel))
 
     def add(self, chunk: tuple[Channel, ...]) -> None:
         """Add the next samples of the log."""
-        for series in self._series.values():
-            series.add(chunk)
+        for channel in self._channels.values():
+            channel.add(chunk)
 
     def result(self) -> CoarseSignals:
         """Return the channels at all instants, once all samples were added."""
-        values = {
-            name: self._series[name].result() if name in self._series else self._unknown(name)
-            for name in COMPARED_CHANNELS
-        }
-        frame = self._series["position"].frame if "position" in self._series else None
+        values = {name: self._values(name) for name in COMPARED_CHANNELS}
+        frame = self._channels["position"].frame if "position" in self._channels else None
         north, east = values["position"].T
         return CoarseSignals(
             dt_secs=self.dt_secs,
@@ -116,92 +111,47 @@ class CoarseRecord:
             speed=values["speed"][:, 0],
             rudder=values["rudder"][:, 0],
             rpm=values["rpm"][:, 0],
-            topics={name: series.stats.topic for name, series in self._series.items()},
+            topics={name: each.stats.topic for name, each in self._channels.items()},
             datum=frame.datum if frame is not None and frame.geographic else None,
         )
 
-    def _unknown(self, name: str) -> FloatArray:
-        return np.full((self._count, 2 if name == "position" else 1), np.nan)
+    def _values(self, name: str) -> FloatArray:
+        """Return the values of a channel, (n, k); all NaN where it is not compared."""
+        channel = self._channels.get(name)
+        if channel is None:
+            return np.full((self._count, 2 if name == "position" else 1), np.nan)
+        return np.where(channel.after_gap[:, None], np.nan, channel.result())
 
 
-class _Series:
-    """One channel on the clock; a position has two components."""
+class Integrated:
+    """The integral of a rate by the trapezoidal rule, from samples that come in chunks.
 
-    def __init__(self, stats: ChannelStats, at: FloatArray, start: int) -> None:
-        self.stats, self._start, self._at = stats, start, at
-        columns = 2 if stats.fields else 1
-        self._hold = stats.hold is not None
-        self._gap_secs = stats.gap_threshold_secs  # infinite where it is held
-        self._interpolators = [
-            Interpolator(at, self._gap_secs, hold=self._hold) for _ in range(columns)
-        ]
-        self._after_gap = np.zeros(len(at) + 1, bool)
-        self.frame: LocalFrame | None = None
+    Examples
+    --------
+    >>> integrated = Integrated()
+    >>> integrated(np.array([0.0, 2.0]), np.array([[1.0], [3.0]])).ravel().tolist()
+    [0.0, 4.0]
+    """
+
+    def __init__(self) -> None:
         self._last: tuple[FloatArray, FloatArray] | None = None
-        self._accumulated = np.zeros(columns)
-        self._changes = self._change_function()
+        self._sum: FloatArray = np.zeros(1)
 
-    def add(self, chunk: tuple[Channel, ...]) -> None:
-        """Add the next samples of the log."""
-        channel = self.stats.select(chunk)
-        if channel is None or not len(channel):
-            return
-        rows = self._rows(channel)
-        valid = np.isfinite(rows).all(axis=1)
-        rows, times = rows[valid], (channel.measured_ns[valid] - self._start) * 1e-9
-        if not len(rows):
-            return
-        if self._last is None and self.stats.name == "heading":
-            self._accumulated = rows[0]  # the heading keeps its zero
-        last_times, last_rows = self._last or (times[:1], rows[:1])
-        self._last = times[-1:], rows[-1:]
-        joined = np.concatenate((last_times, times))
-        in_gap = np.diff(joined) > self._gap_secs
-        self._after_gap[np.searchsorted(self._at, times[in_gap])] = True
-        if self._changes:
-            steps = self._changes(joined, np.concatenate((last_rows, rows)))
-            rows = self._accumulated + np.cumsum(steps, axis=0)
-            self._accumulated = rows[-1]
-        for interpolator, column in zip(self._interpolators, rows.T, strict=True):
-            interpolator.add(times, column)
-
-    def result(self) -> FloatArray:
-        """Return the values at the instants, (n, k).
-
-        The instant after a gap is NaN even if the gap lies between two instants. A channel that is
-        held between its samples has no gaps, and no end before that of the log.
-        """
-        first, last = ((t - self._start) * 1e-9 for t in self.stats.valid_span_ns)
-        end = np.inf if self._hold else last + 1e-6
-        unknown = (self._at < first - 1e-6) | (self._at > end) | self._after_gap[:-1]
-        values = np.column_stack([each.result() for each in self._interpolators])
-        return np.where(unknown[:, None], np.nan, values)
-
-    def _rows(self, channel: Channel) -> FloatArray:
-        """Return the samples, (m, k); of a position north and east of the first fix."""
-        if not self.stats.fields:
-            return channel.values[:, None]
-        positions = positions_of(channel.fields, channel.values)
-        self.frame = self.frame or LocalFrame.at_first(positions)
-        if self.frame is None:
-            return np.full((len(channel), 2), np.nan)
-        return self.frame.north_east(positions)
-
-    def _change_function(self) -> Callable[[FloatArray, FloatArray], FloatArray] | None:
-        """Return the function that computes changes from sample to sample; None for values."""
-        if self.stats.name == "yaw_rate":
-            return _integrated
-        if self.stats.name != "heading":
-            return None
-        full_turn = _full_turn(*self.stats.value_range)
-        return lambda _, values: (
-            (np.diff(values, axis=0) + full_turn / 2) % full_turn - full_turn / 2
-        )
+    def __call__(self, times: FloatArray, rates: FloatArray) -> FloatArray:
+        """Return the integral at the next times, (m, 1), from zero at the first one."""
+        last_time, last_rate = self._last or (times[:1], rates[:1])
+        dt, rate = np.diff(times, prepend=last_time), np.concatenate((last_rate, rates))
+        steps = dt[:, None] * (rate[1:] + rate[:-1]) / 2
+        integral = np.cumsum(np.concatenate((self._sum[None], steps)), axis=0)[1:]
+        self._last, self._sum = (times[-1:], rates[-1:]), integral[-1]
+        return np.asarray(integral)
 
 
-def _integrated(times: FloatArray, rates: FloatArray) -> FloatArray:
-    """Change of the heading between samples of the yaw rate, by the trapezoidal rule."""
-    return np.asarray(np.diff(times)[:, None] * (rates[1:] + rates[:-1]) / 2)
+def _transform(stats: ChannelStats) -> Transform | None:
+    """Return what makes an angle without jumps of a channel; None for the values themselves."""
+    if stats.name == "yaw_rate":
+        return Integrated()
+    return Unwrapped(_full_turn(*stats.value_range)) if stats.name == "heading" else None
 
 
 def _full_turn(low: float, high: float) -> float:
