@@ -24,8 +24,8 @@ from shiplog.ships.paper import PAPER_INPUTS, Coefficients, rudder_effects, yaw_
 from shiplog.types import FloatArray, Signals
 from shiplog.vessel.settings import (
     DisturbanceSettings,
-    disturbance_settings,
     number_error,
+    parse_settings,
     settings_dict,
 )
 
@@ -316,7 +316,7 @@ def force_models(
         For invalid settings, and where the samples do not determine the disturbance.
     """
     errors: list[str] = []
-    disturbance_settings(settings_dict(settings), errors)
+    parse_settings(DisturbanceSettings, settings_dict(settings), errors)
     if errors:
         raise UsageError("; ".join(errors))
     degree = 1 if "ramp" in settings.models else 0 if "constant" in settings.models else None

@@ -85,45 +85,15 @@ class LogFile:
         return self.outline.data_lost
 
     def select_sources(self, sources: Mapping[str, str]) -> "LogFile":
-        """Return the log with a single source for each of the names given.
-
-        Parameters
-        ----------
-        sources
-            The source to keep, by channel name.
-
-        Raises
-        ------
-        LogError
-            The log has no such channel.
-        """
+        """Return the log with a single source for each of the names given; see `Log`."""
         return replace(self, outline=self.outline.select_sources(sources))
 
     def between(
         self, start: float | str | None = None, end: float | str | None = None
     ) -> "LogFile":
-        """Return the part of the log that was measured between two times.
+        """Return the part of the log between two times; see `TrialLog.between`.
 
         One pass over the file computes its span, another one the inputs in force at the start.
-
-        Parameters
-        ----------
-        start, end
-            The bounds: the part has the samples from `start` on and before `end`. A number is in
-            s: since the log's start, or, if negative, before its end. A text is a time in ISO
-            8601, such as ``2026-05-01T12:04:30Z``, or a time of day, such as ``12:04:30``; in UTC
-            where it states no time zone. None is no bound.
-
-        Returns
-        -------
-        log
-            The part. Its name and its metadata ``cut`` state the bounds. A rudder angle or rpm
-            that is in force at `start` is repeated there if it has no sample within a second.
-
-        Raises
-        ------
-        UsageError
-            A bound cannot be read, or no sample is between them.
         """
         if start is None and end is None:
             return self

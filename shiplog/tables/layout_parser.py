@@ -3,7 +3,6 @@
 import codecs
 import os
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from math import isfinite
@@ -12,6 +11,7 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 from shiplog.errors import LayoutError, UsageError
+from shiplog.toml_text import list_errors, parse_toml, unknown_key
 from shiplog.units import CATALOGUE, GEOGRAPHIC, UNITS, conversion_factor, did_you_mean
 
 from .layout import (
@@ -27,7 +27,7 @@ from .layout import (
 )
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-MAX_LAYOUT_CHARACTERS = 100_000  # the TOML parser needs memory by the square of a hostile text
+KIND = "layout file"
 TIME_TEXT_UNITS = ("excel", "hhmmss")  # days since 1899-12-30, and day times in six digits
 _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     # key of the top level: its type, and that type in words
@@ -75,23 +75,7 @@ def parse_layout(text: str, where: str) -> Layout:
     >>> parse_layout(text, "gyro.toml").columns["yaw_rate"].unit
     'deg/s'
     """
-    return _LayoutParser(_toml(text, where), where).layout()
-
-
-def _toml(text: str, where: str) -> dict[str, Any]:
-    """Parse TOML of a bounded size."""
-    if len(text) > MAX_LAYOUT_CHARACTERS:
-        raise LayoutError(
-            f"{len(text)} characters, too long for a layout (at most {MAX_LAYOUT_CHARACTERS}); "
-            f"name a layout file: {where}"
-        )
-    if re.search(r"(?:\.[^.\n]{0,80}){60}", text) or re.search(r"(?:[\[{]\s*){60}", text):
-        raise LayoutError(f"keys or lists nested too deeply for a layout; simplify it: {where}")
-    try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise LayoutError(f"not a TOML file ({reason}); correct that line: {where}") from error
+    return _LayoutParser(parse_toml(text, where, KIND, LayoutError), where).layout()
 
 
 class _LayoutParser:
@@ -113,7 +97,7 @@ class _LayoutParser:
                 known = key in ROLES
                 self._errors.append(
                     f"[{key}] must be a section" if known
-                    else f"unknown key {key!r}{_hint(key, (*_KINDS, *ROLES))}"
+                    else unknown_key(key, (*_KINDS, *ROLES))
                 )  # fmt: skip
             elif key == "time":
                 self._parse_time(value)
@@ -123,10 +107,7 @@ class _LayoutParser:
                 self._parse_channel(key, value)
         self._find_contradictions()
         if self._errors:
-            count = len(self._errors)
-            words = "one error" if count == 1 else f"{count} errors"
-            text = "; ".join(" ".join(e.split()) for e in self._errors)
-            raise LayoutError(f"{words} in the layout file: {text}: {self._where}")
+            raise LayoutError(list_errors(self._errors, KIND, self._where))
         return self._made()
 
     def _made(self) -> Layout:
@@ -208,8 +189,8 @@ class _LayoutParser:
         role = f"{name}.{source}" if source else name
         if name not in ROLES and not isinstance(section.get("positive"), str):
             self._errors.append(
-                f"unknown key {name!r}{_hint(name, (*_KINDS, *ROLES))}; a quantity that shiplog "
-                "does not know needs `positive`, its sense in words"
+                f"{unknown_key(name, (*_KINDS, *ROLES))}; a quantity that shiplog does not know "
+                "needs `positive`, its sense in words"
             )
             return
         if "/" in role or not name or not role.isprintable():
@@ -282,9 +263,7 @@ class _LayoutParser:
     def _check_keys(self, role: str, section: Iterable[str], allowed: Iterable[str]) -> None:
         allowed = tuple(allowed)
         self._errors += [
-            f"unknown key '{role}.{key}'{_hint(key, allowed)}"
-            for key in section
-            if key not in allowed
+            unknown_key(key, allowed, section=role) for key in section if key not in allowed
         ]
 
     def _check_rebuild(self, role: str, section: Mapping[str, Any]) -> None:
@@ -300,11 +279,11 @@ class _LayoutParser:
         except UsageError as error:
             if unit not in UNITS:  # of all units, only those of the quantity help
                 fitting = [name for name, (base, _) in UNITS.items() if base == si]
-                hint = _hint(unit, fitting) or _hint(unit.lower(), fitting)
+                hint = did_you_mean(unit, fitting) or did_you_mean(unit.lower(), fitting)
                 text = f"unknown unit {unit!r}{hint}, possible are {', '.join(fitting)}"
             else:
-                text = str(error).replace(";", ",")
-            self._errors.append(f"{label}: {text}")
+                text = str(error)
+            self._errors.append(f"{label}: {text.replace(';', ',')}")
 
     def _find_contradictions(self) -> None:
         """Check values that are right by themselves but contradict each other."""
@@ -373,7 +352,3 @@ _TOP_CHECKS: dict[str, Any] = {
     "source": lambda value: bool(value) and "/" not in value and value.isprintable(),
     "encoding": _is_text_encoding,
 }
-
-
-def _hint(name: str, allowed: Iterable[str]) -> str:
-    return did_you_mean(name, allowed).replace(";", ",")

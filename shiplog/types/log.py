@@ -195,18 +195,7 @@ class TrialLog(ChannelsByName[Channel]):
             raise ValueError(f"{self.name}: two channels of one topic; merge them: {topics}")
 
     def select_sources(self, sources: Mapping[str, str]) -> "TrialLog":
-        """Return the log with a single source for each of the names given.
-
-        Parameters
-        ----------
-        sources
-            The source to keep, by channel name.
-
-        Raises
-        ------
-        LogError
-            The log has no such channel.
-        """
+        """Return the log with a single source for each of the names given; see `Log`."""
         selected = [self[f"{name}/{source}"] for name, source in sources.items()]
         others = [channel for channel in self.channels if channel.name not in sources]
         return replace(self, channels=(*selected, *others))

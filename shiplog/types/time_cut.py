@@ -72,9 +72,7 @@ def resolve_cut(
     Parameters
     ----------
     start, end
-        The bounds. A number is in s: since the log's start, or, if negative, before its end. A
-        text is a time in ISO 8601, such as ``2026-05-01T12:04:30Z``, or a time of day, such as
-        ``12:04:30``; in UTC where it states no time zone. None is no bound.
+        The bounds, as `TrialLog.between` takes them.
     span_ns
         The first and the last time of measurement of the log, ns.
     name

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Any
 
+from shiplog.toml_text import unknown_key
 from shiplog.units import did_you_mean
 
 from .settings import number_error
@@ -116,6 +117,5 @@ def _numbers(
             errors += [error] if error else []
             values[key] = float(value) if not error else inf
         elif key != "name":
-            near = did_you_mean(key, ["name", *limits]).replace(";", ",")
-            errors.append(f"unknown key 'model.{key}'{near}")
+            errors.append(unknown_key(key, ["name", *limits], section="model"))
     return values

@@ -6,10 +6,10 @@ Each key is a field of a dataclass; the field's metadata has its type and its li
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from math import inf, isfinite
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from shiplog.extensions import extension_names
-from shiplog.units import did_you_mean
+from shiplog.toml_text import unknown_key
 
 FILTER_GROUP = "shiplog.filters"  # the entry points whose names `[filter] kind` accepts
 DISTURBANCES = ("constant", "ramp", "wave")
@@ -82,6 +82,8 @@ class FilterSettings:
         Frequency in rad/s, damping ratio, and standard deviation in rad/s of the wave model.
     """
 
+    SECTION: ClassVar[str] = "filter"
+
     kind: str | None = _choice(_filter_names, None)
     smooth: bool = _flag()
     gate: float = _number(6.0, positive=True, most=1e9)
@@ -123,6 +125,8 @@ class DisturbanceSettings:
         Frequency of the `wave` model, rad/s; None takes the peak of the residual's spectrum.
     """
 
+    SECTION: ClassVar[str] = "disturbance"
+
     models: tuple[str, ...] = _choice(DISTURBANCES, ("constant",), several=True)
     spectrum: str = _choice(SPECTRA, "butterworth")
     yaw_frequency: float = _number(0.05, positive=True, most=1e3)
@@ -140,14 +144,22 @@ class IdentifierSettings:
         Length of the windows in which the coefficients are identified, s.
     """
 
+    SECTION: ClassVar[str] = "identifier"
+
     window_secs: float = _number(200.0, least=MIN_WINDOW_SECS, most=1e9)
 
 
-def filter_settings(table: Mapping[str, object], errors: list[str]) -> FilterSettings:
-    """Parse a `[filter]` section; whether its filter can comply is checked by the replay.
+def parse_settings(
+    kind: type[Settings], table: Mapping[str, object], errors: list[str]
+) -> Settings:
+    """Parse a section of settings; a key with an error keeps its default.
+
+    Whether the filter can comply with its settings is checked by the replay.
 
     Parameters
     ----------
+    kind
+        The class of the settings, such as `FilterSettings`.
     table
         Keys and values of the section.
     errors
@@ -156,36 +168,21 @@ def filter_settings(table: Mapping[str, object], errors: list[str]) -> FilterSet
     Examples
     --------
     >>> errors = []
-    >>> filter_settings({"kind": "extended", "gate": 0}, errors).kind, errors
+    >>> parse_settings(FilterSettings, {"kind": "extended", "gate": 0}, errors).kind, errors
     ('extended', ['filter.gate must be positive, got 0'])
     """
-    return _parse_section("filter", FilterSettings, table, errors)
-
-
-def disturbance_settings(table: Mapping[str, object], errors: list[str]) -> DisturbanceSettings:
-    """Parse a `[disturbance]` section.
-
-    Parameters
-    ----------
-    table
-        Keys and values of the section.
-    errors
-        Messages are appended for everything that is wrong.
-    """
-    return _parse_section("disturbance", DisturbanceSettings, table, errors)
-
-
-def identifier_settings(table: Mapping[str, object], errors: list[str]) -> IdentifierSettings:
-    """Parse an `[identifier]` section.
-
-    Parameters
-    ----------
-    table
-        Keys and values of the section.
-    errors
-        Messages are appended for everything that is wrong.
-    """
-    return _parse_section("identifier", IdentifierSettings, table, errors)
+    allowed = {f.name: f for f in fields(kind)}
+    values: dict[str, Any] = {}
+    for key, value in table.items():
+        if key not in allowed:
+            errors.append(unknown_key(key, allowed, section=kind.SECTION))
+            continue
+        error = _value_error(f"{kind.SECTION}.{key}", value, allowed[key].metadata)
+        if error:
+            errors.append(error)
+        else:
+            values[key] = _converted(value)
+    return kind(**values)
 
 
 def settings_dict(
@@ -199,25 +196,6 @@ def settings_dict(
     {'window_secs': 200.0}
     """
     return {key: value for key, value in asdict(settings).items() if value is not None}
-
-
-def _parse_section(
-    section: str, kind: type[Settings], table: Mapping[str, object], errors: list[str]
-) -> Settings:
-    """Parse the keys of a section; a key with an error keeps its default."""
-    allowed = {f.name: f for f in fields(kind)}
-    values: dict[str, Any] = {}
-    for key, value in table.items():
-        label = f"{section}.{key}"
-        if key not in allowed:
-            errors.append(f"unknown key {label!r}{did_you_mean(key, allowed).replace(';', ',')}")
-            continue
-        error = _value_error(label, value, allowed[key].metadata)
-        if error:
-            errors.append(error)
-        else:
-            values[key] = _converted(value)
-    return kind(**values)
 
 
 def _converted(value: object) -> object:

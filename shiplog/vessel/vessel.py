@@ -12,10 +12,8 @@ from .settings import (
     DisturbanceSettings,
     FilterSettings,
     IdentifierSettings,
-    disturbance_settings,
-    filter_settings,
-    identifier_settings,
     number_error,
+    parse_settings,
     settings_dict,
 )
 
@@ -150,9 +148,9 @@ def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
         else:
             prefixes = ", ".join(f"{section}." for section in SECTIONS)
             errors.append(f"unknown setting {name!r}, it must begin with one of {prefixes}")
-    filtering = filter_settings(tables["filter"], errors)
-    observing = disturbance_settings(tables["disturbance"], errors)
-    identifying = identifier_settings(tables["identifier"], errors)
+    filtering = parse_settings(FilterSettings, tables["filter"], errors)
+    observing = parse_settings(DisturbanceSettings, tables["disturbance"], errors)
+    identifying = parse_settings(IdentifierSettings, tables["identifier"], errors)
     if errors:
         raise UsageError(f"wrong settings: {'; '.join(errors)}")
     return replace(vessel, filter=filtering, disturbance=observing, identifier=identifying)

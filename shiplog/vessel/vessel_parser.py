@@ -1,7 +1,6 @@
 """Parser of vessel files; reports all errors of a file at once."""
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from math import inf, nan, pi
@@ -9,21 +8,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shiplog.errors import VesselError
+from shiplog.toml_text import list_errors, parse_toml, unknown_key
 from shiplog.units import did_you_mean
 
 from .model_section import parse_model_section
 from .presets import PRESETS
 from .settings import (
-    disturbance_settings,
-    filter_settings,
-    identifier_settings,
+    DisturbanceSettings,
+    FilterSettings,
+    IdentifierSettings,
     number_error,
+    parse_settings,
 )
 from .vessel import SECTIONS, Vessel
 
 if TYPE_CHECKING:  # it brings numba; only verbs that compute need it
     from shiplog.ships.paper import Coefficients
 
+KIND = "vessel file"
 TEXT_KEYS = ("name", "angle_unit")
 TIME_CONSTANTS = ("T1", "T2", "T3", "c2", "c3")
 PRODUCTS = ("a", "b1", "b2", "b3", "d", "e")
@@ -111,10 +113,7 @@ def parse_vessel(text: str, where: str) -> Vessel:
     Traceback (most recent call last):
     shiplog.errors.VesselError: 3 errors in the vessel file: [yaw] lacks T1, T2, T3, c2, c3; ...
     """
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise VesselError(f"not a TOML file ({error}); correct that line: {where}") from error
+    table = parse_toml(text, where, KIND, VesselError)
     if not table:
         raise VesselError(
             f"the vessel file is empty; give what is known, such as length = 320: {where}"
@@ -122,9 +121,9 @@ def parse_vessel(text: str, where: str) -> Vessel:
     errors: list[str] = []
     model_table = table.pop("model", None)
     sections = {key: _section(key, table.pop(key, {}), errors) for key in SECTIONS}
-    filtering = filter_settings(sections["filter"], errors)
-    observing = disturbance_settings(sections["disturbance"], errors)
-    identifying = identifier_settings(sections["identifier"], errors)
+    filtering = parse_settings(FilterSettings, sections["filter"], errors)
+    observing = parse_settings(DisturbanceSettings, sections["disturbance"], errors)
+    identifying = parse_settings(IdentifierSettings, sections["identifier"], errors)
     numbers = _numbers(table, errors)
     # a length with an error is nan: it must not be reported as missing, too
     length = numbers[""].get("length", nan if "length" in table else None)
@@ -134,8 +133,7 @@ def parse_vessel(text: str, where: str) -> Vessel:
         _require(numbers, _yaw_keys(numbers["yaw"], errors), errors)
     angle_unit = _angle_unit(table, numbers, errors)
     if errors:
-        count = "one error" if len(errors) == 1 else f"{len(errors)} errors"
-        raise VesselError(f"{count} in the vessel file: {'; '.join(errors)}: {where}")
+        raise VesselError(list_errors(errors, KIND, where))
     per_rad = 180 / pi if angle_unit == "deg" else 1.0
     coefficients = _coefficients(numbers, per_rad) if has_paper_model else None
     vessel = _vessel(str(table.get("name", Path(where).stem)), coefficients, numbers, per_rad)
@@ -179,7 +177,7 @@ def _parse_number(
     if key not in LIMITS[section]:
         sections = (*TEXT_KEYS, *filter(None, LIMITS), *SECTIONS, "model")
         allowed = [*LIMITS[section], *(() if section else sections)]
-        errors.append(f"unknown key {label!r}{did_you_mean(key, allowed).replace(';', ',')}")
+        errors.append(unknown_key(key, allowed, section=section))
         return
     error = number_error(label, value, *LIMITS[section][key], positive=key in POSITIVE_KEYS)
     if error:

@@ -18,24 +18,20 @@ from shiplog.vessel.settings import (
     DisturbanceSettings,
     FilterSettings,
     IdentifierSettings,
-    disturbance_settings,
-    filter_settings,
-    identifier_settings,
+    parse_settings,
     settings_dict,
 )
 from shiplog.vessel.vessel import with_settings
 from shiplog.vessel.vessel_parser import parse_vessel
 
-PARSERS = {
-    "filter": filter_settings,
-    "disturbance": disturbance_settings,
-    "identifier": identifier_settings,
+SETTINGS = {
+    each.SECTION: each for each in (FilterSettings, DisturbanceSettings, IdentifierSettings)
 }
 
 
 def errors_of(section: str, table: dict[str, object]) -> str:
     errors: list[str] = []
-    PARSERS[section](table, errors)
+    parse_settings(SETTINGS[section], table, errors)
     return "; ".join(errors)
 
 
@@ -83,8 +79,7 @@ def test_settings_survive_the_way_to_a_section_and_back(
     settings: FilterSettings | DisturbanceSettings,
 ) -> None:
     errors: list[str] = []
-    parse = filter_settings if isinstance(settings, FilterSettings) else disturbance_settings
-    assert parse(settings_dict(settings), errors) == settings
+    assert parse_settings(type(settings), settings_dict(settings), errors) == settings
     assert not errors
 
 
