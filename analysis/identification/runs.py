@@ -13,28 +13,28 @@ from analysis.replay.channel_warnings import (
     end_warnings,
     late_channel_warnings,
 )
+from analysis.replay.passes import resampled_chunks
 from analysis.replay.reading_options import DEFAULT_OPTIONS, ReadingOptions
-from shiplog.checks.channel_stats import ChannelStats, gap_threshold_secs
-from shiplog.checks.consistency.consistency_check import consistency_findings
+from shiplog.checks.consistency.consistency_check import ConsistencyCheck
 from shiplog.checks.consistency.findings import (
     CONTRADICTIONS,
     naming_contradictions,
     refuse_contradictions,
 )
 from shiplog.errors import LogError, UsageError
-from shiplog.geodesy import LocalFrame, positions_of
-from shiplog.resampling import choose_clock, resample_chunks, with_steering_gear
+from shiplog.progress import no_progress
+from shiplog.resampling import choose_clock, with_steering_gear
 from shiplog.screening import screen_log
 from shiplog.types import (
     FloatArray,
     Log,
-    TimeArray,
-    concatenate_channels,
     concatenate_signals,
 )
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, IdentifierSettings
 from shiplog.vessel.vessel import Vessel
 from shiplog.vessel.vessel_parser import parse_vessel
+
+from .run_fixes import RunFixes
 
 REQUIRED_CHANNELS = ("yaw_rate", "speed", "rudder", "rpm")
 OPTIONAL_CHANNELS = ("sway", "heading")
@@ -106,15 +106,17 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     gear = options.vessel or vessel or Vessel("", None)
     clock = choose_clock(screened, stats, None, REQUIRED_CHANNELS, OPTIONAL_CHANNELS)
     clock = with_steering_gear(clock, gear.rudder_rate)
-    findings = consistency_findings(screened, stats)
+    consistency, fixes = ConsistencyCheck(stats), RunFixes(stats.get("position"))
+    listeners = consistency.add, fixes.add
+    signals = concatenate_signals(
+        resampled_chunks(screened, clock, no_progress, "read", *listeners)
+    )
+    findings = consistency.result()
     if options.strict:
         refuse_contradictions(findings)
     contradictions = tuple(f.text for f in findings if f.kind in CONTRADICTIONS)
-    signals = concatenate_signals(resample_chunks(screened.chunks(), clock))
     with naming_contradictions(contradictions):
         segments = split_into_segments(signals, log.name)
-    position = stats.get("position")
-    fixes = _north_east(screened, position) if position is not None else None
     warnings = [
         *screened.warnings,
         *channel_warnings(stats),
@@ -125,7 +127,7 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     return Run(
         name=log.name,
         segments=segments,
-        positions=tuple(_interpolated(*fixes, each) if fixes else None for each in segments),
+        positions=fixes.at_samples(segments),
         vessel=vessel,
         warnings=tuple(text if log.name in text else f"{log.name}: {text}" for text in warnings),
         data_lost=log.data_lost,
@@ -184,42 +186,6 @@ def _numbered(name: str, number: int) -> str:
 
 def _renamed(run: Run, name: str) -> Run:
     return replace(run, name=name, segments=tuple(replace(t, name=name) for t in run.segments))
-
-
-def _north_east(log: Log, stats: ChannelStats) -> tuple[TimeArray, FloatArray]:
-    """Return the times, (n,) ns, of the fixes of a position channel and their north and east.
-
-    Only usable fixes are returned; north and east, (n, 2) m, are relative to the first one.
-    """
-    selected = (stats.select(chunk) for chunk in log.chunks())
-    parts = [part for part in selected if part is not None]
-    if not parts:
-        return np.zeros(0, np.int64), np.zeros((0, 2))
-    channel = concatenate_channels(parts)
-    positions = positions_of(channel.fields, channel.values)
-    frame, measured = LocalFrame.at_first(positions), positions.measured
-    if frame is None:
-        return np.zeros(0, np.int64), np.zeros((0, 2))
-    return channel.measured_ns[measured], frame.north_east(positions)[measured]
-
-
-def _interpolated(
-    measured_ns: TimeArray, north_east: FloatArray, segment: Segment
-) -> FloatArray | None:
-    """Interpolate fixes at a segment's samples, (n, 2) m; None with fewer than two fixes.
-
-    Inside a gap they are NaN, as beyond the ends.
-    """
-    secs = (measured_ns - segment.signals.start_ns) * 1e-9
-    if len(secs) < 2:
-        return None
-    time = segment.signals.time_secs
-    intervals = np.diff(secs)
-    longest = gap_threshold_secs(float(np.median(intervals)))
-    after = np.clip(np.searchsorted(secs, time), 1, len(intervals))
-    in_gap = (intervals[after - 1] > longest) & (secs[after] != time)
-    columns = [np.interp(time, secs, column, np.nan, np.nan) for column in north_east.T]
-    return np.where(in_gap[:, None], np.nan, np.column_stack(columns))
 
 
 def common_vessel(runs: Sequence[Run], given: Vessel | None) -> Vessel | None:
