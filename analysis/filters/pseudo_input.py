@@ -29,7 +29,15 @@ from .noise_model import NoiseModel
 
 
 class MotionState(NamedTuple):
-    """The state of the paper's model: w, w' and w'' in rad/s^k, v and v' in m/s^k."""
+    """The state of the paper's model.
+
+    Attributes
+    ----------
+    w, w_dot, w_ddot
+        The yaw rate and its derivatives, rad/s, rad/s² and rad/s³.
+    v, v_dot
+        The speed, m/s, and its derivative, m/s².
+    """
 
     w: float
     w_dot: float
@@ -78,11 +86,19 @@ class PseudoInputFilter:
         self._last_rate = np.zeros(1)  # of the rudder, rad/s
 
     def step(self, chunk: Signals, following: Mapping[str, float]) -> Estimates:
-        """Filter the next chunk; `following` are the inputs at the instant after it."""
+        """Filter the next chunk.
+
+        Parameters
+        ----------
+        chunk
+            Signals with `PAPER_OUTPUTS` and `PAPER_INPUTS`; an output that is NaN is not used.
+        following
+            The inputs at the instant after the chunk, by name.
+        """
         return self._run(chunk, following, keep=False)[0]
 
     def trace(self, chunk: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
-        """Filter the next chunk, and return what the smoother needs as well."""
+        """Filter the next chunk as `step` does, and return what the smoother needs as well."""
         return self._run(chunk, following, keep=True)
 
     def to_estimates(
@@ -92,7 +108,20 @@ class PseudoInputFilter:
         states: FloatArray,
         covariances: FloatArray,
     ) -> tuple[FloatArray, FloatArray, None]:
-        """Return the states (n, 5) and their standard deviations (n, 5)."""
+        """Return the states as they are, with their standard deviations.
+
+        Parameters
+        ----------
+        chunk, following
+            As in `step`; not used.
+        states, covariances
+            (n, 5) the states, and (n, 5, 5) their covariances.
+
+        Returns
+        -------
+        states, stds
+            (n, 5) each; None in place of a wave.
+        """
         variances = np.diagonal(covariances, axis1=1, axis2=2)
         return states, np.sqrt(np.maximum(variances, 0.0)), None
 
@@ -228,7 +257,23 @@ def _predict(
 def motion(
     c: Coefficients, x: MotionState, delta: float, delta_dot: float, n: float, n_dot: float
 ) -> MotionState:
-    """Return A x + B u, row by row, with the pseudo-inputs written out."""
+    """Compute the derivative of the state, A x + B u, with the pseudo-inputs written out.
+
+    Parameters
+    ----------
+    c
+        The coefficients of the paper's model.
+    x
+        The state.
+    delta, delta_dot
+        The rudder angle, rad, and its rate, rad/s.
+    n, n_dot
+        The revolutions, rpm, and their rate, rpm/s.
+
+    References
+    ----------
+    Burylin, eqs (4) to (6), with the corrected pseudo-inputs.
+    """
     ks = rudder_effect(c, x.v, n)
     ks_dot = rudder_effect_rate(c, x.v, x.v_dot, n, n_dot)
     steering = c.d * delta + c.e * delta_dot

@@ -28,10 +28,28 @@ def predict_ship(
     n_dot: float,
     dt: float,
 ) -> None:
-    """Advance the state (s,) by a Runge-Kutta step, in place, and set F[:3, :3] to its derivative.
+    """Advance the state by a Runge-Kutta step of fourth order, and compute the transition matrix.
 
-    Rudder and revolutions change at constant rates `delta_dot` and `n_dot` during `dt`. The states
-    of a wave, beyond the third, advance by F[3:, 3:].
+    Parameters
+    ----------
+    c
+        The coefficients of the identification paper's model.
+    x
+        (s,) the state w, w', v and those of a wave; changed in place.
+    F
+        (s, s) the transition matrix. F[:3, :3] is set to the derivative of the step by the ship's
+        states; by F[3:, 3:] the states of the wave advance.
+    delta, delta_dot
+        The rudder angle at the start, rad, and its rate during the step, rad/s.
+    n, n_dot
+        The revolutions at the start, rpm, and their rate during the step, rpm/s.
+    dt
+        The time step, s.
+
+    References
+    ----------
+    The equations of motion: `shiplog.ships.paper`. The derivative of the step follows the
+    variational equation through the same stages.
     """
     eye = np.eye(3)
     J, slopes = np.zeros((3, 3)), np.zeros((4, 3, 3))
@@ -78,9 +96,18 @@ def _advance_wave(x: FloatArray, F: FloatArray) -> None:
 def linearise(
     c: Coefficients, x: FloatArray, delta: float, delta_dot: float, n: float, J: FloatArray
 ) -> None:
-    """Set J (3, 3) to the derivatives of w', w'' and v' by w, w' and v.
+    """Compute the derivatives of w', w'' and v' by w, w' and v.
 
-    The elements that are always zero are not written.
+    Parameters
+    ----------
+    c
+        The coefficients of the identification paper's model.
+    x
+        (3,) or more: w, w' and v.
+    delta, delta_dot, n
+        The rudder angle, rad, its rate, rad/s, and the revolutions, rpm.
+    J
+        (3, 3) the result; elements that are always zero are not written.
     """
     w, v = x[0], x[2]
     J[0, 1] = 1.0
@@ -100,9 +127,22 @@ def output_row(
     n: float,
     row: FloatArray,
 ) -> None:
-    """Set `row` (10,) to w, w', w'', v, v' and their variances.
+    """Compute w, w', w'', v and v' of one instant, and their variances.
 
-    w'' and v' follow from the model, and their variances from its derivatives.
+    w'' and v' follow from the model, and their variances, to first order, from its derivatives.
+
+    Parameters
+    ----------
+    c
+        The coefficients of the identification paper's model.
+    x
+        (s,) the state.
+    P
+        (s, s) its covariance.
+    delta, delta_dot, n
+        The rudder angle, rad, its rate, rad/s, and the revolutions, rpm.
+    row
+        (10,) the result: the five states in rad/s^k and m/s^k, then their variances.
     """
     w, w_dot, v = x[0], x[1], x[2]
     J = np.zeros((3, 3))
@@ -135,7 +175,25 @@ def output_rows(
     n: FloatArray,
     dt: float,
 ) -> FloatArray:
-    """Return `output_row` of each instant of a chunk, (n, 10); `delta` is one longer."""
+    """Compute `output_row` for each instant of a chunk.
+
+    Parameters
+    ----------
+    c
+        The coefficients of the identification paper's model.
+    states, covariances
+        (m, s) the states, and (m, s, s) their covariances.
+    delta
+        (m + 1,) the rudder angle, rad, at each instant and the next one.
+    n
+        (m,) or more: the revolutions, rpm.
+    dt
+        The time step, s.
+
+    Returns
+    -------
+    (m, 10) the five states, then their variances.
+    """
     rows = np.empty((len(states), 10))
     for k in range(len(states)):
         rate = (delta[k + 1] - delta[k]) / dt

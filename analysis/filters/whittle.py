@@ -30,18 +30,37 @@ WHITE, RED, RATE, POWER, FREQUENCY, DAMPING = range(6)
 class Spectrum:
     """Periodogram averaged over segments, up to half the sampling rate, and how it was computed.
 
-    Its unit is its mean over the fitted band, which begins at ordinate `first`.
+    Attributes
+    ----------
+    omega
+        (k,) the frequencies, rad/s.
+    power
+        (k,) the ordinates, in units of their mean over the fitted band.
+    unit
+        That mean, rad²/s²: white noise of this variance has it.
+    first
+        The ordinate with which the fitted band begins.
+    searched
+        The limits of the search for a wave, rad/s.
+    overlap
+        (length,) the autocorrelation of the tapers; the middle lag counts twice.
+    half
+        Half the length of the transform.
+    dt_secs
+        The sampling interval, s.
+    weight
+        The number of independent ordinates per ordinate.
     """
 
-    omega: FloatArray  # (k,) rad/s
-    power: FloatArray  # (k,)
-    unit: float  # rad^2/s^2: white noise of this variance has that mean
+    omega: FloatArray
+    power: FloatArray
+    unit: float
     first: int
-    searched: tuple[float, float]  # rad/s, limits of the search for a wave
-    overlap: FloatArray  # (length,) autocorrelation of the tapers; the middle lag counts twice
-    half: int  # half the length of the transform
+    searched: tuple[float, float]
+    overlap: FloatArray
+    half: int
     dt_secs: float
-    weight: float  # independent ordinates per ordinate
+    weight: float
 
     @property
     def fitted(self) -> FloatArray:
@@ -67,7 +86,26 @@ class Spectrum:
 def spectrum_of(
     residual: FloatArray, dt_secs: float, half_rate: float, lowest: float, frequency: float | None
 ) -> Spectrum | None:
-    """Compute the spectrum of a residual (n,), rad/s; None where it is too short or constant."""
+    """Compute the spectrum of a residual of the yaw rate.
+
+    Parameters
+    ----------
+    residual
+        (n,) rad/s at the instants of a clock; NaN where nothing was measured.
+    dt_secs
+        The step of the clock, s.
+    half_rate
+        Half the sampling rate of the sensor, rad/s, up to which the spectrum is computed.
+    lowest
+        The lowest frequency of a wave, rad/s.
+    frequency
+        The frequency of the wave where it is given, rad/s; None searches for it.
+
+    Returns
+    -------
+    The spectrum; None where the residual is too short or constant, or the band has too few
+    ordinates.
+    """
     at = np.flatnonzero(np.isfinite(residual))
     if len(at) < MIN_SAMPLES:
         return None
@@ -98,7 +136,7 @@ def spectrum_of(
 
 
 def _segments(residual: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Of equal length (s, length), zero where nothing was measured, and their tapers."""
+    """Return segments of equal length, (s, length), zero where not measured, and their tapers."""
     count = ceil(len(residual) / SEGMENT_SAMPLES)
     length = ceil(len(residual) / count)
     values = np.full((count, length), nan)
@@ -110,30 +148,69 @@ def _segments(residual: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _squared(rows: FloatArray, size: int) -> FloatArray:
-    """The squares of the rows' transforms of that size, summed."""
+    """Return the squares of the rows' transforms of that size, summed over the rows."""
     return np.asarray(np.sum(np.abs(rfft(rows, size)) ** 2, axis=0))
 
 
 def negative_log_likelihood(
     spectrum: Spectrum, theta: FloatArray
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Minus Whittle's log likelihood, its slope (6,) and Fisher's information (6, 6)."""
+    """Compute minus the logarithm of Whittle's likelihood, with its derivatives.
+
+    Parameters
+    ----------
+    spectrum
+        The spectrum of the residual.
+    theta
+        (6,) the logarithms of the parameters, in the order of `WHITE` to `DAMPING`: the powers of
+        white noise and red noise, the rate of the red noise, 1/s, and the wave's power, frequency,
+        rad/s, and damping ratio.
+
+    Returns
+    -------
+    value
+        Minus the logarithm of the likelihood.
+    slope
+        (6,) its derivative by `theta`.
+    information
+        (6, 6) Fisher's information.
+
+    References
+    ----------
+    Whittle, "Estimation and information in stationary time series", 1953.
+    """
     slope, information = np.zeros(6), np.zeros((6, 6))
     value = _whittle(spectrum.fitted, np.exp(theta), _shapes(spectrum, theta), slope, information)
     return spectrum.weight * value, spectrum.weight * slope, spectrum.weight * information
 
 
 def mean_periodogram(spectrum: Spectrum, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The mean periodogram (k,) of white noise and red part, and that of the wave."""
+    """Compute the mean periodogram that the parameters predict.
+
+    Parameters
+    ----------
+    spectrum
+        The spectrum, which states segments and tapers.
+    theta
+        (6,) the logarithms of the parameters, as in `negative_log_likelihood`.
+
+    Returns
+    -------
+    background
+        (k,) of white and red noise, in the unit of `spectrum.power`, over the fitted band.
+    wave
+        (k,) of the wave.
+    """
     shapes = _shapes(spectrum, theta)
     white, red, power = np.exp(theta[[WHITE, RED, POWER]])
     return white + red * shapes[0], power * shapes[2]
 
 
 def _shapes(spectrum: Spectrum, theta: FloatArray) -> FloatArray:
-    """The mean periodogram (5, k) of a red part of unit variance and its slope in its rate.
+    """Return mean periodograms and their derivatives, (5, k), for unit variances.
 
-    And that of a wave of unit variance, and its slopes in frequency and damping.
+    The rows are red noise, its derivative by the rate, a wave, and its derivatives by frequency
+    and damping.
     """
     folded = np.zeros((5, spectrum.half + 1))
     rate, frequency, damping = np.exp(theta[[RATE, FREQUENCY, DAMPING]])
@@ -146,10 +223,11 @@ def _folded(
     overlap: FloatArray, dt: float, rate: float, frequency: float, damping: float,
     folded: FloatArray,
 ) -> None:  # fmt: skip
-    """The autocovariances e^-ρτ and e^-aτ (cos ωτ - (a/ω) sin ωτ), a = ζ ω0, ω^2 = ω0^2 - a^2.
+    """Add the autocovariances e^-ρτ and e^-aτ (cos ωτ - (a/ω) sin ωτ) to `folded`.
 
-    With their slopes in ln ρ, ln ω0 and ln ζ; times the tapers' overlap, and folded as a transform
-    of twice the length of `folded` folds them.
+    Here a = ζ ω0 and ω² = ω0² - a². Their derivatives by ln ρ, ln ω0 and ln ζ are added, too; all
+    are multiplied by the tapers' overlap, and folded as a transform of twice the length of
+    `folded` folds them.
     """
     half = folded.shape[1] - 1
     a, one = damping * frequency, sqrt(1 - damping**2)
@@ -177,7 +255,7 @@ def _whittle(
     power: FloatArray, parameters: FloatArray, shapes: FloatArray, slope: FloatArray,
     information: FloatArray,
 ) -> float:  # fmt: skip
-    """The sum of I/S + ln S over the ordinates, its slope and information in the logarithms."""
+    """Return the sum of I/S + ln S over the ordinates; add to its slope and its information."""
     white, red, wave = parameters[WHITE], parameters[RED], parameters[POWER]
     total, parts = 0.0, np.empty(6)
     for k in range(len(power)):
