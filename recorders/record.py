@@ -74,7 +74,7 @@ def record(
     While recording, the log grows beside its final name with ``.part`` appended, readable up to the
     last chunk even if the process is killed. Ctrl-C ends the recording and keeps the log. If the
     source fails, what was received until then stays in the ``.part`` file, complete, and the error
-    names it; an older file at `path` is left as it was. However the recording ends, the metadata of
+    names it; an older file at `path` is not changed. However the recording ends, the metadata of
     the source that have changed since its beginning are written then.
 
     Parameters

@@ -173,7 +173,7 @@ def compare(
     """Replay a log and compare the results with its reference, channel by channel.
 
     A log that cannot be replayed, or has no reference, is a comparison that is not `ok`; its
-    `error` says why.
+    `error` states why.
 
     Parameters
     ----------

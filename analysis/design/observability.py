@@ -17,7 +17,7 @@ AXIS_TOLERANCE = 1e-8  # of the norm of A: the accuracy of a double eigenvalue
 def unobservable_eigenvalues(A: FloatArray, C: FloatArray) -> ComplexArray:
     """Compute the eigenvalues of A that are unobservable from y = C x.
 
-    The staircase form: orthogonal rotations split off the states that C measures, then those that
+    The staircase form: orthogonal rotations separate the states that C measures, then those that
     drive these, and so on; the eigenvalues of the remaining states are unobservable. Unlike
     Hautus's test it needs no eigenvalue of A, and a double eigenvalue is computed to half the
     digits only. The uncontrollable eigenvalues of an input matrix B are
@@ -54,7 +54,7 @@ def unobservable_eigenvalues(A: FloatArray, C: FloatArray) -> ComplexArray:
         rank = int(np.sum(values > threshold))
         if rank == 0:
             break
-        # the dynamics of the remaining states, and how they drive the states just split off
+        # the dynamics of the remaining states, and how they drive the states just separated
         observed, remaining = rotation[:rank], rotation[rank:]
         A, C = remaining @ A @ remaining.T, observed @ A @ remaining.T
         threshold = RANK_TOLERANCE * size

@@ -112,7 +112,7 @@ def unobservable_modes(A: ArrayLike, C: ArrayLike) -> tuple[UnobservableMode, ..
     """Compute the modes of x' = A x that y = C x does not show, by Hautus's test.
 
     A mode λ is unobservable where [A - λ I; C] has a singular value below 1e-10, with A and C
-    scaled to natural units: a large inertia (1e12, say) does not make a mode unobservable.
+    scaled to natural units: a large inertia (such as 1e12) does not make a mode unobservable.
 
     Parameters
     ----------

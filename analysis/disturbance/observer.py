@@ -89,12 +89,12 @@ class DisturbanceSummary:
     at_end
         Mean over the last `settling_secs` of the trial.
     noise_std
-        Standard deviation that sensor noise alone causes in a settled observer, at the trial's rms
-        yaw rate; model errors are not included, they count as a disturbance. For a wave it is that
-        of its value, and, where the wave is well above it, of its amplitude. NaN for the rudder
-        where the rudder has no effect.
+        Standard deviation that sensor noise alone causes in an observer after its transient, at
+        the trial's rms yaw rate; model errors are not included, they count as a disturbance. For a
+        wave it is that of its value, and, where the wave is well above it, of its amplitude. NaN
+        for the rudder where the rudder has no effect.
     settling_secs
-        Duration of the first transient, s, which is left out in a trial more than twice as long.
+        Duration of the first transient, s, which is not counted in a trial more than twice as long.
     """
 
     unit: str

@@ -170,8 +170,8 @@ def _fitted_wave(
 ) -> Wave | None:
     """Fit a wave to the innovations of the slowest filter in the yaw rate.
 
-    Its gate is open, because a filter without a wave model would reject the crests. Spikes are left
-    out by their distance from the typical innovation.
+    Its gate is open, because a filter without a wave model would reject the crests. Spikes are
+    excluded by their distance from the typical innovation.
     """
     unlimited = replace(settings, gate=OPEN_GATE)
     innovations = _filter_head(stats, model, noise, unlimited, kind).innovations[:, 0]

@@ -25,13 +25,13 @@ def check_fixed(models: Sequence[Model], fixed: Mapping[str, float]) -> None:
     ------
     UsageError
         No model has a parameter of that name; models have it in different units; a value is not
-        finite or outside the limits; or nothing is left to estimate.
+        finite or outside the limits; or no parameter is free.
     """
     for model in models:
         if all(parameter.fixed or parameter.name in fixed for parameter in model.parameters):
             raise UsageError(
-                f"all parameters of the model {model.name} are fixed, so that none is left to "
-                "estimate; fix fewer"
+                f"all parameters of the model {model.name} are fixed and none is "
+                "estimated; fix fewer"
             )
     for name, value in fixed.items():
         having = [model.parameter(name) for model in models if name in model.names]
@@ -60,7 +60,7 @@ def fixed_values(
     Parameters
     ----------
     model
-        The model; parameters that it has not are left out.
+        The model; parameters that it does not have are omitted.
     fixed
         Values given by the caller; they override the vessel file.
     vessel

@@ -1,6 +1,6 @@
 """Choice of a model by cross-validation over the runs.
 
-Each run is left out in turn and predicted by a fit to the others. A run is a manoeuvre to one side,
+Each run is held out in turn and predicted by a fit to the others. A run is a manoeuvre to one side,
 so that this validates across manoeuvres and across sides. How well a model fits is no criterion:
 the model with the most parameters always fits best.
 
@@ -46,7 +46,7 @@ class Candidate:
     fit
         The fit to all runs; None where its simulation diverges.
     misfits
-        (r, 4) of each segment, left out with its run: rms of predicted minus measured over the
+        (r, 4) of each segment, held out with its run: rms of predicted minus measured over the
         standard deviation of the measured, in the order of `MODEL_OUTPUTS`.
     """
 
@@ -114,15 +114,15 @@ def rank_models(
 
     done = parallel_map(fit_all, order, progress.reporter([(i, None) for i in order]), threads)
     fits = dict(zip(order, done, strict=True))
-    left_out = [(i, k) for i in order if fits[i] is not None for k in range(len(runs))]
+    held_out = [(i, k) for i in order if fits[i] is not None for k in range(len(runs))]
 
     def fit_others(pair: tuple[int, int]) -> list[FloatArray]:
         whole = fits[pair[0]]
         assert whole is not None  # noqa: S101 - for the type checker
         return _leave_out(whole, runs[pair[1]])
 
-    rows = parallel_map(fit_others, left_out, progress.reporter(left_out), threads)
-    misfits = dict(zip(left_out, rows, strict=True))
+    rows = parallel_map(fit_others, held_out, progress.reporter(held_out), threads)
+    misfits = dict(zip(held_out, rows, strict=True))
     candidates = []
     for i, model in enumerate(models):
         own = [row for k in range(len(runs)) for row in misfits.get((i, k), [])]
@@ -178,7 +178,7 @@ class _RankingProgress:
         self._done = 0.0
 
     def reporter(self, fits: Sequence[tuple[int, int | None]]) -> Callable[[int, bool], None]:
-        """Return the callback of a `parallel_map` over fits: each a model and the run left out."""
+        """Return the callback of a `parallel_map` over fits: each a model and the run held out."""
 
         def report(item: int, done: bool) -> None:
             i, run = fits[item]

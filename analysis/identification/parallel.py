@@ -106,7 +106,7 @@ def _work(
     events: "SimpleQueue[Event[R]]",
     stopped: threading.Event,
 ) -> None:
-    """Take items until none is left, and put an event when one is begun, done or has failed."""
+    """Take items until all are taken, and put an event when one is begun, done or has failed."""
     while not stopped.is_set():
         try:
             i = waiting.get_nowait()

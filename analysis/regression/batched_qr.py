@@ -267,7 +267,7 @@ def _largest_eigenvalues(A: FloatArray, largest: FloatArray) -> None:
 def _tridiagonalise(A: FloatArray, squares: FloatArray) -> None:
     """Reduce symmetric matrices to tridiagonal form T by Householder reflections.
 
-    The diagonal of T is left on the diagonal of A. `squares` (p, m) receives the squared
+    The diagonal of T replaces that of A. `squares` (p, m) receives the squared
     subdiagonal: ``squares[i] = T[i, i - 1]^2``, and ``squares[0] = 0``.
     """
     p, _, m = A.shape

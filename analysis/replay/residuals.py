@@ -156,8 +156,8 @@ def whiteness(innovations: FloatArray) -> float:
     """Return the p-value of a portmanteau test for autocorrelation up to `LAGS` measurements.
 
     Each autocovariance is scaled by its own sampling error, sum(e_t^2 e_{t-k}^2), so that white
-    noise whose strength varies (in proportion to the yaw rate, say) is not taken for coloured. The
-    lags are counted in measurements, however seldom they come; pairs across a gap are omitted.
+    noise whose strength varies, such as in proportion to the yaw rate, is not taken for coloured.
+    The lags are counted in measurements, however rare; pairs across a gap are omitted.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def _model_row(candidate: Candidate) -> tuple[str, ...]:
 
 
 def mean_misfits(candidate: Candidate) -> list[float]:
-    """Average a model's relative errors over the runs left out.
+    """Average a model's relative errors over the runs held out.
 
     Returns
     -------

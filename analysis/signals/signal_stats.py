@@ -192,8 +192,8 @@ def noise_level(values: FloatArray) -> float:
 
     Differencing removes the slow motion of the ship: white noise of variance s² has third
     differences of variance (1 + 9 + 9 + 1) s² = 20 s². Differences beyond `MAX_NOISE_DEVIATION`
-    robust standard deviations (1.4826 times the median absolute deviation) are spikes and are left
-    out. A signal recorded with few digits has at least the noise of its rounding, step / √12.
+    robust standard deviations (1.4826 times the median absolute deviation) are spikes and are
+    excluded. A signal recorded with few digits has at least the noise of its rounding, step / √12.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ class _Feed:
         self.ended = False
 
     def fill(self) -> None:
-        """Take the next batch from the file where none is left."""
+        """Take the next batch from the file where there is no other."""
         while not self._next and not self.ended:
             batch = next(self._batches, None)
             self.ended = batch is None

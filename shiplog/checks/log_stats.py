@@ -382,7 +382,10 @@ def _median_secs(intervals: Quantiles) -> float:
 
 
 def _regularity(intervals: FloatArray, typical: float) -> tuple[float, tuple[float, float]]:
-    """Share of intervals, gaps excluded, more than half off the typical one, and their range."""
+    """Share of intervals that differ by more than half from the typical one, and their range.
+
+    Gaps are not counted.
+    """
     steps = intervals[intervals <= gap_threshold_secs(typical)]
     if len(steps) < MIN_INTERVALS:
         return 0.0, (typical, typical)

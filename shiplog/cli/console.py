@@ -27,7 +27,7 @@ def progress(compiles: str | None = None, *, lines: bool = False) -> Iterator[Pr
     ----------
     compiles
         The package whose loops the work needs; where they were never compiled on this computer,
-        the text says that they are.
+        the text states that they are.
     lines
         Whether to print a line for each step of a known share where stderr is no terminal.
     """

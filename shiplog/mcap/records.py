@@ -31,7 +31,7 @@ def crc32_of_range(stream: IO[bytes], start: int, end: int, crc: int = 0) -> int
     Parameters
     ----------
     stream
-        The file; it is read in blocks, and left at `end`.
+        The file; it is read in blocks, and is then at `end`.
     start, end
         Offsets in the file. The checksum of an empty range is `crc`.
     crc

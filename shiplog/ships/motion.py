@@ -3,7 +3,7 @@
 A model registers its equations for its own type of coefficients (`equations`, `observations`). They
 must hold for real numbers, with which a ship is simulated, and for complex ones: a derivative is
 computed by the complex step, a tiny imaginary part of the parameter whose effect on the outputs is
-read off their imaginary parts. It is exact to rounding, has no step size to choose and needs no
+taken from their imaginary parts. It is exact to rounding, has no step size to choose and needs no
 derivation by hand. So the equations write |x| as `magnitude(x)`, e^x as `exponential(x)`, the
 square root as `root(x)`, and powers as products: numba computes the power of a complex number by
 its logarithm, which loses a tiny imaginary part.

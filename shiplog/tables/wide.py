@@ -50,7 +50,7 @@ def wide_table(
     is none; commanded ones (rudder, rpm) and the heading are interpolated, but not across a gap.
     The components of a position become columns of their own, such as `position_north`. A second
     source of a quantity has its source in the column's name, such as `yaw_rate/mems`. Channels
-    with fewer than two valid samples are left out.
+    with fewer than two valid samples are omitted.
 
     Parameters
     ----------

@@ -47,13 +47,13 @@ def run_python(
 
 def code_blocks(page: Path) -> dict[str, str]:
     """Return the code blocks of a page by the file they are headed with, as `FILE`: before ```."""
-    found, lines = {}, page.read_text(encoding="utf-8").splitlines()
+    result, lines = {}, page.read_text(encoding="utf-8").splitlines()
     for i, line in enumerate(lines):
         name = lines[i - 2].strip("`:") if i > 1 and line.startswith("```") else ""
         if name and lines[i - 2] == f"`{name}`:":
             end = lines.index("```", i + 1)
-            found[name] = "\n".join(lines[i + 1 : end]) + "\n"
-    return found
+            result[name] = "\n".join(lines[i + 1 : end]) + "\n"
+    return result
 
 
 def declare(folder: Path, package: str, group: str, **entries: str) -> None:

@@ -137,13 +137,13 @@ def three_states(
     stats: SignalStats,
     delta: np.ndarray,
     n: np.ndarray,
-    spread: np.ndarray | None = None,
+    stds: np.ndarray | None = None,
 ) -> LinearRun:
     """The other filters' of a straight ship; the wave's states are two of another basis."""
     dt, r = stats.dt_secs, noise.measurement_std**2
     q = noise.process_ratio * r * stats.interval_secs
     A, C = np.array([[0, 1, 0], [c.b1, c.a, 0], [0, 0, 0]]), np.eye(3)[[0, 2]]
-    dw, dv = stats.std + 1e-9 if spread is None else spread
+    dw, dv = stats.std + 1e-9 if stds is None else stds
     P = np.diag([dw, (abs(c.a) + 1e-3) * (stats.std[0] + 1e-9), dv]) ** 2
     intensity = np.diag([0.0, *q])
     path = sailed(c, np.array([stats.first[0], 0.0, stats.first[1]]), delta, n, dt)

@@ -11,8 +11,8 @@ def held(A: np.ndarray, Q: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarra
     """exp(A dt), and the covariance of white noise of intensity Q after dt, by quadrature."""
     nodes, weights = np.polynomial.legendre.leggauss(12)
     at = dt / 2 * (1 + nodes)
-    spread = [w * expm(A * t) @ Q @ expm(A * t).T for w, t in zip(weights, at, strict=True)]
-    return expm(A * dt), dt / 2 * np.sum(spread, axis=0)
+    terms = [w * expm(A * t) @ Q @ expm(A * t).T for w, t in zip(weights, at, strict=True)]
+    return expm(A * dt), dt / 2 * np.sum(terms, axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +46,8 @@ class LinearRun:
         H = np.kron(np.eye(n), self.C)[seen]
         S = H @ prior @ H.T + np.diag(np.tile(self.r, n)[seen])
         gain = np.linalg.solve(S, H @ prior).T
-        off = measured.ravel()[seen] - H @ self.mean.ravel()
-        states = self.mean + (gain @ off).reshape(n, s)
+        deviation = measured.ravel()[seen] - H @ self.mean.ravel()
+        states = self.mean + (gain @ deviation).reshape(n, s)
         blocks = (prior - gain @ H @ prior).reshape(n, s, n, s)
         return states, np.array([blocks[k, :, k] for k in range(n)])
 
@@ -64,11 +64,11 @@ class LinearRun:
     def drawn(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """True states (n, s) and what is measured of them, (n, 2), at every instant."""
         n, s = self.mean.shape
-        off = np.empty((n, s))
-        off[0] = draws(rng, self.P, 1)[0]
+        deviation = np.empty((n, s))
+        deviation[0] = draws(rng, self.P, 1)[0]
         for k, noise in enumerate(draws(rng, self.Q, n - 1)):
-            off[k + 1] = self.F @ off[k] + noise
-        states = self.mean + off
+            deviation[k + 1] = self.F @ deviation[k] + noise
+        states = self.mean + deviation
         return states, states @ self.C.T + np.sqrt(self.r) * rng.standard_normal((n, 2))
 
 
@@ -89,13 +89,13 @@ def normalised_squared(errors: np.ndarray, covariances: np.ndarray) -> np.ndarra
 
 
 def apart(
-    found: tuple[np.ndarray, np.ndarray], expected: tuple[np.ndarray, np.ndarray]
+    result: tuple[np.ndarray, np.ndarray], expected: tuple[np.ndarray, np.ndarray]
 ) -> tuple[float, float]:
     """How far states and covariances are from those expected, in these' standard deviations."""
-    (x, P), (states, covariances) = found, expected
+    (x, P), (states, covariances) = result, expected
     scale = np.sqrt(np.diagonal(covariances, axis1=-2, axis2=-1))
-    off = np.abs(P - covariances) / (scale[..., :, None] * scale[..., None, :])
-    return float(np.max(np.abs(x - states) / scale)), float(np.max(off))
+    deviation = np.abs(P - covariances) / (scale[..., :, None] * scale[..., None, :])
+    return float(np.max(np.abs(x - states) / scale)), float(np.max(deviation))
 
 
 def band(count: int) -> tuple[float, float]:

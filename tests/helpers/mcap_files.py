@@ -55,7 +55,7 @@ def samples(log: TrialLog) -> Samples:
 
 def samples_by_mcap(path: Path, reader: Callable[..., McapReader] = make_reader) -> Samples:
     """Read the samples with the mcap library and the file's schemas, without shiplog."""
-    found: Samples = defaultdict(list)
+    result: Samples = defaultdict(list)
     types: dict[int, Any] = {}
     with path.open("rb") as stream:
         for schema, topic, message in reader(stream, validate_crcs=True).iter_messages():
@@ -73,10 +73,10 @@ def samples_by_mcap(path: Path, reader: Callable[..., McapReader] = make_reader)
                 for f in decoded.DESCRIPTOR.fields
                 if f.type == f.TYPE_DOUBLE and not f.is_repeated
             ]
-            found[topic.topic].append(
+            result[topic.topic].append(
                 (message.log_time, message.publish_time, struct.pack(f"<{len(doubles)}d", *doubles))
             )
-    return dict(found)
+    return dict(result)
 
 
 def write_by_mcap(path: Path, *channels: Channel, **options: Any) -> Path:  # noqa: ANN401 - mcap's own
@@ -126,12 +126,12 @@ def scalar(value: float, tag: int = 0x09) -> bytes:
 
 def file_records(data: bytes) -> list[tuple[int, int, int]]:
     """Return the opcode, the start and the end of each record of a file."""
-    found, at = [], 8
+    result, at = [], 8
     while at + 9 <= len(data) - 8:
         opcode, length = struct.unpack_from("<BQ", data, at)
-        found.append((opcode, at, at + 9 + length))
+        result.append((opcode, at, at + 9 + length))
         at += 9 + length
-    return found
+    return result
 
 
 def mcap_chunk_ranges(data: bytes) -> list[tuple[int, int]]:

@@ -245,7 +245,7 @@ def information_matrix(
         For each segment, (n, c, k).
     power
         The robust weight ``w = (1 + (r / k s)^2)^(-1/2)`` enters as ``w^power``: 1 gives the
-        Gauss-Newton matrix of the iteration; 3 the second derivative of the loss, which says how
+        Gauss-Newton matrix of the iteration; 3 the second derivative of the loss, which states how
         the minimum moves with the data; 0 Fisher's information of Gaussian noise.
 
     Returns

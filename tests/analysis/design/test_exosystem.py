@@ -164,9 +164,11 @@ def test_settling_time_of_the_roll_example(
         P = control.lyap(F, observer.L @ observer.L.T)
         stds[name] = np.sqrt(np.diag(P))[1:]
     step, x = expm(F * 0.05), np.array([0, 0.25, 0.005])
-    off = np.array([abs(x[1])] + [abs((x := step @ x)[1]) for _ in times[1:]])
-    settled = [times[np.flatnonzero(off > 0.05 * of)[-1] + 1] for of in (moment_then, 0.25)]
-    assert settled == pytest.approx([of_the_moment_then, of_the_first], abs=0.051)
+    error = np.array([abs(x[1])] + [abs((x := step @ x)[1]) for _ in times[1:]])
+    settling_times = [
+        times[np.flatnonzero(error > 0.05 * of)[-1] + 1] for of in (moment_then, 0.25)
+    ]
+    assert settling_times == pytest.approx([of_the_moment_then, of_the_first], abs=0.051)
     assert stds[spectrum] / stds["butterworth"] == pytest.approx(noise, abs=0.005)
 
 

@@ -307,10 +307,10 @@ def test_frozen_gain_of_the_ship_is_as_good_as_one_per_tick() -> None:
     frozen = tick_observer(ship, lambda *_: at_first, RATE_AND_SPEED, [-0.1] * 3)
     errors = []
     for observer in (each_tick, frozen):
-        x, off = SHIP_POINT + np.array([0.005, -5e-4, -1.0]), []
+        x, deviations = SHIP_POINT + np.array([0.005, -5e-4, -1.0]), []
         for k in range(0, 400, 4):
             x = observer.step(x, run[k : k + 5, [0, 2]], u[k : k + 5], tick_secs=tick)
-            off.append(x - run[k + 4])
-        errors.append(np.array(off))
+            deviations.append(x - run[k + 4])
+        errors.append(np.array(deviations))
     sizes = np.abs(errors[0]).max(axis=0)
     assert np.all(np.abs(errors[0] - errors[1]).max(axis=0) < 0.01 * sizes)

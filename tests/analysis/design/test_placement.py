@@ -160,8 +160,8 @@ def test_unobservable_modes_are_detected_even_if_defective(
     A = np.block([[seen, np.zeros((3, k))], [rng.standard_normal((k, 3)), own]])
     C = np.hstack((rng.standard_normal((2, 3)), np.zeros((2, k))))
     T = rng.standard_normal((3 + k, 3 + k))
-    found = unobservable_modes(T @ A @ np.linalg.inv(T), C @ np.linalg.inv(T))
-    values = sorted((mode.value for mode in found), key=lambda value: value.real)
+    result = unobservable_modes(T @ A @ np.linalg.inv(T), C @ np.linalg.inv(T))
+    values = sorted((mode.value for mode in result), key=lambda value: value.real)
     assert values == pytest.approx(modes, abs=1e-7)
     assert unobservable_modes(seen, C[:, :3]) == ()
 
@@ -221,14 +221,14 @@ def test_poles_moved_by_rounding_raise_an_error() -> None:
 def test_accuracy_over_100_random_systems(
     n: int, m: int, median: float, worst: float, equal: float
 ) -> None:
-    rng, off, of_equal = np.random.default_rng(0), [], []
+    rng, errors_apart, of_equal = np.random.default_rng(0), [], []
     for _ in range(100):
         A, C = rng.standard_normal((n, n)), rng.standard_normal((m, n))
-        for poles, errors in ((-rng.uniform(1, 3, n), off), (np.full(n, -1.0), of_equal)):
+        for poles, errors in ((-rng.uniform(1, 3, n), errors_apart), (np.full(n, -1.0), of_equal)):
             L = place_multilevel(A, C, poles)
             errors.append(polynomial_error(A - L @ C, poles))
-    assert np.median(off) < median
-    assert max(off) < worst
+    assert np.median(errors_apart) < median
+    assert max(errors_apart) < worst
     assert np.median(of_equal) < 2e-10
     assert max(of_equal) < equal
 

@@ -137,8 +137,8 @@ MOTION_ROWS = [
 def test_matrices_row_by_row() -> None:
     A, B = pseudo_input_matrices(TABLE1, 1.0)
     assert pytest.approx(np.array(MOTION_ROWS), rel=1e-15) == A
-    for found, row in zip(B, INPUT_ROWS, strict=True):
-        entries = {int(column) + 1: found[column] for column in np.flatnonzero(found)}
+    for result, row in zip(B, INPUT_ROWS, strict=True):
+        entries = {int(column) + 1: result[column] for column in np.flatnonzero(result)}
         assert entries == pytest.approx(row, rel=1e-15)
     _, port = pseudo_input_matrices(TABLE1, -1.0)
     changed = {(2, 4), (3, 14)}  # the entries of w|w|

@@ -42,9 +42,9 @@ TWO_DECAYS, BOTH = np.diag([-2, -0.2]), np.array([[1.0], [1]])
     ],
 )
 def test_gains_of_the_ship_filters(shift: float, G: tuple[float, float], gain: list[float]) -> None:
-    found = quality_filter(SHIP, RATE, R1, R2, G=np.diag(G), shift=shift)
-    assert found.gain[:, 0] == pytest.approx(gain, abs=1e-8)
-    assert found.residual < 1e-12
+    result = quality_filter(SHIP, RATE, R1, R2, G=np.diag(G), shift=shift)
+    assert result.gain[:, 0] == pytest.approx(gain, abs=1e-8)
+    assert result.residual < 1e-12
 
 
 def test_three_design_cycles_of_the_double_integrator() -> None:
@@ -54,10 +54,10 @@ def test_three_design_cycles_of_the_double_integrator() -> None:
 
 
 def test_double_integrator_with_shift_and_weight_on_the_rates() -> None:
-    found = quality_regulator(DOUBLE, PUSH, np.eye(2), 1, G=np.diag([0.5, 2]), shift=1)
-    assert found.gain[0] == pytest.approx([-1.7532528806, -2.5631300883], abs=1e-8)
+    result = quality_regulator(DOUBLE, PUSH, np.eye(2), 1, G=np.diag([0.5, 2]), shift=1)
+    assert result.gain[0] == pytest.approx([-1.7532528806, -2.5631300883], abs=1e-8)
     expected = [-1.2815650442 - 0.3329323028j, -1.2815650442 + 0.3329323028j]
-    assert found.poles == pytest.approx(np.array(expected), abs=1e-8)
+    assert result.poles == pytest.approx(np.array(expected), abs=1e-8)
 
 
 def test_cycles_of_a_scalar_system_converge_to_minus_two() -> None:
@@ -91,11 +91,11 @@ def test_shift_trades_settling_time_against_noise(
 )
 def test_rate_weight_trades_damping_against_noise(G: float, noise: float, slowest: float) -> None:
     optimal = kalman_gain(SHIP, np.eye(2), RATE, R1, R2).covariance[0, 0]
-    found = quality_filter(SHIP, RATE, R1, R2, G=np.diag([0, G]))
-    of_it = error_covariance(SHIP, found.gain, RATE, R1, R2)[0, 0]
-    assert np.abs(found.poles.imag).max() == 0  # damping ratio of at least one
+    result = quality_filter(SHIP, RATE, R1, R2, G=np.diag([0, G]))
+    of_it = error_covariance(SHIP, result.gain, RATE, R1, R2)[0, 0]
+    assert np.abs(result.poles.imag).max() == 0  # damping ratio of at least one
     assert np.sqrt(of_it / optimal) == pytest.approx(noise, abs=5e-4)
-    assert found.poles[-1].real == pytest.approx(slowest, abs=5e-5)
+    assert result.poles[-1].real == pytest.approx(slowest, abs=5e-5)
 
 
 def test_destabilising_shifts_raise_an_error_with_the_pole() -> None:
@@ -128,17 +128,17 @@ def test_cascade_improves_only_a_first_stage_that_is_too_fast(
     factor: float, errors: list[float], best: int
 ) -> None:
     first = quality_filter(SHIP, RATE, R1, factor * R2).gain
-    found = cascade(SHIP, RATE, R1, R2, first, stages=5, correlation_secs=10)
-    assert found.relative[:, 0] == pytest.approx(errors, abs=5e-3)
-    assert found.best == best
-    assert "further stages increase it" in found.summary
-    assert f"stage {best} of 5 is the best" in found.summary
+    result = cascade(SHIP, RATE, R1, R2, first, stages=5, correlation_secs=10)
+    assert result.relative[:, 0] == pytest.approx(errors, abs=5e-3)
+    assert result.best == best
+    assert "further stages increase it" in result.summary
+    assert f"stage {best} of 5 is the best" in result.summary
 
 
 def test_summary_of_a_cascade() -> None:
     first = quality_filter(SHIP, RATE, R1, 1e-4 * R2).gain
-    found = cascade(SHIP, RATE, R1, R2, first, stages=2, correlation_secs=10)
-    assert found.summary == (
+    result = cascade(SHIP, RATE, R1, R2, first, stages=2, correlation_secs=10)
+    assert result.summary == (
         "stage 2 of 2 is the best, 1.27 times the optimal error; the first alone has 2.91"
     )
 
@@ -163,8 +163,8 @@ def random_regulator(
 @given(SEEDS, st.floats(0, 3))
 def test_poles_meet_the_bound_and_the_riccati_equation_holds(seed: int, c: float) -> None:
     A, B, P, R, G = random_regulator(seed)
-    found = quality_regulator(A, B, P, R, G=G, shift=c)
-    Q, heavier = found.cost, R + B.T @ G @ B
+    result = quality_regulator(A, B, P, R, G=G, shift=c)
+    Q, heavier = result.cost, R + B.T @ G @ B
     part = np.linalg.solve(heavier, B.T @ G @ A)
     J21 = P + A.T @ G @ A - A.T @ G @ B @ part
     J11 = c / 2 * np.eye(len(A)) + A - B @ part
@@ -173,11 +173,11 @@ def test_poles_meet_the_bound_and_the_riccati_equation_holds(seed: int, c: float
     sizes = [np.linalg.norm(M) for M in (J21, A, Q, J12)]
     scale = sizes[0] + 2 * sizes[1] * sizes[2] + sizes[3] * sizes[2] ** 2
     assert np.linalg.norm(left) < 1e-12 * scale
-    assert found.residual < 1e-12
-    assert found.gain == pytest.approx(
+    assert result.residual < 1e-12
+    assert result.gain == pytest.approx(
         -np.linalg.solve(heavier, B.T @ G @ A + B.T @ Q), rel=1e-8, abs=1e-8
     )
-    assert np.linalg.eigvals(A + B @ found.gain).real.max() < -c / 2
+    assert np.linalg.eigvals(A + B @ result.gain).real.max() < -c / 2
 
 
 @FEW
@@ -218,8 +218,8 @@ def test_without_weights_slow_eigenvalues_are_mirrored_and_fast_ones_kept(
     before = np.linalg.eigvals(A)
     assume(np.abs(before.real + c / 2).min() > 0.02)
     after = np.where(before.real < -c / 2, before, -c - before.conj())
-    found = quality_regulator(A, B, np.zeros_like(P), R, shift=c)
-    assert np.poly(found.poles) == pytest.approx(np.poly(after), rel=1e-6, abs=1e-6)
+    result = quality_regulator(A, B, np.zeros_like(P), R, shift=c)
+    assert np.poly(result.poles) == pytest.approx(np.poly(after), rel=1e-6, abs=1e-6)
 
 
 @FEW
@@ -331,9 +331,9 @@ def test_gain_matches_the_standard_riccati_equation(seed: int, c: float) -> None
     A, B, P, R, G = random_regulator(seed)
     Q, L = equation_of(A, B, P, R, G, c)
     assume(np.linalg.norm(L) < 1e3)
-    found = quality_regulator(A, B, P, R, G=G, shift=c)
-    assert_allclose(found.cost, Q, rtol=1e-7, atol=1e-8 * np.abs(Q).max())
-    assert_allclose(found.gain, L, rtol=1e-7, atol=1e-7)
+    result = quality_regulator(A, B, P, R, G=G, shift=c)
+    assert_allclose(result.cost, Q, rtol=1e-7, atol=1e-8 * np.abs(Q).max())
+    assert_allclose(result.gain, L, rtol=1e-7, atol=1e-7)
 
 
 @FEW
@@ -352,8 +352,8 @@ def test_filter_equation_has_its_quadratic_term(seed: int, c: float) -> None:
     """J21 + P J11 + J11* P - P J12 P = 0, K = (P S' + A G S') (R2 + S G S')⁻¹."""
     A, B, R1, R2, G = random_regulator(seed)
     S = B.T
-    found = quality_filter(A, S, R1, R2, G=G, shift=c)
-    P, heavier, across = found.covariance, R2 + S @ G @ S.T, A @ G @ S.T
+    result = quality_filter(A, S, R1, R2, G=G, shift=c)
+    P, heavier, across = result.covariance, R2 + S @ G @ S.T, A @ G @ S.T
     J12 = S.T @ np.linalg.solve(heavier, S)
     J11 = c / 2 * np.eye(len(A)) + A.T - S.T @ np.linalg.solve(heavier, across.T)
     J21 = R1 + A @ G @ A.T - across @ np.linalg.solve(heavier, across.T)
@@ -363,7 +363,7 @@ def test_filter_equation_has_its_quadratic_term(seed: int, c: float) -> None:
         sizes[0] + 2 * sizes[1] * sizes[2] + sizes[3] * sizes[2] ** 2
     )
     gain = np.linalg.solve(heavier, (P @ S.T + across).T).T
-    assert_allclose(found.gain, gain, rtol=1e-8, atol=1e-8)
+    assert_allclose(result.gain, gain, rtol=1e-8, atol=1e-8)
 
 
 @pytest.mark.parametrize("weighted", [False, True])
@@ -371,9 +371,9 @@ def test_bound_holds_for_300_random_systems(weighted: bool) -> None:
     for seed in range(300):
         A, B, P, R, G = random_regulator(seed)
         c = 0.01 * seed
-        found = quality_regulator(A, B, P, R, G=G if weighted else None, shift=c)
-        assert np.linalg.eigvals(A + B @ found.gain).real.max() < -c / 2
-        assert found.residual < 1e-12
+        result = quality_regulator(A, B, P, R, G=G if weighted else None, shift=c)
+        assert np.linalg.eigvals(A + B @ result.gain).real.max() < -c / 2
+        assert result.residual < 1e-12
 
 
 def test_gain_grows_without_bound_over_cycles_without_rate_weight() -> None:
@@ -396,6 +396,6 @@ def test_gain_increments_fall_geometrically_with_rate_weight() -> None:
 def test_cascade_does_not_improve_a_first_stage_that_is_too_slow() -> None:
     """The first filter is designed for 1e4 times the noise, as in the text of the page."""
     first = quality_filter(SHIP, RATE, R1, 1e4 * R2).gain
-    found = cascade(SHIP, RATE, R1, R2, first, stages=5, correlation_secs=10)
-    assert found.best == 1
-    assert found.relative[0, 0] > 12
+    result = cascade(SHIP, RATE, R1, R2, first, stages=5, correlation_secs=10)
+    assert result.best == 1
+    assert result.relative[0, 0] > 12

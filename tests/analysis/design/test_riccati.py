@@ -33,25 +33,25 @@ def system(seed: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, F
 @given(SEEDS)
 def test_gain_matches_control(seed: int) -> None:
     A, G, C, Q, R = system(seed)
-    found = kalman_gain(A, G, C, Q, R)
+    result = kalman_gain(A, G, C, Q, R)
     W = G @ Q @ G.T  # control requires exact symmetry
     L, P, _ = control.lqe(A, np.eye(len(A)), C, (W + W.T) / 2, (R + R.T) / 2)
-    assert found.gain == pytest.approx(L, rel=1e-7, abs=1e-7)
-    assert found.covariance == pytest.approx(P, rel=1e-7, abs=1e-7)
+    assert result.gain == pytest.approx(L, rel=1e-7, abs=1e-7)
+    assert result.covariance == pytest.approx(P, rel=1e-7, abs=1e-7)
 
 
 @FEW
 @given(SEEDS)
 def test_riccati_equation_holds_and_the_slowest_pole_is_last(seed: int) -> None:
     A, G, C, Q, R = system(seed)
-    found = kalman_gain(A, G, C, Q, R)
-    P, sharp = found.covariance, C.T @ np.linalg.solve(R, C)
+    result = kalman_gain(A, G, C, Q, R)
+    P, sharp = result.covariance, C.T @ np.linalg.solve(R, C)
     left = A @ P + P @ A.T + G @ Q @ G.T - P @ sharp @ P
     a, q, s, p = (np.linalg.norm(M) for M in (A, G @ Q @ G.T, sharp, P))
     assert np.linalg.norm(left) < 1e-12 * (q + 2 * a * p + s * p**2)
-    assert found.residual < 1e-12
-    assert found.poles[-1].real == found.poles.real.max() < 0
-    assert np.poly(found.poles) == pytest.approx(np.poly(A - found.gain @ C), rel=1e-9, abs=1e-9)
+    assert result.residual < 1e-12
+    assert result.poles[-1].real == result.poles.real.max() < 0
+    assert np.poly(result.poles) == pytest.approx(np.poly(A - result.gain @ C), rel=1e-9, abs=1e-9)
     assert np.linalg.eigvalsh(P)[0] > -1e-12 * p
 
 
@@ -59,12 +59,12 @@ def test_riccati_equation_holds_and_the_slowest_pole_is_last(seed: int) -> None:
 @given(SEEDS)
 def test_any_other_gain_has_a_larger_error(seed: int) -> None:
     A, G, C, Q, R = system(seed)
-    found, W = kalman_gain(A, G, C, Q, R), G @ Q @ G.T
-    best = error_covariance(A, found.gain, C, W, R)
-    assert best == pytest.approx(found.covariance, rel=1e-6, abs=1e-8 * np.trace(best))
+    result, W = kalman_gain(A, G, C, Q, R), G @ Q @ G.T
+    best = error_covariance(A, result.gain, C, W, R)
+    assert best == pytest.approx(result.covariance, rel=1e-6, abs=1e-8 * np.trace(best))
     rng = np.random.default_rng(seed)
-    margin = -found.poles[-1].real / np.linalg.norm(C, 2)
-    other = found.gain + 0.01 * margin * rng.uniform(-1, 1, found.gain.shape)
+    margin = -result.poles[-1].real / np.linalg.norm(C, 2)
+    other = result.gain + 0.01 * margin * rng.uniform(-1, 1, result.gain.shape)
     if np.linalg.eigvals(A - other @ C).real.max() < 0:
         assert np.trace(error_covariance(A, other, C, W, R)) >= np.trace(best) * (1 - 1e-9)
 
@@ -80,9 +80,9 @@ def test_correlated_noise_equals_an_uncorrelated_system(seed: int) -> None:
     # w = N R⁻¹ v + a part uncorrelated with v, and v = y - C x: the first part is an input
     known = G @ N @ np.linalg.inv(R)
     plain = kalman_gain(A - known @ C, G, C, Q - N @ np.linalg.solve(R, N.T), R)
-    found = kalman_gain(A, G, C, Q, R, N)
-    assert found.residual < 1e-12
-    assert found.gain == pytest.approx(plain.gain + known, rel=1e-7, abs=1e-7)
+    result = kalman_gain(A, G, C, Q, R, N)
+    assert result.residual < 1e-12
+    assert result.gain == pytest.approx(plain.gain + known, rel=1e-7, abs=1e-7)
 
 
 @FEW
@@ -97,9 +97,9 @@ def test_samples_every_dt_have_noise_intensity_r_dt() -> None:
     q, r, dt = 1e-12, 2.5e-7, 0.01
     Qd = q * dt * np.array([[dt**2 / 3, dt / 2], [dt / 2, 1]])
     predictor, P, _ = control.dlqe(expm(A * dt), np.eye(2), C, Qd, [[r]])
-    found = kalman_gain(A, [[0], [1]], C, q, r * dt)
-    assert predictor / dt == pytest.approx(found.gain, rel=2e-3)
-    assert found.covariance == pytest.approx(P, rel=2e-3)
+    result = kalman_gain(A, [[0], [1]], C, q, r * dt)
+    assert predictor / dt == pytest.approx(result.gain, rel=2e-3)
+    assert result.covariance == pytest.approx(P, rel=2e-3)
 
 
 def test_control_returns_the_gain_of_the_discrete_predictor() -> None:
@@ -191,7 +191,7 @@ def test_cross_covariance_matches_the_cross_term_of_scipy(seed: int) -> None:
     N /= max(1.0, 10 * np.linalg.norm(N, 2))
     W, R = G @ Q @ G.T, (R + R.T) / 2
     P = solve_continuous_are(A.T, C.T, (W + W.T) / 2, R, s=G @ N)
-    found = kalman_gain(A, G, C, Q, R, N)
-    assert found.covariance == pytest.approx(P, rel=1e-7, abs=1e-7 * np.abs(P).max())
+    result = kalman_gain(A, G, C, Q, R, N)
+    assert result.covariance == pytest.approx(P, rel=1e-7, abs=1e-7 * np.abs(P).max())
     gain = np.linalg.solve(R, (P @ C.T + G @ N).T).T
-    assert found.gain == pytest.approx(gain, rel=1e-6, abs=1e-7 * max(1.0, np.abs(gain).max()))
+    assert result.gain == pytest.approx(gain, rel=1e-6, abs=1e-7 * max(1.0, np.abs(gain).max()))

@@ -72,17 +72,17 @@ def test_variance_of_the_dryden_filter_is_twice_sigma_squared() -> None:
 
 def test_kalman_filter_of_the_paper() -> None:
     plant = augment_with_shaping(A0, B0, C0, G0, spectral_factor(*DRYDEN))
-    found = kalman_gain(plant.A, plant.G, plant.C, 1, R)
-    gain = found.gain[PAPERS_ORDER]
-    closed = (plant.A - found.gain @ plant.C)[np.ix_(PAPERS_ORDER, PAPERS_ORDER)]
+    result = kalman_gain(plant.A, plant.G, plant.C, 1, R)
+    gain = result.gain[PAPERS_ORDER]
+    closed = (plant.A - result.gain @ plant.C)[np.ix_(PAPERS_ORDER, PAPERS_ORDER)]
     assert gain == pytest.approx(np.array(GAIN), abs=1e-8)
     assert closed[:4, :2] == pytest.approx(np.array(CLOSED), abs=1e-8)
-    assert found.poles.real == pytest.approx(POLES, abs=1e-8)
-    assert np.abs(found.poles.imag).max() == 0
-    assert np.diag(found.covariance)[PAPERS_ORDER] == pytest.approx(VARIANCES, abs=1e-8)
+    assert result.poles.real == pytest.approx(POLES, abs=1e-8)
+    assert np.abs(result.poles.imag).max() == 0
+    assert np.diag(result.covariance)[PAPERS_ORDER] == pytest.approx(VARIANCES, abs=1e-8)
     assert gain == pytest.approx(np.array(PRINTED_GAIN), abs=5e-5)
     assert closed == pytest.approx(np.array(PRINTED_CLOSED), abs=5e-5)
-    assert found.poles.real == pytest.approx(PRINTED_POLES, abs=5e-5)
+    assert result.poles.real == pytest.approx(PRINTED_POLES, abs=5e-5)
     assert plant.B[PAPERS_ORDER, 0] == pytest.approx([0, 0, 0, 0, 20.2])
 
 
@@ -244,9 +244,9 @@ def test_dryden_factor_in_closed_form() -> None:
 
 def test_two_misprints_of_the_paper_differ_by_whole_numbers() -> None:
     plant = augment_with_shaping(A0, B0, C0, G0, spectral_factor(*DRYDEN))
-    found = kalman_gain(plant.A, plant.G, plant.C, 1, R)
-    assert found.gain[PAPERS_ORDER][3, 1] - 2 == pytest.approx(-2.2457, abs=5e-5)
-    assert found.poles[-1].real - 1 == pytest.approx(-1.1661, abs=5e-5)
+    result = kalman_gain(plant.A, plant.G, plant.C, 1, R)
+    assert result.gain[PAPERS_ORDER][3, 1] - 2 == pytest.approx(-2.2457, abs=5e-5)
+    assert result.poles[-1].real - 1 == pytest.approx(-1.1661, abs=5e-5)
     # both follow from F = A - L C, whose trace is the sum of its poles
     (_, printed), (sensed, _) = PRINTED_CLOSED[3][:2], PRINTED_GAIN[3]
     assert -sensed * C0[0, 1] - printed == pytest.approx(PRINTED_GAIN[3][1], abs=1e-4)

@@ -53,8 +53,8 @@ def observed(vessel: Vessel, manoeuvre: str, noise: str, gusts: tuple[Gust, ...]
         signal_stats(signals, vessel.coefficients), vessel.coefficients, vessel.filter
     )
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
-    found, summaries = observe_disturbance(signals, vessel.coefficients, noise_model)
-    return signals, found, summaries, truth
+    estimated, summaries = observe_disturbance(signals, vessel.coefficients, noise_model)
+    return signals, estimated, summaries, truth
 
 
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "turning-circle", "pseudo-random"])
@@ -62,30 +62,30 @@ def observed(vessel: Vessel, manoeuvre: str, noise: str, gusts: tuple[Gust, ...]
 def test_a_step_in_yaw_moment_is_found_within_5_percent(
     vessel: Vessel, manoeuvre: str, noise: str
 ) -> None:
-    _, found, _, truth = observed(vessel, manoeuvre, noise, (Gust(STEP, 200.0),))
+    _, estimated, _, truth = observed(vessel, manoeuvre, noise, (Gust(STEP, 200.0),))
     settled = slice(4000, None)  # 200 s after its onset: four of the observer's periods
-    assert np.mean(found.yaw[settled]) == pytest.approx(truth[-1], rel=0.05)
-    assert np.max(np.abs(found.yaw[settled] / truth[-1] - 1)) < 0.15
+    assert np.mean(estimated.yaw[settled]) == pytest.approx(truth[-1], rel=0.05)
+    assert np.max(np.abs(estimated.yaw[settled] / truth[-1] - 1)) < 0.15
 
 
 def test_a_gust_comes_and_goes(vessel: Vessel) -> None:
-    _, found, _, truth = observed(vessel, "zigzag-20-20", "white", (Gust(STEP, 150.0, 200.0),))
+    _, estimated, _, truth = observed(vessel, "zigzag-20-20", "white", (Gust(STEP, 150.0, 200.0),))
     size = truth.max()
-    assert np.mean(found.yaw[3000:3490]) == pytest.approx(size, rel=0.05)
-    assert np.mean(found.yaw[5000:]) == pytest.approx(0, abs=0.05 * size)
+    assert np.mean(estimated.yaw[3000:3490]) == pytest.approx(size, rel=0.05)
+    assert np.mean(estimated.yaw[5000:]) == pytest.approx(0, abs=0.05 * size)
 
 
 def test_without_a_disturbance_the_estimate_is_the_sensors_noise(vessel: Vessel) -> None:
-    _, found, summaries, _ = observed(vessel, "zigzag-20-20", "white", ())
-    assert np.std(found.yaw[1500:]) == pytest.approx(summaries["yaw"].noise_std, rel=0.4)
-    assert np.std(found.surge[3000:]) == pytest.approx(summaries["surge"].noise_std, rel=0.6)
+    _, estimated, summaries, _ = observed(vessel, "zigzag-20-20", "white", ())
+    assert np.std(estimated.yaw[1500:]) == pytest.approx(summaries["yaw"].noise_std, rel=0.4)
+    assert np.std(estimated.surge[3000:]) == pytest.approx(summaries["surge"].noise_std, rel=0.6)
 
 
 def test_a_slow_sensor_is_corrected_as_fast_as_a_quick_one(vessel: Vessel) -> None:
-    _, found, _, truth = observed(
+    _, estimated, _, truth = observed(
         vessel, "zigzag-20-20", "white", (Gust(STEP, 200.0),), yaw_rate__rate_hz=1.0
     )
-    assert np.mean(found.yaw[320:]) == pytest.approx(truth[-1], rel=0.1)
+    assert np.mean(estimated.yaw[320:]) == pytest.approx(truth[-1], rel=0.1)
 
 
 def test_where_nothing_is_measured_the_disturbance_is_held(vessel: Vessel) -> None:
@@ -95,15 +95,15 @@ def test_where_nothing_is_measured_the_disturbance_is_held(vessel: Vessel) -> No
     values["yaw_rate"][4000:4300] = np.nan
     gapped: Signals = replace(signals, values=values)
     noise = noise_of(signal_stats(gapped, vessel.coefficients), vessel.coefficients, vessel.filter)
-    found, _ = observe_disturbance(gapped, vessel.coefficients, noise)
-    assert np.ptp(found.yaw[4000:4300]) == 0
+    estimated, _ = observe_disturbance(gapped, vessel.coefficients, noise)
+    assert np.ptp(estimated.yaw[4000:4300]) == 0
 
 
 def test_the_moment_is_converted_to_the_rudder_of_the_same_effect(vessel: Vessel) -> None:
     straight = (Gust(STEP, 100.0),)
-    _, found, *_ = observed(vessel, "turning-circle-1", "white", straight)
+    _, estimated, *_ = observed(vessel, "turning-circle-1", "white", straight)
     # at the approach speed two degrees, and little else while the ship goes nearly straight
-    assert np.degrees(np.mean(found.rudder[2200:2600])) == pytest.approx(2.0, rel=0.08)
+    assert np.degrees(np.mean(estimated.rudder[2200:2600])) == pytest.approx(2.0, rel=0.08)
 
 
 def test_a_force_is_found_in_surge(vessel: Vessel) -> None:
@@ -112,8 +112,8 @@ def test_a_force_is_found_in_surge(vessel: Vessel) -> None:
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
     noise = noise_of(signal_stats(signals, c), c, vessel.filter)
     # a model with 2 % more thrust estimates a force that holds the ship back by that much
-    found, _ = observe_disturbance(signals, c._replace(h=1.02 * c.h), noise)
-    assert np.mean(found.surge[6000:]) == pytest.approx(-0.02 * c.h * 80, rel=0.1)
+    estimated, _ = observe_disturbance(signals, c._replace(h=1.02 * c.h), noise)
+    assert np.mean(estimated.surge[6000:]) == pytest.approx(-0.02 * c.h * 80, rel=0.1)
 
 
 # ---- ramps and waves
@@ -206,12 +206,12 @@ def test_a_ramp_of_many_small_gusts_is_found_under_white_noise(vessel: Vessel) -
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
     c = vessel.coefficients
-    found, summaries = observe_disturbance(
+    estimated, summaries = observe_disturbance(
         signals, c, noise_of(signal_stats(signals, c), c, vessel.filter), chosen_models("ramp")
     )
     up = slice(2800, 4000)
-    assert np.std(found.yaw[up] - truth[up]) < 2 * summaries["yaw"].noise_std + 0.05 * truth[-1]
-    assert np.mean(found.yaw[5800:]) == pytest.approx(truth[-1], rel=0.1)
+    assert np.std(estimated.yaw[up] - truth[up]) < 2 * summaries["yaw"].noise_std + 0.05 * truth[-1]
+    assert np.mean(estimated.yaw[5800:]) == pytest.approx(truth[-1], rel=0.1)
 
 
 WAVE = radians(0.15) * OMEGA**2  # rad/s^3: a yaw rate of 0.15 deg/s
@@ -237,14 +237,14 @@ def phasor(values: np.ndarray, times: np.ndarray) -> tuple[complex, float]:
 def test_a_wave_is_found_in_amplitude_and_phase(vessel: Vessel, models: tuple[str, ...]) -> None:
     stds = radians(0.005), 0.02
     signals = sailed(vessel.coefficients, wave, surging, secs=1000.0, stds=stds)
-    found, summaries = observe_disturbance(
+    estimated, summaries = observe_disturbance(
         signals, vessel.coefficients, quiet(stds), chosen_models(*models), OMEGA
     )
     settled = slice(5000, None)
     times = signals.time_secs[settled]
     for seen, amplitude, phase, name in (
-        (found.yaw_wave, WAVE, 0.4, "yaw_wave"),
-        (found.surge_wave, SURGING, -1.0, "surge_wave"),
+        (estimated.yaw_wave, WAVE, 0.4, "yaw_wave"),
+        (estimated.surge_wave, SURGING, -1.0, "surge_wave"),
     ):
         turning, _ = phasor(seen[settled], times)
         assert abs(turning) == pytest.approx(amplitude, rel=0.03)
@@ -257,11 +257,13 @@ def test_a_wave_is_found_in_amplitude_and_phase(vessel: Vessel, models: tuple[st
 
 def test_on_a_clock_of_one_second_a_wave_is_found_as_well(vessel: Vessel) -> None:
     signals = sailed(vessel.coefficients, wave, surging, secs=1000.0, dt=1.0)
-    found, _ = observe_disturbance(
+    estimated, _ = observe_disturbance(
         signals, vessel.coefficients, quiet(), chosen_models("constant", "wave"), OMEGA
     )
     times = signals.time_secs[500:]
-    yaw, surge = (phasor(seen[500:], times)[0] for seen in (found.yaw_wave, found.surge_wave))
+    yaw, surge = (
+        phasor(seen[500:], times)[0] for seen in (estimated.yaw_wave, estimated.surge_wave)
+    )
     assert (abs(yaw), abs(surge)) == pytest.approx((WAVE, SURGING), rel=0.04)
     assert (np.angle(yaw), np.angle(surge)) == pytest.approx((0.4, -1.0), abs=0.04)
 
@@ -273,14 +275,14 @@ def test_step_and_wave_are_separated(vessel: Vessel, models: tuple[str, ...]) ->
     signals = sailed(
         vessel.coefficients, lambda t: step * (t >= 500) + wave(t), surging, secs=1000.0, stds=stds
     )
-    found, summaries = observe_disturbance(
+    estimated, summaries = observe_disturbance(
         signals, vessel.coefficients, quiet(stds), chosen_models(*models), OMEGA
     )
     before, after = slice(4500, 4990), slice(7000, None)
-    assert np.max(np.abs(found.yaw[before])) < 0.1 * step
-    assert np.mean(found.yaw[after]) == pytest.approx(step, rel=0.05)
-    assert np.std(found.yaw[after]) < 2 * summaries["yaw"].noise_std
-    assert np.mean(found.yaw_wave[after]) == pytest.approx(0, abs=0.01 * WAVE)
+    assert np.max(np.abs(estimated.yaw[before])) < 0.1 * step
+    assert np.mean(estimated.yaw[after]) == pytest.approx(step, rel=0.05)
+    assert np.std(estimated.yaw[after]) < 2 * summaries["yaw"].noise_std
+    assert np.mean(estimated.yaw_wave[after]) == pytest.approx(0, abs=0.01 * WAVE)
     # without a wave in the exosystem the wave appears in the moment itself
     alone, _ = observe_disturbance(signals, vessel.coefficients, quiet(stds))
     assert np.std(alone.yaw[after]) > 0.3 * step
@@ -299,21 +301,21 @@ def test_gust_and_wave_of_a_simulated_log_are_both_estimated(vessel: Vessel) -> 
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
     truth = trial.trajectory.at(signals.time_secs)["yaw_disturbance"]
     noise = noise_of(signal_stats(signals, c), c, vessel.filter)
-    found, _ = observe_disturbance(signals, c, noise, chosen_models("constant", "wave"), OMEGA)
+    estimated, _ = observe_disturbance(signals, c, noise, chosen_models("constant", "wave"), OMEGA)
     settled = slice(4000, None)
     _, size = phasor(truth[settled], signals.time_secs[settled])
-    assert np.mean(found.yaw[settled]) == pytest.approx(size, rel=0.05)
+    assert np.mean(estimated.yaw[settled]) == pytest.approx(size, rel=0.05)
     rest = truth[settled] - size
-    assert np.std(found.yaw_wave[settled] - rest) < 0.05 * np.std(rest)
+    assert np.std(estimated.yaw_wave[settled] - rest) < 0.05 * np.std(rest)
 
 
 def test_the_amplitude_is_found_within_a_minute(vessel: Vessel) -> None:
     signals = sailed(vessel.coefficients, lambda t: wave(t) * (t >= 100), stds=(radians(0.005), 0))
-    found, _ = observe_disturbance(
+    estimated, _ = observe_disturbance(
         signals, vessel.coefficients, quiet(), chosen_models("constant", "wave"), OMEGA
     )
     period = round(2 * pi / OMEGA / 0.1)
-    tops = [np.ptp(found.yaw_wave[k : k + period]) / 2 for k in range(1500, 5500, period)]
+    tops = [np.ptp(estimated.yaw_wave[k : k + period]) / 2 for k in range(1500, 5500, period)]
     assert tops == pytest.approx([WAVE] * len(tops), rel=0.1)
 
 
@@ -324,11 +326,11 @@ def test_the_error_due_to_noise_in_each_part_is_the_one_reported(
     # a ship that hardly turns is as linear as the observer assumes
     stds = radians(0.02), 0.1
     signals = sailed(vessel.coefficients, secs=4000.0, stds=stds, rudder=radians(0.1))
-    found, summaries = observe_disturbance(
+    estimated, summaries = observe_disturbance(
         signals, vessel.coefficients, quiet(stds), chosen_models(*models), OMEGA
     )
     for name, summary in summaries.items():
-        seen = getattr(found, name)[6000:]
+        seen = getattr(estimated, name)[6000:]
         if summary.noise_std == 0:
             assert not seen.any()
             assert "wave" in models
@@ -341,11 +343,11 @@ def test_the_error_due_to_noise_in_each_part_is_the_one_reported(
 def test_the_std_of_a_wave_is_that_of_its_amplitude(vessel: Vessel) -> None:
     stds = radians(0.02), 0.1
     signals = sailed(vessel.coefficients, wave, secs=4000.0, stds=stds, rudder=radians(0.1))
-    found, summaries = observe_disturbance(
+    estimated, summaries = observe_disturbance(
         signals, vessel.coefficients, quiet(stds), chosen_models("constant", "wave"), OMEGA
     )
     period = round(2 * pi / OMEGA / 0.1)
-    cut = found.yaw_wave[6000:]
+    cut = estimated.yaw_wave[6000:]
     times = signals.time_secs[6000:]
     amplitudes = [
         abs(phasor(cut[k : k + period], times[k : k + period])[0])
@@ -360,12 +362,12 @@ def test_the_observer_does_not_diverge_in_waves_on_a_nonlinear_ship(vessel: Vess
     signals = sailed(
         vessel.coefficients, lambda t: size * np.sin(t) * (t >= 100), rudder=radians(35)
     )
-    found, _ = observe_disturbance(
+    estimated, _ = observe_disturbance(
         signals, vessel.coefficients, quiet(), chosen_models("ramp", "wave"), 1.0
     )
-    assert np.std(found.yaw[4500:]) < 1e-6
+    assert np.std(estimated.yaw[4500:]) < 1e-6
     times = signals.time_secs[4500:]
-    assert found.yaw_wave[4500:] == pytest.approx(size * np.sin(times), abs=0.03 * size)
+    assert estimated.yaw_wave[4500:] == pytest.approx(size * np.sin(times), abs=0.03 * size)
 
 
 def poles_at(c: Coefficients, observer: ForceObserver, w: float, every: int) -> np.ndarray:
@@ -404,10 +406,10 @@ def test_in_a_turn_the_poles_stay_where_they_were_placed(
     observer = ForceObserver(c, quiet(), stats, chosen_models(*models), OMEGA)
     as_designed = np.sort(poles_at(c, observer, stats.yaw_rate_rms, every).real)
     for turning in (0.0, 0.5, 1.0):
-        found = np.sort(poles_at(c, observer, radians(turning), every).real)
+        estimated = np.sort(poles_at(c, observer, radians(turning), every).real)
         exact = "wave" in models
         slack = 0.003 if exact else 0.2 * every**0.5 * 0.05
-        assert found == pytest.approx(as_designed, rel=0.06, abs=slack), turning
+        assert estimated == pytest.approx(as_designed, rel=0.06, abs=slack), turning
 
 
 # ---- gaps
@@ -428,8 +430,8 @@ def test_a_ramp_continues_for_the_observers_memory_and_is_then_held(
 ) -> None:
     push = ramp_moment(50.0, 2e-9), ramp_moment(50.0, 2e-5)
     signals = gapped(sailed(vessel.coefficients, *push), sensor, slice(4000, 5000))
-    found, _ = observe_disturbance(signals, vessel.coefficients, quiet(), chosen_models("ramp"))
-    seen = getattr(found, part)[3999:5000]
+    estimated, _ = observe_disturbance(signals, vessel.coefficients, quiet(), chosen_models("ramp"))
+    seen = getattr(estimated, part)[3999:5000]
     steps, last = np.diff(seen), round(memory / 0.1)
     assert steps[:last] == pytest.approx(np.full(last, steps[0]), rel=1e-6)
     assert steps[0] > 0
@@ -441,10 +443,10 @@ def test_a_ramp_continues_for_the_observers_memory_and_is_then_held(
 )
 def test_without_samples_a_wave_continues(vessel: Vessel, models: tuple[str, ...]) -> None:
     signals = gapped(sailed(vessel.coefficients, wave, surging), "yaw_rate", slice(4000, 5000))
-    found, _ = observe_disturbance(
+    estimated, _ = observe_disturbance(
         signals, vessel.coefficients, quiet(), chosen_models(*models), OMEGA
     )
-    times, seen = signals.time_secs[4000:5000], found.yaw_wave[4000:5000]
+    times, seen = signals.time_secs[4000:5000], estimated.yaw_wave[4000:5000]
     turning, _ = phasor(seen, times)
     assert abs(turning) == pytest.approx(WAVE, rel=0.02)
     again = turning.real * np.sin(OMEGA * times) + turning.imag * np.cos(OMEGA * times)
@@ -470,16 +472,16 @@ def broken(vessel: Vessel) -> Signals:
 def in_chunks(
     signals: Signals, cuts: list[int], make: Callable[[], ForceObserver]
 ) -> tuple[dict[str, np.ndarray], dict]:
-    observer, edges, found = make(), [0, *sorted(cuts), len(signals)], []
+    observer, edges, estimated = make(), [0, *sorted(cuts), len(signals)], []
     for start, stop in pairwise(edges):
         if stop > start:
             after = min(stop, len(signals) - 1)
             following = {name: float(signals[name][after]) for name in ("rudder", "rpm")}
-            found.append(observer.step(signals.part(start, stop), following))
+            estimated.append(observer.step(signals.part(start, stop), following))
     arrays = {
-        part: np.concatenate([getattr(chunk, part) for chunk in found])
+        part: np.concatenate([getattr(chunk, part) for chunk in estimated])
         for part in PARTS
-        if getattr(found[0], part) is not None
+        if getattr(estimated[0], part) is not None
     }
     return arrays, observer.result()
 
@@ -513,14 +515,14 @@ def test_only_the_disturbances_requested_are_estimated(
     vessel: Vessel, models: tuple[str, ...]
 ) -> None:
     signals = sailed(vessel.coefficients, wave, surging, secs=100.0)
-    found, summaries = observe_disturbance(
+    estimated, summaries = observe_disturbance(
         signals, vessel.coefficients, quiet(), chosen_models(*models), OMEGA
     )
     waves = "wave" in models
-    assert (found.yaw_wave is not None) == (found.surge_wave is not None) == waves
+    assert (estimated.yaw_wave is not None) == (estimated.surge_wave is not None) == waves
     assert list(summaries) == ["yaw", "rudder", "surge", *(["yaw_wave", "surge_wave"] * waves)]
     slow = models != ("wave",)
-    assert found.yaw.any() == found.surge.any() == found.rudder.any() == slow
+    assert estimated.yaw.any() == estimated.surge.any() == estimated.rudder.any() == slow
     if not slow:
         assert (
             summaries["yaw"].noise_std
@@ -545,20 +547,20 @@ def test_the_union_of_the_models_is_observed(vessel: Vessel) -> None:
 
 def test_the_frequency_is_ignored_without_a_wave(vessel: Vessel) -> None:
     signals = sailed(vessel.coefficients, secs=100.0)
-    found, _ = observe_disturbance(
+    estimated, _ = observe_disturbance(
         signals, vessel.coefficients, quiet(), chosen_models("constant"), 1e9
     )
-    assert found.yaw_wave is None
+    assert estimated.yaw_wave is None
 
 
 def test_an_observer_that_diverges_returns_nan(vessel: Vessel) -> None:
     signals = sailed(vessel.coefficients, secs=300.0)
     c = vessel.coefficients._replace(h=-10 * vessel.coefficients.h)  # backwards, hard
-    found, summaries = observe_disturbance(
+    estimated, summaries = observe_disturbance(
         signals, c, quiet(), chosen_models("constant", yaw_frequency=1e-4, surge_frequency=1e-4)
     )
-    assert np.isnan(found.surge[-1])
-    assert np.nanmax(np.abs(found.surge)) < 1e6
+    assert np.isnan(estimated.surge[-1])
+    assert np.nanmax(np.abs(estimated.surge)) < 1e6
     assert np.isfinite(summaries["surge"].rms)
 
 
@@ -651,10 +653,10 @@ def test_every_log_is_observed_by_every_model(path: Path) -> None:
                 OMEGA if "wave" in models else None,
             )
             for _, held, following in chunks:
-                found = observer.step(held, following)
+                estimated = observer.step(held, following)
                 for part in ("yaw", "surge", "yaw_wave", "surge_wave"):
-                    if getattr(found, part) is not None:
-                        assert np.isfinite(getattr(found, part)).all(), (models, spectrum, part)
+                    if getattr(estimated, part) is not None:
+                        assert np.isfinite(getattr(estimated, part)).all(), (models, spectrum, part)
             for summary in observer.result().values():
                 assert np.isfinite(
                     [summary.mean, summary.rms, summary.at_end, summary.noise_std]
@@ -666,11 +668,11 @@ def test_a_wave_too_fast_for_one_sensor_is_estimated_in_the_other_alone(vessel: 
         vessel, "zigzag-20-20", duration_secs=300.0, sensors=suite("white", {"speed.rate_hz": 0.2})
     )
     log = TrialLog("trial", trial.channels, vessel_toml=PRESETS["table1"])
-    found = analyse(log, settings={"disturbance.models": ["constant", "wave"]})
-    assert found.disturbance.yaw_wave is not None
-    assert found.disturbance.surge_wave is None
-    assert "surge_wave" not in found.findings.disturbances
-    assert any("no wave is estimated in surge" in text for text in found.findings.warnings)
+    estimated = analyse(log, settings={"disturbance.models": ["constant", "wave"]})
+    assert estimated.disturbance.yaw_wave is not None
+    assert estimated.disturbance.surge_wave is None
+    assert "surge_wave" not in estimated.findings.disturbances
+    assert any("no wave is estimated in surge" in text for text in estimated.findings.warnings)
 
 
 def test_summaries_survive_pickling_and_deepcopy(vessel: Vessel) -> None:

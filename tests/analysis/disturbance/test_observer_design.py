@@ -68,8 +68,8 @@ def test_plant_and_slow_part_have_the_spectrum_requested_and_the_wave_its_own_fr
 
 def test_a_wave_decays_no_slower_than_the_slow_part() -> None:
     model = ForceModel(0, 0.15, "butterworth", 0.05)
-    found = np.log(np.linalg.eigvals(error_transition(YAW, model, 0.1))) / 0.1
-    assert np.min(np.abs(found - (-0.05 + 0.15j))) < 1e-8
+    result = np.log(np.linalg.eigvals(error_transition(YAW, model, 0.1))) / 0.1
+    assert np.min(np.abs(result - (-0.05 + 0.15j))) < 1e-8
 
 
 @pytest.mark.parametrize(
@@ -78,8 +78,8 @@ def test_a_wave_decays_no_slower_than_the_slow_part() -> None:
 )
 def test_the_roll_example(spectrum: str, gain: list[float]) -> None:
     ramp = ForceModel(1, None, spectrum, 0.05)
-    found = force_observer(np.zeros((1, 1)), ramp, sampling(FINE))
-    assert found.force.correction / FINE == pytest.approx(gain, rel=1e-4)
+    result = force_observer(np.zeros((1, 1)), ramp, sampling(FINE))
+    assert result.force.correction / FINE == pytest.approx(gain, rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -94,14 +94,18 @@ def test_the_roll_example(spectrum: str, gain: list[float]) -> None:
 def test_the_errors_of_the_roll_example(secs: int, error: list[float]) -> None:
     inertia = 1000.0
     step = error_transition(np.zeros((1, 1)), ForceModel(1, None, "butterworth", 0.05), FINE)
-    off = np.linalg.matrix_power(step, round(secs / FINE)) @ [0, 0.25 / inertia, 0.005 / inertia]
-    assert off * [1, inertia, inertia] == pytest.approx(error, abs=3e-6)
+    deviation = np.linalg.matrix_power(step, round(secs / FINE)) @ [
+        0,
+        0.25 / inertia,
+        0.005 / inertia,
+    ]
+    assert deviation * [1, inertia, inertia] == pytest.approx(error, abs=3e-6)
 
 
 def test_the_gains_of_a_surge_force() -> None:
     constant = ForceModel(0, None, "butterworth", 0.1)
-    found = force_observer(SURGE, constant, sampling(FINE)).force.correction
-    assert found / FINE == pytest.approx([0.13742136, 0.01], rel=1e-4)
+    result = force_observer(SURGE, constant, sampling(FINE)).force.correction
+    assert result / FINE == pytest.approx([0.13742136, 0.01], rel=1e-4)
 
 
 def test_the_gains_of_yaw_with_a_ramp_and_a_wave(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,9 +113,9 @@ def test_the_gains_of_yaw_with_a_ramp_and_a_wave(monkeypatch: pytest.MonkeyPatch
     pair = POLE_PATTERNS["butterworth"](2, 0.4)
     poles = np.array([*POLE_PATTERNS["butterworth"](3, 0.1), *pair])
     monkeypatch.setattr("analysis.disturbance.observer_design._poles", lambda *_: poles)
-    found = force_observer(NOMOTO, ForceModel(1, 0.6, "butterworth", 0.1), sampling(FINE))
+    result = force_observer(NOMOTO, ForceModel(1, 0.6, "butterworth", 0.1), sampling(FINE))
     expected = [0.71568542, 0.01046024, 0.00044444, -0.07732315, -0.38629581]
-    assert found.force.correction / FINE == pytest.approx(expected, rel=2e-3)
+    assert result.force.correction / FINE == pytest.approx(expected, rel=2e-3)
 
 
 @pytest.mark.parametrize("model", EVERY)
@@ -145,11 +149,11 @@ def test_the_slow_part_is_held_after_the_observers_memory_or_the_longest_interva
 def test_the_error_due_to_noise_is_that_of_the_discrete_lyapunov_equation(
     model: ForceModel,
 ) -> None:
-    found = force_observer(YAW, model, sampling(1.0))
-    M = found.force.correction[:, None]
+    result = force_observer(YAW, model, sampling(1.0))
+    M = result.force.correction[:, None]
     P = control.dlyap(error_transition(YAW, model, 1.0), M @ M.T)
-    expected = [np.sqrt(row @ P[2:, 2:] @ row) for row in found.force.parts]
-    assert found.stds == pytest.approx(expected, rel=1e-6)
+    expected = [np.sqrt(row @ P[2:, 2:] @ row) for row in result.force.parts]
+    assert result.stds == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("plant", [YAW, SURGE], ids=["yaw", "surge"])
@@ -157,10 +161,10 @@ def test_the_error_due_to_noise_is_that_of_the_discrete_lyapunov_equation(
 def test_the_transient_is_as_long_as_reported(plant: np.ndarray, model: ForceModel) -> None:
     if model.degree is None:
         return
-    found, p = force_observer(plant, model, sampling(0.1)), len(plant)
+    result, p = force_observer(plant, model, sampling(0.1)), len(plant)
     step = error_transition(plant, model, 0.1)
     remaining = (
-        np.linalg.matrix_power(step, round(found.settling_secs / 0.1)) @ np.eye(len(step))[p]
+        np.linalg.matrix_power(step, round(result.settling_secs / 0.1)) @ np.eye(len(step))[p]
     )
     # the paper's time is a little short for a constant: the error may still be an eighth
     assert abs(remaining[p]) < (0.13 if model.degree == 0 else 0.05)

@@ -1,4 +1,4 @@
-"""Filters and smoothers are as far from the truth as they say, over many runs of their model."""
+"""The errors of filters and smoothers are as large as their covariances state, over many runs."""
 
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -62,25 +62,25 @@ def seen_of(count: int) -> np.ndarray:
 
 
 def usual_of(c: Coefficients, inputs: np.ndarray, dt: float, **known: float) -> SignalStats:
-    found = signal_stats(signals_of(seen_of(len(inputs)), *inputs.T, dt), c)
-    return replace(found, first=FIRST, std=SPREAD, **known)
+    result = signal_stats(signals_of(seen_of(len(inputs)), *inputs.T, dt), c)
+    return replace(result, first=FIRST, std=SPREAD, **known)
 
 
 def linear(c: Coefficients, settings: FilterSettings, noise: NoiseModel) -> Pair:
-    """Runs drawn from the filter's own model; the wave's states are left out."""
+    """Runs drawn from the filter's own model; without the wave's states."""
     inputs = np.column_stack(steered(COUNT, DT))
     stats = usual_of(c, inputs, DT)
     if settings.chosen == "pseudo-input":
         run = five_states(c, noise, stats, *inputs.T)
     else:
-        spread = None if settings.chosen == "extended" else noise.measurement_std
-        run = three_states(c, noise, stats, *inputs.T, spread)
+        stds = None if settings.chosen == "extended" else noise.measurement_std
+        run = three_states(c, noise, stats, *inputs.T, stds)
     drawn = [run.drawn(np.random.default_rng(seed)) for seed in range(SEEDS)]
     return judged(c, settings, noise, stats, inputs, drawn)
 
 
 def nonlinear(c: Coefficients, settings: FilterSettings, noise: NoiseModel) -> Pair:
-    """Runs of the ship as she is, a yaw moment and a surge force pushing her about."""
+    """Runs of the nonlinear ship, disturbed by a random yaw moment and surge force."""
     dt, count, ahead, turning = 0.1, 1000, 7.0, 4e-3
     inputs = np.column_stack(steered(count, dt))
     stats = usual_of(c, inputs, dt, median_speed=ahead, yaw_rate_rms=turning)
@@ -105,7 +105,7 @@ def judged(
 ) -> Pair:
     """The errors over the runs drawn."""
     own = 5 if settings.chosen == "pseudo-input" else 3
-    found: tuple[list, list] = [], []
+    result: tuple[list, list] = [], []
     new = make_filter(c, noise, stats, settings)
     for true, measured in drawn:
         signals = signals_of(measured * seen_of(len(measured)), *inputs.T, stats.dt_secs)
@@ -113,10 +113,10 @@ def judged(
         _, trace, smoothed = smoothed_run(filtering, signals)
         expected = true if own == 5 else told_of(c, true[:, :3], *inputs.T, stats.dt_secs)
         ways = (trace.states, trace.covariances), smoothed
-        for kept, (x, P) in zip(found, ways, strict=True):
+        for kept, (x, P) in zip(result, ways, strict=True):
             outputs, _, _ = filtering.to_estimates(signals, last_inputs(signals), x, P)
             kept.append((x[:, :own] - true[:, :own], P[:, :own, :own], outputs - expected))
-    filtered, smoothed = (Ensemble(*map(np.array, zip(*runs, strict=True))) for runs in found)
+    filtered, smoothed = (Ensemble(*map(np.array, zip(*runs, strict=True))) for runs in result)
     return filtered, smoothed
 
 
@@ -124,7 +124,7 @@ CASES = {
     "pseudo-input": (linear, "pseudo-input", OF_FIVE),
     "extended": (linear, "extended", OF_THREE),
     "extended among waves": (linear, "extended", AMONG_WAVES),
-    "extended, the ship as she is": (nonlinear, "extended", OF_THREE),
+    "extended, the nonlinear ship": (nonlinear, "extended", OF_THREE),
     "steady-state": (linear, "steady-state", OF_THREE),
     "steady-state among waves": (linear, "steady-state", AMONG_WAVES),
     "quality": (linear, "quality", OF_THREE),

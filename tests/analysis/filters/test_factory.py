@@ -43,7 +43,7 @@ def made(vessel: Vessel, stats: SignalStats, kind: str, wave: Wave | None = None
 
 
 def straight_run(vessel: Vessel, seed: int, count: int = 1000) -> Signals:
-    """A ship on her course, measured with white noise."""
+    """A ship on a straight course, measured with white noise."""
     speed = steady_speed(vessel.coefficients, 80.0)
     measured = np.random.default_rng(seed).standard_normal((count, 2)) * STDS + [0.0, speed]
     return signals_of(measured, np.zeros(count), np.full(count, 80.0), 0.1)
@@ -83,11 +83,11 @@ def test_rejected_sample_is_treated_as_missing(
     spiked = off_by(clean, name, slice(500, 503), 20 * STDS[output])
     missing = off_by(clean, name, slice(500, 503), np.nan)
     assert filtered(vessel, spiked, kind).rejected.sum() == 3
-    stats, found = signal_stats(clean, vessel.coefficients), []
+    stats, result = signal_stats(clean, vessel.coefficients), []
     for signals in (spiked, missing):
         filtering = made(vessel, stats, kind)
-        found.append(filtering.trace(signals, last_inputs(signals)))
-    (estimates, trace), (expected, without) = found
+        result.append(filtering.trace(signals, last_inputs(signals)))
+    (estimates, trace), (expected, without) = result
     assert np.array_equal(estimates.states, expected.states)
     assert np.array_equal(estimates.stds, expected.stds)
     for part, values in vars(without).items():
@@ -113,13 +113,13 @@ def test_a_step_that_lasts_is_believed_after_five_samples(
     vessel: Vessel, kind: str, output: int, name: str
 ) -> None:
     stepped = off_by(straight_run(vessel, 1), name, slice(500, None), 20 * STDS[output])
-    found = filtered(vessel, stepped, kind)
+    result = filtered(vessel, stepped, kind)
     assert MAX_REJECTED_IN_A_ROW == 5
-    at = np.flatnonzero(found.rejected[:530, output])
+    at = np.flatnonzero(result.rejected[:530, output])
     assert at.tolist() == [500 + k for k in range(MAX_REJECTED_IN_A_ROW)]
-    assert not found.rejected[:, 1 - output].any()
+    assert not result.rejected[:, 1 - output].any()
     state = (0, 3)[output]
-    assert found.states[-1, state] - found.states[499, state] > 10 * STDS[output]
+    assert result.states[-1, state] - result.states[499, state] > 10 * STDS[output]
 
 
 @of_each_kind
@@ -146,10 +146,10 @@ def log(vessel: Vessel) -> TrialLog:
     return as_log(simulate(vessel, "zigzag-20-20", duration_secs=150.0, seed=3, sensors=sensors))
 
 
-def same(found: Estimates, expected: Estimates) -> None:
+def same(result: Estimates, expected: Estimates) -> None:
     for name, values in vars(expected).items():
         if values is not None:
-            assert np.array_equal(getattr(found, name), values, equal_nan=True), name
+            assert np.array_equal(getattr(result, name), values, equal_nan=True), name
 
 
 @of_each
@@ -172,13 +172,13 @@ def test_a_trace_is_kept_without_changing_what_is_said(
     signals = resample(log, channels=NAMES)
     stats = signal_stats(signals, vessel.coefficients)
     filtering = made(vessel, stats, kind, wave)
-    found, trace = filtering.trace(signals, last_inputs(signals))
-    same(found, made(vessel, stats, kind, wave).step(signals, last_inputs(signals)))
+    result, trace = filtering.trace(signals, last_inputs(signals))
+    same(result, made(vessel, stats, kind, wave).step(signals, last_inputs(signals)))
     estimates = filtering.to_estimates(
         signals, last_inputs(signals), trace.states, trace.covariances
     )
     for name, values in zip(("states", "stds", "wave"), estimates, strict=True):
-        expected = getattr(found, name)
+        expected = getattr(result, name)
         assert values is expected is None or np.array_equal(values, expected), name
 
 
@@ -221,10 +221,10 @@ def test_where_a_log_is_cut_changes_nothing(
     stats = signal_stats(signals, vessel.coefficients)
     filtering = made(vessel, stats, kind)
     chunks = held_throughout(resample_chunks(parted.chunks(), clock), InputHold(clock))
-    found = [filtering.step(held, following) for _, held, following in chunks]
-    assert len(found) > 5
+    result = [filtering.step(held, following) for _, held, following in chunks]
+    assert len(result) > 5
     whole = made(vessel, stats, kind).step(signals, last_inputs(signals))
-    same(together(found), whole)
+    same(together(result), whole)
 
 
 @of_each
@@ -255,9 +255,9 @@ def test_the_inputs_are_never_asked_for_beyond_the_instant_that_follows(
     """What follows a chunk changes the next estimates, not those of the chunk."""
     signals = straight_run(vessel, 2, 200)
     stats = signal_stats(signals, vessel.coefficients)
-    found = [
+    result = [
         made(vessel, stats, kind).step(signals, {"rudder": delta, "rpm": 80.0})
         for delta in (0.0, 0.1)
     ]
-    assert np.array_equal(found[0].states[:-1], found[1].states[:-1])
-    assert np.array_equal(found[0].states[:, [0, 1, 3]], found[1].states[:, [0, 1, 3]])
+    assert np.array_equal(result[0].states[:-1], result[1].states[:-1])
+    assert np.array_equal(result[0].states[:, [0, 1, 3]], result[1].states[:, [0, 1, 3]])

@@ -21,11 +21,11 @@ TURNING, AHEAD = 4e-3, 7.0
 
 
 def usual_at(c: Coefficients, dt: float, intervals: tuple[int, int] = (1, 1)) -> SignalStats:
-    """A ship that turns and goes ahead as usual, and how often she is measured."""
+    """A ship that turns at an ordinary rate and speed, and the intervals of its sensors."""
     still = signals_of(np.ones((40, 2)), np.zeros(40), np.full(40, 80.0), dt)
-    found = signal_stats(still, c)
+    result = signal_stats(still, c)
     return replace(
-        found, intervals=np.array(intervals, float), yaw_rate_rms=TURNING, median_speed=AHEAD
+        result, intervals=np.array(intervals, float), yaw_rate_rms=TURNING, median_speed=AHEAD
     )
 
 
@@ -56,7 +56,7 @@ def best_gain(of: LinearAxis) -> np.ndarray:
 
 
 def stds(of: LinearAxis, gain: np.ndarray) -> np.ndarray:
-    """How far off a filter of that gain is in the end, all in units of the process noise."""
+    """Stationary error variance of a filter of that gain, in units of the process noise."""
     F, Q, r = from_sample_to_sample(of)
     unit = np.sqrt(np.diag(Q))
     kept = np.eye(len(F)) - np.outer(gain, of.C[0])
@@ -65,8 +65,8 @@ def stds(of: LinearAxis, gain: np.ndarray) -> np.ndarray:
     return np.sqrt(np.diag(P))
 
 
-def same_poles(found: np.ndarray, wanted: np.ndarray) -> bool:
-    return bool(np.abs(np.poly(found) - np.poly(wanted)).max() < 1e-8)
+def same_poles(result: np.ndarray, wanted: np.ndarray) -> bool:
+    return bool(np.abs(np.poly(result) - np.poly(wanted)).max() < 1e-8)
 
 
 def test_a_channel_is_the_ship_about_her_usual_motion(vessel: Vessel) -> None:
@@ -242,9 +242,9 @@ def test_a_per_tick_gain_places_the_same_poles_whatever_the_motion(
     F = block_diag(expm(J[:2, :2] * dt), between)
     at = [0, 1, *range(3, len(c))]
     kept = np.eye(len(F)) - np.outer(K[at], c[at])
-    found, wanted = (np.sort_complex(p) for p in (np.linalg.eigvals(kept @ F), poles))
+    result, wanted = (np.sort_complex(p) for p in (np.linalg.eigvals(kept @ F), poles))
     assert K[2] == 0.0
-    assert np.abs(found - wanted).max() < 1e-8
+    assert np.abs(result - wanted).max() < 1e-8
     among[2] = np.exp(-0.05 * dt)
     K = placed(J, between, np.eye(len(c))[2], among, dt, 1)
     assert (1 - K[2]) * np.exp(J[2, 2] * dt) == pytest.approx(among[2].real, rel=1e-12)

@@ -71,18 +71,18 @@ def test_the_order_in_which_two_outputs_are_taken_in_does_not_matter(seed: int) 
     rng = np.random.default_rng(seed)
     x, P, C = drawn(rng, 3)
     y, r = rng.standard_normal(2), np.array([0.2, 3.0])
-    found = []
+    result = []
     for order in ((0, 1), (1, 0)):
         state, covariance = x, P
         for output in order:
             state, covariance = taken(state, covariance, C[output], y[output], r[output])
-        found.append((state, covariance))
+        result.append((state, covariance))
     S = C @ P @ C.T + np.diag(r)
     gain = np.linalg.solve(S, C @ P).T
-    found.append((x + gain @ (y - C @ x), P - gain @ C @ P))
-    for state, covariance in found[1:]:
-        assert state == pytest.approx(found[0][0], rel=1e-9, abs=1e-9)
-        assert np.abs((covariance - found[0][1]) / units(P)).max() < 1e-9
+    result.append((x + gain @ (y - C @ x), P - gain @ C @ P))
+    for state, covariance in result[1:]:
+        assert state == pytest.approx(result[0][0], rel=1e-9, abs=1e-9)
+        assert np.abs((covariance - result[0][1]) / units(P)).max() < 1e-9
 
 
 @seeds

@@ -106,8 +106,8 @@ def test_a_filter_is_the_joint_gaussian_given_what_was_measured_until_then(
 @OFTEN
 @given(run=runs())
 def test_a_smoother_is_the_joint_gaussian_given_all_that_was_measured(kind: str, run: Run) -> None:
-    _, _, found = smoothed_run(run.filtering(kind), run.signals)
-    assert max(apart(found, run.by_force(kind).given(run.measured))) < 1e-9
+    _, _, result = smoothed_run(run.filtering(kind), run.signals)
+    assert max(apart(result, run.by_force(kind).given(run.measured))) < 1e-9
 
 
 @pytest.mark.parametrize("kind", FILTERS)
@@ -122,5 +122,5 @@ def test_with_everything_missing_a_filter_is_the_ships_own_motion(kind: str, run
     path = sailed(run.c, start, run.delta, run.n, run.dt)
     expected = told_of(run.c, path, run.delta, run.n, run.dt)
     assert np.isnan(estimates.innovations).all()
-    for found, true in zip(estimates.states[:-1].T, expected[:-1].T, strict=True):
-        assert found == pytest.approx(true, abs=1e-7 * np.abs(true).max())
+    for result, true in zip(estimates.states[:-1].T, expected[:-1].T, strict=True):
+        assert result == pytest.approx(true, abs=1e-7 * np.abs(true).max())

@@ -75,9 +75,9 @@ def test_under_white_noise_the_true_models_innovations_are_white_and_as_large_as
     _, estimates = filtered(trial, vessel)
     for i, name in enumerate(PAPER_OUTPUTS):
         e, s = estimates.innovations[:, i], estimates.innovation_stds[:, i]
-        found = assess_innovations(name, "", e, s, noise_measured=True)
-        assert found.white, found
-        assert found.consistent, found
+        result = assess_innovations(name, "", e, s, noise_measured=True)
+        assert result.white, result
+        assert result.consistent, result
 
 
 def test_the_papers_slow_wave_makes_the_innovations_coloured(
@@ -181,14 +181,14 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_is_a_
     filtering = make_filter(c, noise, stats, STATED)
     estimates, trace = filtering.trace(signals, last_inputs(signals))
     expected = told_of(c, sailed(c, start, delta, n, dt), delta, n, dt)
-    for found, true in zip(estimates.states[:-1].T, expected[:-1].T, strict=True):
-        assert found == pytest.approx(true, abs=1e-8 * np.abs(true).max())
+    for result, true in zip(estimates.states[:-1].T, expected[:-1].T, strict=True):
+        assert result == pytest.approx(true, abs=1e-8 * np.abs(true).max())
     run = five_states(straight(c), noise, stats, delta[:1], n[:1])
     P = trace.covariances[0]
     np.testing.assert_allclose(P, run.P, rtol=1e-12)
-    for found in trace.covariances[1:]:
+    for result in trace.covariances[1:]:
         P = run.F @ P @ run.F.T + run.Q
-        np.testing.assert_allclose(found, P, rtol=1e-9)
+        np.testing.assert_allclose(result, P, rtol=1e-9)
 
 
 def test_as_printed_the_jump_of_the_rudder_is_missing_from_the_yaw_jerk(vessel: Vessel) -> None:

@@ -47,10 +47,10 @@ def signals(vessel: Vessel) -> Signals:
     sensors = suite("white", {"speed.rate_hz": 2.0})
     trial = simulate(vessel, "zigzag-20-20", duration_secs=120.0, seed=5, sensors=sensors)
     names = ("yaw_rate", "speed", "rudder", "rpm")
-    found = resample(TrialLog("trial", trial.channels), channels=names)
-    yaw_rate = found["yaw_rate"].copy()
+    computed = resample(TrialLog("trial", trial.channels), channels=names)
+    yaw_rate = computed["yaw_rate"].copy()
     yaw_rate[300:420] = np.nan
-    return replace(found, values=dict(found.values) | {"yaw_rate": yaw_rate})
+    return replace(computed, values=dict(computed.values) | {"yaw_rate": yaw_rate})
 
 
 def made(vessel: Vessel, signals: Signals, kind: str, wave: Wave | None = None) -> Filter:
@@ -79,8 +79,8 @@ def test_a_joint_gaussian_given_all_data_agrees_on_a_short_linear_run(
     run = five_states if kind == "pseudo-input" else three_states
     states, covariances = run(c, noise, stats, delta, n).given(measured)
     own = 5 if kind == "pseudo-input" else 3
-    found = x[:, :own], P[:, :own, :own]
-    assert max(apart(found, (states[:, :own], covariances[:, :own, :own]))) < 1e-9
+    computed = x[:, :own], P[:, :own, :own]
+    assert max(apart(computed, (states[:, :own], covariances[:, :own, :own]))) < 1e-9
 
 
 def by_rauch_tung_striebel(trace: Trace, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -104,12 +104,12 @@ def test_rauch_tung_and_striebel_agree_on_a_nonlinear_run(
 ) -> None:
     c, noise = vessel.coefficients, NOISES[kind]
     stats = signal_stats(signals, c)
-    _, trace, found = smoothed_run(made(vessel, signals, kind), signals)
+    _, trace, computed = smoothed_run(made(vessel, signals, kind), signals)
     if kind == "extended":
         Q = pushes(c, noise, stats)
     else:
         Q = five_states(c, noise, stats, np.zeros(1), np.zeros(1)).Q
-    assert max(apart(found, by_rauch_tung_striebel(trace, Q))) < 1e-8
+    assert max(apart(computed, by_rauch_tung_striebel(trace, Q))) < 1e-8
 
 
 def smoothed_in_chunks(
@@ -206,26 +206,26 @@ def test_the_settings_smooth_what_is_told_and_leave_the_innovations_alone(
 ) -> None:
     c, noise = vessel.coefficients, NOISES[kind]
     plain = filter_states(signals, c, noise, FilterSettings(kind=kind))
-    found = filter_states(signals, c, noise, FilterSettings(kind=kind, smooth=True))
+    computed = filter_states(signals, c, noise, FilterSettings(kind=kind, smooth=True))
     for name in ("innovations", "innovation_stds", "rejected"):
-        assert np.array_equal(getattr(found, name), getattr(plain, name), equal_nan=True), name
+        assert np.array_equal(getattr(computed, name), getattr(plain, name), equal_nan=True), name
     filtering = made(vessel, signals, kind)
     _, _, (x, P) = smoothed_run(filtering, signals)
     states, stds, _ = filtering.to_estimates(signals, last_inputs(signals), x, P)
-    assert np.array_equal(found.states, states)
-    assert np.array_equal(found.stds, stds)
-    assert not np.array_equal(found.states, plain.states)
+    assert np.array_equal(computed.states, states)
+    assert np.array_equal(computed.stds, stds)
+    assert not np.array_equal(computed.states, plain.states)
 
 
 def test_a_smoothed_wave_is_told_too(vessel: Vessel, signals: Signals) -> None:
     c, noise = vessel.coefficients, replace(NOISES["extended"], wave=WAVE)
     settings = FilterSettings(kind="extended", smooth=True)
-    found = filter_states(signals, c, noise, settings)
+    computed = filter_states(signals, c, noise, settings)
     filtering = made(vessel, signals, "extended", WAVE)
     estimates, trace, (x, _) = smoothed_run(filtering, signals)
-    assert np.array_equal(found.wave, x[:, 3:] @ filtering.outputs[0, 3:])
+    assert np.array_equal(computed.wave, x[:, 3:] @ filtering.outputs[0, 3:])
     nothing = SmoothingPass(filtering.outputs)
     nothing.add(trace)
     (end,) = nothing.result()
     again = smoothed(filtering, signals, last_inputs(signals), estimates, trace, end)
-    assert np.array_equal(again.wave, found.wave)
+    assert np.array_equal(again.wave, computed.wave)

@@ -86,8 +86,8 @@ def test_a_step_is_the_ships_own(vessel: Vessel, seed: int, dt: float) -> None:
         return rates(c, s, delta + delta_dot * t, delta_dot, n + n_dot * t)
 
     exact = solve_ivp(moving, (0, dt), x, "DOP853", rtol=1e-13, atol=1e-18).y[:, -1]
-    found = step(c, x, (delta, delta_dot, n, n_dot), dt)
-    np.testing.assert_allclose(found, exact, rtol=1e-7 * dt**4 + 1e-10)
+    result = step(c, x, (delta, delta_dot, n, n_dot), dt)
+    np.testing.assert_allclose(result, exact, rtol=1e-7 * dt**4 + 1e-10)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -97,8 +97,8 @@ def test_the_transition_is_the_derivative_of_the_step(vessel: Vessel, seed: int)
     F = np.zeros((3, 3))
     predict_ship(c, x.copy(), F, *u, dt)
     for j, h in enumerate((1e-6, 1e-6, 1e-4)):
-        off = h * np.eye(3)[j]
-        slope = (step(c, x + off, u, dt) - step(c, x - off, u, dt)) / (2 * h)
+        shift = h * np.eye(3)[j]
+        slope = (step(c, x + shift, u, dt) - step(c, x - shift, u, dt)) / (2 * h)
         assert F[:, j] / UNITS == pytest.approx(slope / UNITS, rel=1e-6, abs=1e-6 / UNITS[j])
 
 
@@ -121,8 +121,8 @@ def test_a_joint_gaussian_by_brute_force_agrees_on_a_short_linear_run(
     estimates, trace = make_filter(c, noise, stats, EXTENDED).trace(signals, last_inputs(signals))
     run = three_states(c, noise, stats, delta, n)
     states, covariances = run.filtered(measured)
-    found = trace.states[:, :3], trace.covariances[:, :3, :3]
-    assert max(apart(found, (states[:, :3], covariances[:, :3, :3]))) < 1e-9
+    result = trace.states[:, :3], trace.covariances[:, :3, :3]
+    assert max(apart(result, (states[:, :3], covariances[:, :3, :3]))) < 1e-9
     variances = np.diagonal(covariances, axis1=1, axis2=2)
     stds = np.sqrt(variances[:, :3])
     np.testing.assert_allclose(estimates.stds[:, [0, 1, 3]], stds, rtol=1e-9)
@@ -167,15 +167,15 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_grows
     estimates, trace = filtering.trace(signals, last_inputs(signals))
     path = sailed(c, start, delta, n, dt)
     expected = told_of(c, path, delta, n, dt)
-    for found, true in zip(estimates.states.T, expected.T, strict=True):
-        assert found == pytest.approx(true, abs=1e-9 * np.abs(true).max())
+    for result, true in zip(estimates.states.T, expected.T, strict=True):
+        assert result == pytest.approx(true, abs=1e-9 * np.abs(true).max())
     P, Q = trace.covariances[0], pushes(c, NOISE, stats)
     for k in range(count - 1):
         u = delta[k], (delta[k + 1] - delta[k]) / dt, n[k], (n[k + 1] - n[k]) / dt
         F = transition(c, path[k], u, dt)
         P = F @ P @ F.T + Q
-        found = trace.states[k + 1], trace.covariances[k + 1]
-        assert max(apart(found, (path[k + 1], P))) < 1e-9
+        result = trace.states[k + 1], trace.covariances[k + 1]
+        assert max(apart(result, (path[k + 1], P))) < 1e-9
 
 
 def test_every_gain_begins_as_unsure_as_the_signals_vary(vessel: Vessel) -> None:
@@ -251,23 +251,23 @@ def test_any_other_gain_is_kept_in_a_straight_ship_once_the_best_one_has_fallen_
     filtering = make_filter(c, NOISE, stats, settings)
     estimates, trace = filtering.trace(signals, last_inputs(signals))
     run = three_states(c, NOISE, stats, delta, n)
-    off, P, settled, taken = np.zeros(3), run.P, [False, False], [0, 0]
+    deviation, P, handed_over, taken = np.zeros(3), run.P, [False, False], [0, 0]
     poles = [np.abs(designed_gain(settings, one)[1]).max() for one in (of_yaw, of_surge)]
     for k in range(count):
         for output in np.flatnonzero(np.isfinite(measured[k])):
             C = run.C[output]
             best = P @ C / (C @ P @ C + run.r[output])
             taken[output] += 1
-            settled[output] |= bool(C @ best <= 1.5 * C @ K[output])
-            settled[output] |= bool(poles[output] ** taken[output] < np.exp(-1))
-            gain = K[output] if settled[output] else best
+            handed_over[output] |= bool(C @ best <= 1.5 * C @ K[output])
+            handed_over[output] |= bool(poles[output] ** taken[output] < np.exp(-1))
+            gain = K[output] if handed_over[output] else best
             kept = np.eye(3) - np.outer(gain, C)
-            off = off + gain * (measured[k, output] - C @ (run.mean[k] + off))
+            deviation = deviation + gain * (measured[k, output] - C @ (run.mean[k] + deviation))
             P = kept @ P @ kept.T + run.r[output] * np.outer(gain, gain)
-        found = trace.states[k], trace.covariances[k]
-        assert max(apart(found, (run.mean[k] + off, P))) < 1e-9
-        off, P = run.F @ off, run.F @ P @ run.F.T + run.Q
-    assert settled == [True, True]
+        result = trace.states[k], trace.covariances[k]
+        assert max(apart(result, (run.mean[k] + deviation, P))) < 1e-9
+        deviation, P = run.F @ deviation, run.F @ P @ run.F.T + run.Q
+    assert handed_over == [True, True]
     assert not estimates.rejected.any()
 
 
@@ -287,9 +287,9 @@ def test_the_gains_taken_are_those_designed_for_the_sensors_own_interval(
     filtering = make_filter(c, noise, stats, settings)
     _, trace = filtering.trace(signals, last_inputs(signals))
     designed = np.delete(trace.gains[::4, 0], 2, axis=1), trace.gains[::2, 1, 2:3]
-    for found, channel in zip(designed, (yaw, surge), strict=True):
+    for result, channel in zip(designed, (yaw, surge), strict=True):
         gain, _ = designed_gain(settings, channel)
-        once_settled = found[len(found) // 2 :]
+        once_settled = result[len(result) // 2 :]
         np.testing.assert_allclose(once_settled, np.tile(gain, (len(once_settled), 1)), rtol=1e-7)
 
 
@@ -323,9 +323,9 @@ def test_under_white_noise_the_true_models_innovations_are_white_and_as_large_as
     estimates = filter_states(signals, vessel.coefficients, *stated(vessel.coefficients, signals))
     for i, name in enumerate(PAPER_OUTPUTS):
         e, s = estimates.innovations[:, i], estimates.innovation_stds[:, i]
-        found = assess_innovations(name, "", e, s, noise_measured=True)
-        assert found.white, found
-        assert found.consistent, found
+        result = assess_innovations(name, "", e, s, noise_measured=True)
+        assert result.white, result
+        assert result.consistent, result
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -351,7 +351,7 @@ def test_without_noise_the_filter_follows_the_truth_in_all_five_states(
 def test_missing_samples_are_predicted_through_and_the_doubt_grows(
     zigzag: SimulatedTrial, vessel: Vessel, kind: str
 ) -> None:
-    """Not for ever: a ship that turns faster forgets faster where she was."""
+    """Not for ever: the memory of a ship that turns faster is shorter."""
     signals, c = on_one_clock(zigzag), vessel.coefficients
     noise = replace(stated(c, signals)[0], process_ratio=np.array([1e-4, 1e-3]))
     holed = {name: values.copy() for name, values in signals.values.items()}
@@ -359,9 +359,9 @@ def test_missing_samples_are_predicted_through_and_the_doubt_grows(
     signals = replace(signals, values=holed)
     estimates = filter_states(signals, c, noise, FilterSettings(kind=kind))
     assert np.all(np.isnan(estimates.innovations[2000:2600, 0]))
-    doubt = estimates.stds[1999:2600, 0]
-    assert np.all(np.diff(doubt[:200]) > 0)
-    assert np.all(doubt[200:] > 1.5 * doubt[0])
+    std = estimates.stds[1999:2600, 0]
+    assert np.all(np.diff(std[:200]) > 0)
+    assert np.all(std[200:] > 1.5 * std[0])
     error = errors(zigzag, signals, estimates.states[:, 0], "yaw_rate")
     assert np.abs(error[2000:2600]).max() < 4 * estimates.stds[2599, 0]
 
@@ -379,9 +379,9 @@ def test_a_wave_that_is_told_of_is_told_from_the_ships_own_turning(
     )
     noise = NoiseModel(np.array([9e-5, 0.1]), np.array([1e-4, 1e-3]))
     rough = replace(noise, wave=replace(WAVE, std=1e-3))
-    off = []
+    stds = []
     for assumed in (noise, rough):
         estimates = filter_states(signals, c, assumed, FilterSettings(kind=kind))
-        off.append(np.std(errors(trial, signals, estimates.states[:, 0], "yaw_rate")[200:]))
+        stds.append(np.std(errors(trial, signals, estimates.states[:, 0], "yaw_rate")[200:]))
     assert np.std((estimates.wave - waves)[200:]) < 0.2 * np.std(waves)
-    assert off[1] < 0.25 * off[0]
+    assert stds[1] < 0.25 * stds[0]

@@ -97,8 +97,8 @@ def unlikelihood(
     ratios[output] = ratio
     tuned = replace(noise, process_ratio=ratios)
     filtering = make_filter(c, tuned, stats, FilterSettings(kind=kind))
-    found = filtering.step(stats.head, last_inputs(stats.head))
-    e, s = found.innovations[:, output], found.innovation_stds[:, output]
+    result = filtering.step(stats.head, last_inputs(stats.head))
+    e, s = result.innovations[:, output], result.innovation_stds[:, output]
     known = np.isfinite(e)
     return float(np.sum((e[known] / s[known]) ** 2 + np.log(2 * np.pi * s[known] ** 2)))
 
@@ -119,8 +119,8 @@ def test_what_nobody_states_makes_the_innovations_likeliest(
         near = noise.process_ratio[output] * np.array([0.8, 1.25])
         tried = [*grid, *near[near > grid[0]]]
         score = [unlikelihood(stats, c, others, kind, output, ratio) for ratio in tried]
-        found = unlikelihood(stats, c, others, kind, output, noise.process_ratio[output])
-        assert found < min(score) + 0.5  # the search ends within a twentieth of the ratio
+        result = unlikelihood(stats, c, others, kind, output, noise.process_ratio[output])
+        assert result < min(score) + 0.5  # the search ends within a twentieth of the ratio
 
 
 @pytest.mark.parametrize("kind", LIKELIEST)
@@ -142,9 +142,9 @@ def test_a_ratio_that_a_run_was_drawn_with_is_found_again(
         run = replace(three_states(c, noise, stats, *inputs[:1].T), mean=path)
     _, measured = run.drawn(np.random.default_rng(seed))
     settings = FilterSettings(kind=kind, yaw_rate_std=STDS[0], speed_std=STDS[1])
-    found = noise_of(signal_stats(signals_of(measured, *inputs.T, dt), c), c, settings)
-    off = np.log10(found.process_ratio / noise.process_ratio)
-    assert off == pytest.approx([0.0, 0.0], abs=0.15)
+    result = noise_of(signal_stats(signals_of(measured, *inputs.T, dt), c), c, settings)
+    log_error = np.log10(result.process_ratio / noise.process_ratio)
+    assert log_error == pytest.approx([0.0, 0.0], abs=0.15)
 
 
 @pytest.mark.parametrize("kind", FILTERS[1:4])
@@ -152,10 +152,10 @@ def test_where_the_gain_is_not_the_best_the_noise_is_the_extended_filters(
     signals: Signals, vessel: Vessel, kind: str
 ) -> None:
     head = signals.part(0, 1500)
-    found = noise_from_log(head, vessel.coefficients, kind=kind)
+    result = noise_from_log(head, vessel.coefficients, kind=kind)
     expected = noise_from_log(head, vessel.coefficients, kind="extended")
-    assert np.array_equal(found.process_ratio, expected.process_ratio)
-    assert np.array_equal(found.measurement_std, expected.measurement_std)
+    assert np.array_equal(result.process_ratio, expected.process_ratio)
+    assert np.array_equal(result.measurement_std, expected.measurement_std)
 
 
 @pytest.mark.parametrize("kind", LIKELIEST)
@@ -214,8 +214,8 @@ def test_a_wave_that_is_stated_is_told_of_as_stated(signals: Signals, vessel: Ve
         signals, vessel.coefficients, kind="extended", process_ratio=RATIO, wave=True, **given
     )
     assert noise.wave is not None
-    found = noise.wave.frequency, noise.wave.damping, noise.wave.std
-    assert found == pytest.approx((0.7, 0.2, 1e-5))
+    result = noise.wave.frequency, noise.wave.damping, noise.wave.std
+    assert result == pytest.approx((0.7, 0.2, 1e-5))
 
 
 def test_with_its_wave_told_of_a_log_takes_less_process_noise(

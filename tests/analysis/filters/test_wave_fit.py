@@ -79,21 +79,21 @@ def at_sea(
 
 
 def fitted(residual: FloatArray, dt: float, interval: float = 1.0, **stated: float) -> Wave:
-    found = fit_wave(residual, dt, interval, **stated)
-    assert found is not None
-    return found
+    result = fit_wave(residual, dt, interval, **stated)
+    assert result is not None
+    return result
 
 
-def off(found: Wave, frequency: float, damping: float, std: float) -> FloatArray:
-    """Logarithms of found over true."""
-    return np.log([found.frequency / frequency, found.damping / damping, found.std / std])
+def log_errors(result: Wave, frequency: float, damping: float, std: float) -> FloatArray:
+    """Logarithms of the estimates over the true values."""
+    return np.log([result.frequency / frequency, result.damping / damping, result.std / std])
 
 
 def share_within(errors: FloatArray, frequency: float, damping: float, std: float) -> FloatArray:
     return np.mean(np.abs(errors) <= np.log([frequency, damping, std]), axis=0)
 
 
-# ---- what is found
+# ---- what is estimated
 
 
 def information(n: int, dt: float, true: FloatArray) -> FloatArray:
@@ -121,10 +121,10 @@ def test_a_clear_waves_filter_is_found_nearly_as_well_as_can_be(
     secs: float, dt: float, frequency: float, damping: float, std: float
 ) -> None:
     true = (frequency, damping, std)
-    found = [fitted(at_sea(seed, secs, dt, *true), dt) for seed in range(8)]
-    errors = np.array([off(wave, *true) for wave in found])
+    result = [fitted(at_sea(seed, secs, dt, *true), dt) for seed in range(8)]
+    errors = np.array([log_errors(wave, *true) for wave in result])
     assert share_within(errors, 1.05, 1.6, 1.15).min() >= MOST
-    assert all(wave.stands_out for wave in found)
+    assert all(wave.stands_out for wave in result)
     bound = np.linalg.inv(information(int(secs / dt), dt, np.array(true))).diagonal()[:3]
     assert np.all(np.sqrt(np.mean(errors**2, axis=0)) < 1.5 * np.sqrt(bound))
 
@@ -134,17 +134,17 @@ def test_a_short_logs_or_a_broad_waves_filter_is_found_less_exactly(
     secs: float, dt: float, frequency: float, damping: float, std: float
 ) -> None:
     true = (frequency, damping, std)
-    found = [fitted(at_sea(seed, secs, dt, *true), dt) for seed in range(8)]
-    errors = np.array([off(wave, *true) for wave in found])
+    result = [fitted(at_sea(seed, secs, dt, *true), dt) for seed in range(8)]
+    errors = np.array([log_errors(wave, *true) for wave in result])
     assert share_within(errors, 1.12, 2.2, 1.25).min() >= MOST
-    assert np.mean([wave.stands_out for wave in found]) >= MOST
+    assert np.mean([wave.stands_out for wave in result]) >= MOST
 
 
 def test_the_fitted_filter_has_the_spectrum_that_welch_sees() -> None:
     dt, true = 0.2, (0.7, 0.12, 1.5)
     residual = at_sea(3, 8000.0, dt, *true)
-    found = fitted(residual, dt)
-    shaping = wave_filter(found.std**2, found.frequency, found.damping)
+    result = fitted(residual, dt)
+    shaping = wave_filter(result.std**2, result.frequency, result.damping)
     hertz, spectrum = welch(residual, 1 / dt, nperseg=2048)
     kept = (hertz > 0.04) & (hertz < 1.0)  # |H|^2 is not aliased there
     _, H = freqs(shaping.numerator, shaping.denominator, 2 * pi * hertz[kept])
@@ -164,18 +164,18 @@ def test_a_regular_wave_has_its_frequency_its_std_and_little_damping(
     for seed in range(3):
         rng = np.random.default_rng(seed)
         wave = std * np.sqrt(2) * np.sin(frequency * time_secs + rng.uniform(0, 2 * pi))
-        found = fitted(wave + rng.standard_normal(len(wave)), dt)
-        assert abs(found.frequency - frequency) < 0.5 * 2 * pi / secs
-        assert found.std == pytest.approx(std, rel=0.1)
-        assert found.damping < 2 / (frequency * min(secs, 16_384 * dt))
-        assert found.stands_out
+        result = fitted(wave + rng.standard_normal(len(wave)), dt)
+        assert abs(result.frequency - frequency) < 0.5 * 2 * pi / secs
+        assert result.std == pytest.approx(std, rel=0.1)
+        assert result.damping < 2 / (frequency * min(secs, 16_384 * dt))
+        assert result.stands_out
 
 
 def test_a_regular_wave_without_noise_is_found_too() -> None:
-    found = fitted(3e-3 * np.sin(0.7 * np.arange(0, 500, 0.1)), 0.1)
-    assert found.frequency == pytest.approx(0.7, abs=0.1 * 2 * pi / 500)
-    assert found.std == pytest.approx(3e-3 / np.sqrt(2), rel=0.02)
-    assert found.stands_out
+    result = fitted(3e-3 * np.sin(0.7 * np.arange(0, 500, 0.1)), 0.1)
+    assert result.frequency == pytest.approx(0.7, abs=0.1 * 2 * pi / 500)
+    assert result.std == pytest.approx(3e-3 / np.sqrt(2), rel=0.02)
+    assert result.stands_out
 
 
 def with_gaps(residual: FloatArray) -> FloatArray:
@@ -201,25 +201,25 @@ def test_gaps_and_a_slow_sensor_do_no_harm(
     sensor: Callable[[FloatArray], FloatArray], interval: float, frequency: float
 ) -> None:
     true = (frequency, 0.1, 1.5)
-    found = [fitted(sensor(at_sea(s, 1500.0, 0.2, *true)), 0.2, interval) for s in range(4)]
-    errors = np.array([off(wave, *true) for wave in found])
+    result = [fitted(sensor(at_sea(s, 1500.0, 0.2, *true)), 0.2, interval) for s in range(4)]
+    errors = np.array([log_errors(wave, *true) for wave in result])
     assert share_within(errors, 1.05, 1.6, 1.15).min() >= MOST
-    assert all(wave.stands_out for wave in found)
+    assert all(wave.stands_out for wave in result)
 
 
 def test_a_wave_is_found_above_what_the_model_does_not_know_of_the_ship() -> None:
     dt, true = 0.2, (0.8, 0.1, 1.0)
     for seed in range(6):
         red = red_of(np.random.default_rng(100 + seed), 7500, dt, 0.03, 3.0)
-        found = fitted(at_sea(seed, 1500.0, dt, *true) + red, dt)
-        assert np.all(np.abs(off(found, *true)) < np.log([1.05, 1.6, 1.15]))
-        assert found.stands_out
+        result = fitted(at_sea(seed, 1500.0, dt, *true) + red, dt)
+        assert np.all(np.abs(log_errors(result, *true)) < np.log([1.05, 1.6, 1.15]))
+        assert result.stands_out
 
 
 def test_a_slow_wave_stands_out_in_a_few_periods() -> None:
-    found = [fitted(at_sea(s, 300.0, 0.2, 0.3, 0.05, 1.0), 0.2) for s in range(8)]
-    assert np.mean([wave.stands_out for wave in found]) >= MOST
-    assert [wave.frequency for wave in found] == pytest.approx([0.3] * 8, rel=0.1)
+    result = [fitted(at_sea(s, 300.0, 0.2, 0.3, 0.05, 1.0), 0.2) for s in range(8)]
+    assert np.mean([wave.stands_out for wave in result]) >= MOST
+    assert [wave.frequency for wave in result] == pytest.approx([0.3] * 8, rel=0.1)
 
 
 def test_no_unit_matters() -> None:
@@ -238,10 +238,10 @@ def test_what_is_stated_is_kept_to_the_last_bit() -> None:
     true = {"frequency": 0.8, "damping": 0.1, "std": 1.0}
     for name, value in true.items():
         stated = {name: value * 1.01}
-        found = fitted(residual, 0.2, **stated)
-        assert getattr(found, name) == stated[name]
-        assert np.all(np.abs(off(found, **true)) < np.log([1.05, 1.4, 1.15]))
-        assert found.stands_out
+        result = fitted(residual, 0.2, **stated)
+        assert getattr(result, name) == stated[name]
+        assert np.all(np.abs(log_errors(result, **true)) < np.log([1.05, 1.4, 1.15]))
+        assert result.stands_out
     whole = fitted(residual, 0.2, **true)
     assert (whole.frequency, whole.damping, whole.std) == (0.8, 0.1, 1.0)
     assert whole.stands_out
@@ -250,10 +250,10 @@ def test_what_is_stated_is_kept_to_the_last_bit() -> None:
 
 def test_a_stated_frequency_is_one_place_to_look_at_and_may_be_a_slow_one() -> None:
     residual = at_sea(4, 2000.0, 0.5, 0.15, 0.1, 2.0)
-    found = fitted(residual, 0.5, frequency=0.15)
-    assert found.needed == pytest.approx(2 * np.log(100))
-    assert np.all(np.abs(off(found, 0.15, 0.1, 2.0)) < np.log([1.001, 2.0, 1.3]))
-    assert found.stands_out
+    result = fitted(residual, 0.5, frequency=0.15)
+    assert result.needed == pytest.approx(2 * np.log(100))
+    assert np.all(np.abs(log_errors(result, 0.15, 0.1, 2.0)) < np.log([1.001, 2.0, 1.3]))
+    assert result.stands_out
 
 
 def test_a_wave_that_is_not_where_it_is_stated_does_not_stand_out() -> None:
@@ -264,10 +264,10 @@ def test_a_wave_that_is_not_where_it_is_stated_does_not_stand_out() -> None:
 
 def test_a_wave_stated_altogether_needs_no_measurements() -> None:
     nothing = np.full(5, np.nan)
-    found = fitted(nothing, 0.1, frequency=0.6, damping=1.0, std=2e-4)
-    assert (found.frequency, found.damping, found.std) == (0.6, 1.0, 2e-4)
-    assert np.isnan(found.evidence)
-    assert not found.stands_out
+    result = fitted(nothing, 0.1, frequency=0.6, damping=1.0, std=2e-4)
+    assert (result.frequency, result.damping, result.std) == (0.6, 1.0, 2e-4)
+    assert np.isnan(result.evidence)
+    assert not result.stands_out
     assert fit_wave(nothing, 0.1, 1.0, frequency=0.6, damping=0.1) is None
 
 
@@ -287,8 +287,8 @@ def test_noise_claims_a_wave_in_one_log_of_a_hundred_at_the_most(red: float) -> 
     claims = 0
     for seed in range(150):
         rng = np.random.default_rng(seed)
-        found = fitted(rng.standard_normal(200) + red_of(rng, 200, 1.0, 0.05, red), 1.0)
-        claims += found.evidence > found.needed
+        result = fitted(rng.standard_normal(200) + red_of(rng, 200, 1.0, 0.05, red), 1.0)
+        claims += result.evidence > result.needed
     assert claims <= 1
 
 
@@ -315,8 +315,8 @@ def differenced(rng: np.random.Generator, n: int, _dt: float) -> FloatArray:
 def test_a_spectrum_that_only_falls_or_rises_is_no_wave_though_no_background_fits_it(
     noise: Noise,
 ) -> None:
-    found = [fitted(noise(np.random.default_rng(s), 3000, 0.2), 0.2) for s in range(8)]
-    assert np.mean([wave.stands_out for wave in found]) <= 0.1
+    result = [fitted(noise(np.random.default_rng(s), 3000, 0.2), 0.2) for s in range(8)]
+    assert np.mean([wave.stands_out for wave in result]) <= 0.1
 
 
 def test_a_line_below_the_lowest_frequency_is_no_wave() -> None:
@@ -333,9 +333,9 @@ def test_a_line_below_the_lowest_frequency_is_no_wave() -> None:
 
 def test_a_faster_wave_is_found_beside_such_a_line() -> None:
     residual = at_sea(7, 1000.0, 0.1, 0.8, 0.1, 1.0) + 3 * np.sin(0.1 * np.arange(0, 1000, 0.1))
-    found = fitted(residual, 0.1)
-    assert found.frequency == pytest.approx(0.8, rel=0.05)
-    assert found.stands_out
+    result = fitted(residual, 0.1)
+    assert result.frequency == pytest.approx(0.8, rel=0.05)
+    assert result.stands_out
 
 
 def test_a_wave_stands_out_where_it_is_likely_and_a_peak() -> None:
@@ -404,12 +404,12 @@ def test_no_grid_of_parameters_holds_a_likelier_wave(seed: int) -> None:
     dt = 0.5
     residual = at_sea(seed, 200.0, dt, 0.9, 0.1, 0.8)
     spectrum = seen_of(residual, dt)
-    found, _ = _likeliest(spectrum, np.full(6, np.nan))
-    least = negative_log_likelihood(spectrum, found)[0] / spectrum.weight
+    result, _ = _likeliest(spectrum, np.full(6, np.nan))
+    least = negative_log_likelihood(spectrum, result)[0] / spectrum.weight
     tau = dt * np.arange(len(residual))
-    red = np.exp(found[1] - np.exp(found[2]) * tau)
-    for frequency in np.concatenate((np.geomspace(0.26, 5.6, 40), np.exp(found[4]) * SPREAD)):
-        dampings = np.exp(found[5]) * np.array([0.2, 0.5, 0.8, 1.0, 1.25, 2.0, 4.0])
+    red = np.exp(result[1] - np.exp(result[2]) * tau)
+    for frequency in np.concatenate((np.geomspace(0.26, 5.6, 40), np.exp(result[4]) * SPREAD)):
+        dampings = np.exp(result[5]) * np.array([0.2, 0.5, 0.8, 1.0, 1.25, 2.0, 4.0])
         dampings = dampings[dampings < 0.5]
         covariances = [red]
         for damping in dampings:
@@ -418,8 +418,8 @@ def test_no_grid_of_parameters_holds_a_likelier_wave(seed: int) -> None:
             covariances.append(np.real(residues @ np.exp(np.outer(poles, tau))))
         of_red, *waves = fast_means(spectrum, covariances)
         for of_wave in waves:
-            for white in np.exp(found[0]) * np.array([0.7, 0.9, 1.0, 1.1, 1.4]):
-                for power in np.exp(found[3]) * np.array([0.03, 0.1, 0.3, 0.7, 0.9, 1, 1.1, 1.5]):
+            for white in np.exp(result[0]) * np.array([0.7, 0.9, 1.0, 1.1, 1.4]):
+                for power in np.exp(result[3]) * np.array([0.03, 0.1, 0.3, 0.7, 0.9, 1, 1.1, 1.5]):
                     mean = white + of_red + power * of_wave
                     assert np.sum(spectrum.fitted / mean + np.log(mean)) > least - 1e-3
 
@@ -466,13 +466,13 @@ def test_a_sensor_too_slow_for_any_wave_tells_nothing() -> None:
 
 def test_a_short_log_is_searched_above_six_periods_of_its_length() -> None:
     """A slow drift of a short log would be a wave otherwise."""
-    found = fitted(np.random.default_rng(0).standard_normal(200), 0.1)
-    assert found.frequency >= 6 * 2 * pi / 20
-    assert not found.stands_out
+    result = fitted(np.random.default_rng(0).standard_normal(200), 0.1)
+    assert result.frequency >= 6 * 2 * pi / 20
+    assert not result.stands_out
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "reason"),
     [
         ({"dt_secs": 0.0}, "dt_secs is 0"),
         ({"dt_secs": np.nan}, "dt_secs, .*NaN"),
@@ -485,9 +485,9 @@ def test_a_short_log_is_searched_above_six_periods_of_its_length() -> None:
         ({"frequency": 4.0, "interval": 10.0}, "sample every 1 s resolves none above 3.14"),
     ],
 )
-def test_what_is_out_of_range_is_refused(given: dict[str, float], said: str) -> None:
+def test_what_is_out_of_range_is_refused(given: dict[str, float], reason: str) -> None:
     arguments = {"dt_secs": 0.1, "interval": 1.0} | given
-    with pytest.raises(UsageError, match=said):
+    with pytest.raises(UsageError, match=reason):
         fit_wave(np.random.default_rng(0).standard_normal(500), **arguments)
 
 
@@ -497,7 +497,7 @@ def test_fifty_thousand_samples_take_less_than_half_a_second() -> None:
     best = np.inf
     for _ in range(3):
         start = perf_counter()
-        found = fitted(residual, 0.1)
+        result = fitted(residual, 0.1)
         best = min(best, perf_counter() - start)
     assert best < 0.5
-    assert np.all(np.abs(off(found, 0.8, 0.1, 1.0)) < np.log([1.03, 1.3, 1.1]))
+    assert np.all(np.abs(log_errors(result, 0.8, 0.1, 1.0)) < np.log([1.03, 1.3, 1.1]))

@@ -102,7 +102,7 @@ def test_validation_logs_are_predicted_with_manoeuvring_indices() -> None:
 
 
 @pytest.mark.xdist_group("auto")
-def test_auto_takes_the_model_that_best_predicts_the_run_left_out() -> None:
+def test_auto_takes_the_model_that_best_predicts_the_run_held_out() -> None:
     ship = identify_auto().ship
     assert ship.candidates[0].model is ship.model
     assert ship.model.name in ("burylin", "burylin-tied")
@@ -314,7 +314,7 @@ def test_a_constant_yaw_rate_is_rejected() -> None:
 
 def test_fixing_every_parameter_is_rejected() -> None:
     everything = VESSEL.coefficients._asdict()
-    with pytest.raises(UsageError, match="none is left to estimate"):
+    with pytest.raises(UsageError, match="none is estimated; fix fewer"):
         identify([a_log()], "burylin", fixed=everything)
 
 

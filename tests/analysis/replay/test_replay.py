@@ -238,8 +238,8 @@ def test_a_dead_input_sensor_is_warned_of(zigzag_log: TrialLog, name: str) -> No
 
 
 def test_a_heading_of_nan_only_is_ignored(zigzag_log: TrialLog) -> None:
-    off = bias("heading", np.nan)(zigzag_log)
-    found = analyse(off)
+    unmeasured = bias("heading", np.nan)(zigzag_log)
+    found = analyse(unmeasured)
     assert "heading" not in found.signals
 
 

@@ -32,9 +32,9 @@ def test_recorded_positions_are_the_track(zigzag: SimulatedTrial, zigzag_log: Tr
 
 def test_without_positions_the_track_is_dead_reckoned(zigzag: SimulatedTrial) -> None:
     channels = tuple(c for c in zigzag.channels if c.name != "position")
-    for left_out, by in ((), "heading"), (("heading",), "yaw rate"):
-        log = TrialLog("x", tuple(c for c in channels if c.name not in left_out))
-        names = ("yaw_rate", "rudder", *(() if left_out else ("heading",)))
+    for missing, by in ((), "heading"), (("heading",), "yaw rate"):
+        log = TrialLog("x", tuple(c for c in channels if c.name not in missing))
+        names = ("yaw_rate", "rudder", *(() if missing else ("heading",)))
         signals = resample(log, channels=names)
         truth = zigzag.trajectory.at(signals.time_secs)
         track, origin = tracked(log, signals, truth["yaw_rate"], truth["speed"])

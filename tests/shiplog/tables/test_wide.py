@@ -104,7 +104,7 @@ def test_the_long_form_keeps_further_channels_with_their_units() -> None:
     assert {each.topic: each.unit for each in back} == {each.topic: each.unit for each in log}
 
 
-def test_components_and_second_sources_are_columns_and_empty_channels_are_left_out() -> None:
+def test_components_and_second_sources_are_columns_and_empty_channels_are_omitted() -> None:
     frame = trial().to_pandas()
     assert list(frame.columns) == ["yaw_rate", "position_north", "position_east", "yaw_rate/mems"]
     np.testing.assert_allclose(frame["position_east"], trial()["position"].values[:, 1])
