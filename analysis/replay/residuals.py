@@ -125,14 +125,14 @@ class ResidualTest:
         variance = MEASURED_NOISE_VARIANCE if self._noise_measured else STATED_NOISE_VARIANCE
         half_width = BAND_99 * sqrt(variance / count) if count else float("nan")
         return ResidualSummary(
-            self._name,
-            self._unit,
-            count,
-            sqrt(self._innovations.mean_square),
-            self._normalised.mean_square,
-            (1 - half_width, 1 + half_width),
-            self._products.whiteness(self._innovations.mean, count),
-            self._rejected,
+            name=self._name,
+            unit=self._unit,
+            count=count,
+            rms=sqrt(self._innovations.mean_square),
+            mean_nis=self._normalised.mean_square,
+            nis_band=(1 - half_width, 1 + half_width),
+            whiteness_p=self._products.whiteness(self._innovations.mean, count),
+            rejected=self._rejected,
         )
 
 
