@@ -28,7 +28,7 @@ from .fixed_parameters import check_fixed, fixed_values
 from .identified_ship import IdentifiedShip, run_fits
 from .model_selection import Candidate, rank_models, require_two_runs
 from .parallel import single_blas_thread
-from .prior_sensitivity import prior_sensitivity
+from .prior_sensitivity import PriorSensitivity, prior_sensitivity
 from .runs import Run, common_vessel, consistency_warnings, distinct_runs
 from .validation import validate
 
@@ -101,18 +101,14 @@ def identify(
     steps.begin("fit")
     with naming_contradictions([text for run in runs for text in run.contradictions]):
         candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)
-    steps.begin("uncertainty")
-    estimates = uncertainty(fit)
-    steps.begin("prior sensitivity")
-    sensitivity = prior_sensitivity(fit, estimates)
-    share = np.fmax(estimates.prior_share, sensitivity.shares)
-    estimates = replace(estimates, prior_share=share)
+    estimates, sensitivity = _estimates(fit, steps)
     steps.begin("other methods")
     histories = _histories(fit, estimates)
     steps.begin("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
-    warnings += [warning for run in (*runs, *held_out) for warning in run.warnings]
-    warnings += consistency_warnings([*runs, *held_out])
+    all_runs = [*runs, *held_out]
+    warnings += [warning for run in all_runs for warning in run.warnings]
+    warnings += consistency_warnings(all_runs)
     warnings += fit_warnings(fit, estimates, sensitivity, validations)
     warnings += _assumed_length(fit, ship)
     names, values = fit.problem.model.names, fit.parameters.tolist()
@@ -131,7 +127,7 @@ def identify(
         fixed={n: v for n, v in zip(names, values, strict=True) if n not in estimates.names},
         advice={name: manoeuvres_to_identify(name) for name in estimates.unidentifiable},
         warnings=tuple(warnings),
-        data_lost=any(run.data_lost for run in (*runs, *held_out)),
+        data_lost=any(run.data_lost for run in all_runs),
     )
 
 
@@ -200,6 +196,16 @@ def _best_fit(candidates: Sequence[Candidate]) -> OutputError:
     raise LogError(
         "the simulation of every model diverges on these logs; check their signs and units"
     )
+
+
+def _estimates(fit: OutputError, steps: _Steps) -> tuple[Uncertainty, PriorSensitivity]:
+    """Return the uncertainty of a fit with the shares of the prior, and the second fit's."""
+    steps.begin("uncertainty")
+    estimates = uncertainty(fit)
+    steps.begin("prior sensitivity")
+    sensitivity = prior_sensitivity(fit, estimates)
+    share = np.fmax(estimates.prior_share, sensitivity.shares)
+    return replace(estimates, prior_share=share), sensitivity
 
 
 def _histories(fit: OutputError, estimates: Uncertainty) -> tuple[ParameterHistory, ...]:

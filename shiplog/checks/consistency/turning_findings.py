@@ -83,52 +83,60 @@ def unit_findings(
 ) -> Iterator[Finding]:
     """Report a wrong unit of yaw rate or heading; the course of the fixes decides between them."""
     pair = ratios.get(("yaw_rate", "heading"))
-    yaw_course, heading_course = (
-        ratios.get((name, "position")) for name in ("yaw_rate", "heading")
+    by_course = {name: ratios.get((name, "position")) for name in ("yaw_rate", "heading")}
+    if pair is None:
+        yield from _units_by_course(by_course, topics)
+    elif _differs(pair, MIN_FACTOR):
+        yield _unit_by_pair(pair, by_course, topics)
+
+
+def _unit_by_pair(
+    pair: TurningRatio, by_course: Mapping[str, TurningRatio | None], topics: Mapping[str, str]
+) -> Finding:
+    """Report the wrong unit of a yaw rate and a heading that turn differently."""
+    factor = 1 / abs(pair.ratio)
+    units = {
+        "yaw_rate": misread_units(factor, YAW_RATE_UNITS, 0.15),
+        "heading": misread_units(1 / factor, HEADING_UNITS, 0.05),
+    }
+    contradicted = {
+        name: ratio is not None and _differs(ratio, MIN_COURSE_FACTOR)
+        for name, ratio in by_course.items()
+    }
+    heading_wrong = contradicted["heading"] or not units["yaw_rate"]
+    if contradicted["yaw_rate"] or not units["heading"]:
+        heading_wrong = False
+    likely, other = ("heading", "yaw_rate") if heading_wrong else ("yaw_rate", "heading")
+    cause = in_words(units[likely]) or "a wrong scale"
+    remedy = f'[{likely}] unit = "{units[likely][0][0]}"' if units[likely] else "the scale"
+    if units[other] and not any(by_course.values()):
+        cause += f"; or else {other}: {in_words(units[other])}"
+    error = pair.error * factor / abs(pair.ratio)
+    return Finding(
+        "unit",
+        likely,
+        f"{topics[likely]}: the integrated yaw rate is {factor:.3g} (± {2 * error:.2g}) times the "
+        f"change of the heading; likely {cause}; change in the layout: {remedy}",
     )
-    if pair is not None and _differs(pair, MIN_FACTOR):
-        factor = 1 / abs(pair.ratio)
-        yaw_units = misread_units(factor, YAW_RATE_UNITS, 0.15)
-        heading_units = misread_units(1 / factor, HEADING_UNITS, 0.05)
-        heading_wrong = (
-            heading_course is not None and _differs(heading_course, MIN_COURSE_FACTOR)
-        ) or not yaw_units
-        if yaw_course is not None and _differs(yaw_course, MIN_COURSE_FACTOR):
-            heading_wrong = False
-        likely, likely_units, other, other_units = (
-            ("heading", heading_units, "yaw_rate", yaw_units)
-            if heading_wrong and heading_units
-            else ("yaw_rate", yaw_units, "heading", heading_units)
-        )
-        error = pair.error * factor / abs(pair.ratio)
-        cause = in_words(likely_units) or "a wrong scale"
-        remedy = f'[{likely}] unit = "{likely_units[0][0]}"' if likely_units else "the scale"
-        decided = yaw_course is not None or heading_course is not None
-        alternative = (
-            f"; or else {other}: {in_words(other_units)}" if other_units and not decided else ""
-        )
+
+
+def _units_by_course(
+    by_course: Mapping[str, TurningRatio | None], topics: Mapping[str, str]
+) -> Iterator[Finding]:
+    """Report wrong units of a yaw rate or a heading that turns unlike the course of the fixes."""
+    units = {"yaw_rate": YAW_RATE_UNITS, "heading": HEADING_UNITS}
+    for name, ratio in by_course.items():
+        if ratio is None or not _differs(ratio, MIN_COURSE_FACTOR):
+            continue
+        matches = misread_units(1 / ratio.ratio, units[name], 0.4)
+        remedy = f'[{name}] unit = "{matches[0][0]}"' if matches else "its unit"
         yield Finding(
             "unit",
-            likely,
-            f"{topics[likely]}: the integrated yaw rate is {factor:.3g} "
-            f"(± {2 * error:.2g}) times the change of the heading; likely {cause}{alternative}; "
-            f"change in the layout: {remedy}",
+            name,
+            f"{topics[name]}: turns {abs(1 / ratio.ratio):.3g} times as much as the course of "
+            f"the fixes; likely {in_words(matches) or 'a wrong unit'}; change in the layout: "
+            f"{remedy}",
         )
-    elif pair is None:
-        tables = (("yaw_rate", yaw_course, YAW_RATE_UNITS), ("heading", heading_course,
-                  HEADING_UNITS))  # fmt: skip
-        for name, ratio, units in tables:
-            if ratio is None or not _differs(ratio, MIN_COURSE_FACTOR):
-                continue
-            matches = misread_units(1 / ratio.ratio, units, 0.4)
-            remedy = f'[{name}] unit = "{matches[0][0]}"' if matches else "its unit"
-            yield Finding(
-                "unit",
-                name,
-                f"{topics[name]}: turns {abs(1 / ratio.ratio):.3g} times as much as the course of "
-                f"the fixes; likely {in_words(matches) or 'a wrong unit'}; change in the layout: "
-                f"{remedy}",
-            )
 
 
 def column_findings(pair: TurningRatio | None, topics: Mapping[str, str]) -> Iterator[Finding]:
