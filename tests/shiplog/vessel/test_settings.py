@@ -6,7 +6,7 @@ from dataclasses import fields
 import pytest
 from filter_runs import FILTERS
 
-from analysis.cli import REPLAY, replay_settings
+from analysis.cli.replay_verb import REPLAY, replay_settings
 from analysis.regression.sliding import WINDOW_SECS
 from analysis.regression.weak_form import BUMP_SECS
 from shiplog import Vessel, load_vessel

@@ -1,0 +1,11 @@
+"""The verbs of the analysis: replay, identify, check.
+
+A module for each; what a verb computes is imported when it runs. Nothing imports this folder but
+the entry points of `shiplog.verbs`.
+"""
+
+from .check_verb import CHECK
+from .identify_verb import IDENTIFY
+from .replay_verb import REPLAY
+
+__all__ = ["CHECK", "IDENTIFY", "REPLAY"]

@@ -1,0 +1,60 @@
+"""Options that replay and identify share: how their logs are read, and the review they show."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shiplog.cli.options import (
+    add_cut_options,
+    add_source_option,
+    assigned_sources,
+)
+
+if TYPE_CHECKING:
+    from analysis.replay.reading_options import ReadingOptions
+
+
+def add_reading_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that state how logs are read; `reading_options` and `open_cut` apply them."""
+    parser.add_argument(
+        "--vessel", help="a preset or a vessel.toml, instead of the one that the log carries"
+    )
+    parser.add_argument(
+        "--length",
+        type=float,
+        metavar="METRES",
+        help="length between perpendiculars, such as 320; precedes that of the vessel file",
+    )
+    add_source_option(parser)
+    parser.add_argument(
+        "--strict", action="store_true", help="refuse a log with a contradiction in unit or sign"
+    )
+    add_cut_options(parser)
+
+
+def reading_options(arguments: argparse.Namespace) -> "ReadingOptions":
+    """Return the options that state how logs are read; the vessel file is loaded.
+
+    Raises
+    ------
+    UsageError
+        A source is not given as ``CHANNEL=SOURCE``.
+    VesselError
+        The vessel file cannot be read or has errors.
+    """
+    from analysis.replay.reading_options import ReadingOptions
+    from shiplog.vessel.vessel_parser import load_vessel
+
+    sources = assigned_sources(arguments.source)
+    vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
+    return ReadingOptions(vessel, arguments.length, sources, arguments.strict)
+
+
+def show_review(path: str | Path, *, view: bool) -> None:
+    """Print where the review is, and open it in the Rerun viewer if asked to."""
+    print(f"review: {path} (open it with: rerun {path})", file=sys.stderr)
+    if view:
+        from analysis.view.viewer import view_review
+
+        view_review(path)
