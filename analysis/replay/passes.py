@@ -23,7 +23,7 @@ from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, choose_clock, resample_chunks, with_steering_gear
 from shiplog.screening import ScreenedLog, Screening, screen_log
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
-from shiplog.types import FloatArray, Log
+from shiplog.types import ChunkedLog, FloatArray, Log
 from shiplog.vessel.settings import MIN_WINDOW_SECS
 
 from .channel_warnings import channel_warnings, end_warnings, late_channel_warnings
@@ -173,7 +173,7 @@ def second_pass(
 
 
 def resampled_chunks(
-    log: Log,
+    log: ChunkedLog,
     clock: Clock,
     on_progress: ProgressCallback,
     step: str,
@@ -266,7 +266,7 @@ class _Equations:
         return [text + f"their windows are empty; use more than {needed:.0f} s"]
 
 
-def _require_outputs(log: Log, stats: SignalStats) -> None:
+def _require_outputs(log: ChunkedLog, stats: SignalStats) -> None:
     """Raise `LogError` where yaw rate or speed has too few samples to estimate its noise."""
     for name, count in zip(PAPER_OUTPUTS, stats.sample_counts, strict=True):
         if count < MIN_OUTPUT_SAMPLES:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shiplog.geodesy import positions_of
-from shiplog.types import Channel, FloatArray, Log, TimeArray
+from shiplog.types import Channel, ChunkedLog, FloatArray, TimeArray
 from shiplog.units import CATALOGUE
 
 from .channel_stats import (
@@ -36,7 +36,7 @@ LAST_INSTANT_NS = np.iinfo(np.int64).max
 
 
 def compute_log_stats(
-    log: Log, *, strict: bool = False, sources: Mapping[str, str] | None = None
+    log: ChunkedLog, *, strict: bool = False, sources: Mapping[str, str] | None = None
 ) -> LogStats:
     """Compute the statistics of all channels in one pass over the log.
 
@@ -77,7 +77,7 @@ class _Cleaning(NamedTuple):
 
 
 def _collect(
-    log: Log, cleanings: Mapping[ChannelKey, _Cleaning], *, strict: bool
+    log: ChunkedLog, cleanings: Mapping[ChannelKey, _Cleaning], *, strict: bool
 ) -> "dict[ChannelKey, _ChannelStatsCollector]":
     """Collect the statistics of all channels in one pass."""
     collectors: dict[ChannelKey, _ChannelStatsCollector] = {}

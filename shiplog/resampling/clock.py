@@ -8,7 +8,7 @@ import numpy as np
 
 from shiplog.checks.channel_stats import ChannelStats, LogStats, is_rudder_order
 from shiplog.errors import LogError, UsageError
-from shiplog.types import Log
+from shiplog.types import ChunkedLog
 from shiplog.units import CATALOGUE
 
 # A clock is rejected as an error in the log's times if it exceeds both of these.
@@ -44,7 +44,7 @@ class Clock:
 
 
 def choose_clock(
-    log: Log,
+    log: ChunkedLog,
     stats: LogStats,
     dt_secs: float | None = None,
     channels: tuple[str, ...] | None = None,
@@ -126,7 +126,7 @@ def with_steering_gear(clock: Clock, rate: float) -> Clock:
     return replace(clock, channels={**clock.channels, "rudder": followed})
 
 
-def _require_samples(log: Log, name: str, channel: ChannelStats) -> None:
+def _require_samples(log: ChunkedLog, name: str, channel: ChannelStats) -> None:
     if channel.fields:
         raise UsageError(
             f"channel {name!r} has components ({', '.join(channel.fields)}) and cannot be "
@@ -148,7 +148,9 @@ def _require_samples(log: Log, name: str, channel: ChannelStats) -> None:
         )
 
 
-def _common_span(log: Log, channels: list[ChannelStats], first: ChannelStats) -> tuple[int, int]:
+def _common_span(
+    log: ChunkedLog, channels: list[ChannelStats], first: ChannelStats
+) -> tuple[int, int]:
     """Return the start and the end of the clock as `choose_clock` defines them, ns.
 
     It starts at a sample of the channel `first`.
@@ -170,7 +172,7 @@ def _common_span(log: Log, channels: list[ChannelStats], first: ChannelStats) ->
     return start, end
 
 
-def _first_sample(log: Log, channel: ChannelStats, earliest_ns: int) -> int:
+def _first_sample(log: ChunkedLog, channel: ChannelStats, earliest_ns: int) -> int:
     """Return the time of the first valid sample from `earliest_ns` on; that itself if none is."""
     for chunk in log.chunks():
         part = channel.select(chunk)

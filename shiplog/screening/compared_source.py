@@ -7,7 +7,7 @@ import numpy as np
 
 from shiplog.checks.channel_on_clock import ChannelOnClock, Frames, Unwrapped
 from shiplog.checks.channel_stats import ChannelStats
-from shiplog.types import FloatArray, Log
+from shiplog.types import ChunkedLog, FloatArray
 from shiplog.units import CATALOGUE, display_conversion
 
 MAX_INSTANTS = 20_000  # of the clock on which sources are compared
@@ -55,7 +55,7 @@ class Source:
 
 
 def sources_on_one_clock(
-    log: Log, channels: Sequence[ChannelStats]
+    log: ChunkedLog, channels: Sequence[ChannelStats]
 ) -> tuple[FloatArray, list[Source]]:
     """Interpolate channels at the instants of one clock, in one pass over the log.
 

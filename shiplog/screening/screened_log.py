@@ -33,7 +33,7 @@ class Screening:
 
 
 class ScreenedLog:
-    """A log as its users take it; a `shiplog.types.Log`.
+    """A log as its users take it; a `shiplog.types.ChunkedLog`.
 
     Impossible values and sentinels are NaN, and each quantity has one source.
 
@@ -79,7 +79,3 @@ class ScreenedLog:
         """Iterate over the screened samples in chunks, each topic in the order of reception."""
         for chunk in self._log.chunks():
             yield tuple(self._stats[channel.key].screened(channel) for channel in chunk)
-
-    def select_sources(self, sources: Mapping[str, str]) -> "ScreenedLog":
-        """Return the log with other sources; as those were not screened, screen the log anew."""
-        return ScreenedLog(self._log.select_sources(sources), self.screening)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 
 from shiplog.checks.channel_stats import ChannelStats, LogStats
-from shiplog.types import Log
+from shiplog.types import ChunkedLog
 
 from .compared_source import Source, sources_on_one_clock
 from .source_rules import Comparison, best_source
@@ -13,7 +13,7 @@ _ORDER = ("heading", "position", "yaw_rate")  # quantities with which others are
 
 
 def choose_sources(
-    log: Log, stats: LogStats, names: Iterable[str], chosen: Mapping[str, str]
+    log: ChunkedLog, stats: LogStats, names: Iterable[str], chosen: Mapping[str, str]
 ) -> tuple[dict[str, str], list[str]]:
     """Choose a source of each quantity that has several, and compare it with the others.
 

@@ -12,13 +12,14 @@ except for the conversions of `TrialLog` to tables, when they are called.
 from .arrays import FloatArray, ReadOnlyMapping, TimeArray, is_sorted, read_only
 from .channel import Channel, concatenate_channels
 from .event import Event, EventLevel
-from .log import ChannelsByName, Log, NamedChannel, TrialLog
+from .log import ChannelsByName, ChunkedLog, Log, NamedChannel, TrialLog
 from .raw_packets import RawPackets
 from .signals import Signals, concatenate_signals
 
 __all__ = [
     "Channel",
     "ChannelsByName",
+    "ChunkedLog",
     "Event",
     "EventLevel",
     "FloatArray",

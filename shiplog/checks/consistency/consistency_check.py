@@ -4,7 +4,7 @@ import numpy as np
 
 from shiplog.checks.channel_stats import ChannelStats, LogStats
 from shiplog.checks.log_stats import compute_log_stats
-from shiplog.types import Channel, Log
+from shiplog.types import Channel, ChunkedLog
 
 from .coarse_record import COMPARED_CHANNELS, CoarseRecord, CoarseSignals
 from .findings import Finding
@@ -37,7 +37,7 @@ NO_FIX = "latitude", 91.0  # deg, which AIS prints
 MIN_IMPOSSIBLE_SHARE = 0.2  # of the samples, from which the unit is the likely cause
 
 
-def consistency_findings(log: Log, stats: LogStats | None = None) -> list[Finding]:
+def consistency_findings(log: ChunkedLog, stats: LogStats | None = None) -> list[Finding]:
     """Return what the channels of a log contradict each other in.
 
     Parameters
