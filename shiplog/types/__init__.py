@@ -11,8 +11,10 @@ except for the conversions of `TrialLog` to tables, when they are called.
 
 from .arrays import FloatArray, ReadOnlyMapping, TimeArray, is_sorted, read_only
 from .channel import Channel, concatenate_channels
+from .channels_by_name import ChannelsByName, NamedChannel
 from .event import Event, EventLevel
-from .log import ChannelsByName, ChunkedLog, Log, NamedChannel, TrialLog
+from .log import TrialLog
+from .log_interface import ChunkedLog, Log
 from .raw_packets import RawPackets
 from .signals import Signals, concatenate_signals
 

@@ -1,17 +1,15 @@
-"""Logs: the channels of a trial, in memory or in a file."""
+"""A log in memory: the channels of a trial, each with its own times."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shiplog.errors import LogError
-from shiplog.units import did_you_mean
-
 from .arrays import ReadOnlyMapping, is_sorted
 from .channel import Channel
+from .channels_by_name import ChannelsByName
 from .inputs_in_force import inputs_in_force, with_inputs_in_force
 from .time_cut import empty_cut_error, resolve_cut
 
@@ -20,137 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CHUNK_SAMPLES = 1 << 16  # of the longest channel in a chunk of a `TrialLog`: fits the CPU cache
-
-
-class NamedChannel(Protocol):
-    """Anything about one quantity from one source: a channel, or statistics of it."""
-
-    @property
-    def name(self) -> str:
-        """The quantity."""
-
-    @property
-    def source(self) -> str:
-        """The sensor or program it comes from."""
-
-
-C_co = TypeVar("C_co", bound=NamedChannel, covariant=True)
-
-
-class ChannelsByName(Generic[C_co]):
-    """A collection of channels, or of something about each of them, indexed by name.
-
-    ``log["yaw_rate"]`` is the first source of that quantity in the file, ``log["yaw_rate/gyro"]``
-    the source named. Iteration yields the channels in the order of the file and `len` counts
-    them; ``in`` accepts a name, a name with its source, and a channel.
-
-    Attributes
-    ----------
-    name
-        The name of the log, for messages.
-    channels
-        The channels in the order of the file.
-    """
-
-    name: str
-    channels: tuple[C_co, ...]
-
-    def __getitem__(self, key: str) -> C_co:
-        """Return the channel of a name, or of a name and a source.
-
-        Raises
-        ------
-        LogError
-            There is no such channel; the message lists those that the log has.
-        """
-        found = self.get(key)
-        if found is None:
-            raise LogError(self._no_channel(key))
-        return found
-
-    def get(self, key: str) -> C_co | None:
-        """Return ``log[key]``, or None if there is no such channel."""
-        name, _, source = key.strip("/").partition("/")
-        for channel in self.channels:
-            if channel.name == name and source in ("", channel.source):
-                return channel
-        return None
-
-    def _no_channel(self, key: str) -> str:
-        name, _, source = key.strip("/").partition("/")
-        sources = [channel.source for channel in self.channels if channel.name == name]
-        if sources:
-            return f"no source {source!r} of {name!r} in {self.name}; it has {', '.join(sources)}"
-        names = sorted({channel.name for channel in self.channels})
-        return (
-            f"no channel {key!r} in {self.name}; it has {', '.join(names) or 'none'}"
-            f"{did_you_mean(key, names)}"
-        )
-
-    def __contains__(self, key: object) -> bool:
-        """Whether a name, a name with its source, or a channel is in the log."""
-        if isinstance(key, str):
-            return self.get(key) is not None
-        return any(channel is key for channel in self.channels)
-
-    def __iter__(self) -> Iterator[C_co]:
-        """Iterate over the channels in the order of the file."""
-        return iter(self.channels)
-
-    def __len__(self) -> int:
-        """Return the number of channels."""
-        return len(self.channels)
-
-
-class ChunkedLog(Protocol):
-    """The samples of a log, as recorded or as screened: what resampling and checks need of it."""
-
-    @property
-    def name(self) -> str:
-        """The name of the file."""
-
-    def chunks(self) -> Iterator[tuple[Channel, ...]]:
-        """Iterate over the samples in chunks, each topic in the order of reception.
-
-        Each call is one pass over the log; a log allows any number of them.
-        """
-
-
-class Log(ChunkedLog, Protocol):
-    """The interface of a log, whether it is in memory (`TrialLog`) or in its file (`LogFile`).
-
-    Of a log in its file, `warnings` and `data_lost` are complete after a first pass over `chunks`.
-    """
-
-    @property
-    def metadata(self) -> Mapping[str, str]:
-        """Text about the trial, by key."""
-
-    @property
-    def vessel_toml(self) -> str | None:
-        """The attached vessel file."""
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Problems met in reading the file."""
-
-    @property
-    def data_lost(self) -> bool:
-        """Whether a part of the file could not be read."""
-
-    def select_sources(self, sources: Mapping[str, str]) -> Self:
-        """Return the log with a single source for each of the names given.
-
-        Parameters
-        ----------
-        sources
-            The source to keep, by channel name.
-
-        Raises
-        ------
-        LogError
-            The log has no such channel.
-        """
 
 
 @dataclass(frozen=True, eq=False)
