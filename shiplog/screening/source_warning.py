@@ -14,6 +14,7 @@ from .compared_source import (
 )
 
 MIN_CORRELATION = 0.9  # of two sources, for one to be described as a multiple of the other
+ROUNDING = 1e-9  # of a source's range, below which an offset is one of arithmetic
 NOISE_ERRORS = 3.0  # standard deviations of noise that are no disagreement
 
 
@@ -61,6 +62,8 @@ def _difference(best: Source, other: Source, sources: Sequence[Source]) -> str:
     if a.ndim == 1 and min(np.ptp(a), np.ptp(b)) > 0:
         scale, offset = np.polyfit(a, b, 1)
         if abs(np.corrcoef(a, b)[0, 1]) > MIN_CORRELATION:
-            multiple = f"{scale:.2f} x {best.stats.source} {offset * factor:+.2g} {unit}"
+            multiple = f"{scale:.2f} x {best.stats.source}"
+            if abs(offset) > ROUNDING * np.ptp(a):
+                multiple += f" {offset * factor:+.2g} {unit}"
             text += f" ({other.stats.source} = {multiple})"
     return text
