@@ -19,7 +19,7 @@ MIN_DISAGREEMENT = {
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class ComparedSource:
     """One source of a quantity on the common clock.
 
     Attributes
@@ -56,7 +56,7 @@ class Source:
 
 def sources_on_one_clock(
     log: ChunkedLog, channels: Sequence[ChannelStats]
-) -> tuple[FloatArray, list[Source]]:
+) -> tuple[FloatArray, list[ComparedSource]]:
     """Interpolate channels at the instants of one clock, in one pass over the log.
 
     Returns
@@ -83,11 +83,11 @@ def sources_on_one_clock(
     return clock, [_source(each) for each in gathered]
 
 
-def _source(gathered: ChannelOnClock) -> Source:
+def _source(gathered: ChannelOnClock) -> ComparedSource:
     values = gathered.result()
     if gathered.stats.valid < 2:
         values = np.full_like(values, np.nan)
-    return Source(gathered.stats, values if gathered.stats.fields else values[:, 0])
+    return ComparedSource(gathered.stats, values if gathered.stats.fields else values[:, 0])
 
 
 def is_circular(channel: ChannelStats) -> bool:
@@ -96,7 +96,7 @@ def is_circular(channel: ChannelStats) -> bool:
     return kind is not None and kind.circular
 
 
-def min_disagreement(name: str, sources: Sequence[Source]) -> float:
+def min_disagreement(name: str, sources: Sequence[ComparedSource]) -> float:
     """Return the rms difference below which sources of a quantity agree, in its unit."""
     _, factor = display_unit(sources[0].stats)
     if name in MIN_DISAGREEMENT:

@@ -8,7 +8,13 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
-from .compared_source import MIN_INSTANTS, Source, display_unit, min_disagreement, root_mean_square
+from .compared_source import (
+    MIN_INSTANTS,
+    ComparedSource,
+    display_unit,
+    min_disagreement,
+    root_mean_square,
+)
 
 MIN_COVERAGE_SHARE = 0.5  # of the most complete source; one that has less is not used
 DECISIVE_RATIO = 1.5  # between two sources' errors, or their rates, for one to be better
@@ -19,7 +25,7 @@ SMOOTHING_SECS = 10.0  # a heading is differentiated over this time
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class SourceComparison:
     """Sources of one quantity to choose from, with the sources chosen of other quantities.
 
     Attributes
@@ -35,16 +41,16 @@ class Comparison:
     """
 
     name: str
-    sources: Sequence[Source]
-    references: Mapping[str, Source]
+    sources: Sequence[ComparedSource]
+    references: Mapping[str, ComparedSource]
     clock: FloatArray
 
 
 # the sources that are kept, and why, in words; None where the rule does not apply
-_Kept = tuple[list[Source], str] | None
+_Kept = tuple[list[ComparedSource], str] | None
 
 
-def best_source(comparison: Comparison) -> tuple[Source, str]:
+def best_source(comparison: SourceComparison) -> tuple[ComparedSource, str]:
     """Return the source of a quantity to use, and why, in words."""
     sources, reason = comparison.sources, ""
     for rule in (
@@ -59,18 +65,18 @@ def best_source(comparison: Comparison) -> tuple[Source, str]:
     return sources[0], reason or "the first in the log"
 
 
-def _alive(comparison: Comparison) -> _Kept:
+def _alive(comparison: SourceComparison) -> _Kept:
     alive = [source for source in comparison.sources if not source.is_dead]
     return alive, "the others are constant or not measured"
 
 
-def _complete(comparison: Comparison) -> _Kept:
+def _complete(comparison: SourceComparison) -> _Kept:
     most = max(source.coverage for source in comparison.sources)
     kept = [s for s in comparison.sources if s.coverage >= MIN_COVERAGE_SHARE * most]
     return kept, f"measured for {most:.0%} of the time, the others less"
 
 
-def _by_range(comparison: Comparison) -> _Kept:
+def _by_range(comparison: SourceComparison) -> _Kept:
     """Keep the headings that turn with the ship; a stuck one may be noisy."""
     if comparison.name != "heading":
         return None
@@ -78,7 +84,7 @@ def _by_range(comparison: Comparison) -> _Kept:
     return _smallest(comparison, [-each for each in ranges], "the others hardly vary", ratio=0.2)
 
 
-def _by_other_quantity(comparison: Comparison) -> _Kept:
+def _by_other_quantity(comparison: SourceComparison) -> _Kept:
     """Keep the sources close to the heading's derivative, or to the speed of the fixes."""
     reference = comparison.references.get(
         {"yaw_rate": "heading", "speed": "position"}.get(comparison.name, "")
@@ -96,7 +102,7 @@ def _by_other_quantity(comparison: Comparison) -> _Kept:
     return _smallest(comparison, errors, "the closest to the heading")
 
 
-def _through_water(comparison: Comparison) -> _Kept:
+def _through_water(comparison: SourceComparison) -> _Kept:
     """Keep the speeds that are not over the ground by the name of their source."""
     if comparison.name != "speed":
         return None
@@ -104,7 +110,7 @@ def _through_water(comparison: Comparison) -> _Kept:
     return kept, "through the water; the others are over the ground by their names"
 
 
-def _by_median(comparison: Comparison) -> _Kept:
+def _by_median(comparison: SourceComparison) -> _Kept:
     """Keep the sources close to the median of three or more."""
     sources = comparison.sources
     if len(sources) < 3 or sources[0].values.ndim > 1:
@@ -118,7 +124,7 @@ def _by_median(comparison: Comparison) -> _Kept:
     return _smallest(comparison, errors, "the closest to the median of all")
 
 
-def _by_zero(comparison: Comparison) -> _Kept:
+def _by_zero(comparison: SourceComparison) -> _Kept:
     """Keep the rudder that is nearest to zero where it does not turn the ship."""
     rate = comparison.references.get("yaw_rate")
     if comparison.name != "rudder" or rate is None:
@@ -153,7 +159,7 @@ def _rudder_zero(rudder: FloatArray, rate: FloatArray, clock: FloatArray) -> flo
     return float(-constant / effect) if rank == 3 and effect != 0 else np.nan
 
 
-def _by_rate(comparison: Comparison) -> _Kept:
+def _by_rate(comparison: SourceComparison) -> _Kept:
     """Keep the sources with the highest sampling rate."""
     intervals = [source.stats.interval_secs for source in comparison.sources]
     fastest = min(intervals)
@@ -166,7 +172,7 @@ def _by_rate(comparison: Comparison) -> _Kept:
 
 
 def _smallest(
-    comparison: Comparison,
+    comparison: SourceComparison,
     errors: Sequence[float],
     words: str,
     *,

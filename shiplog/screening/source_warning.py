@@ -6,7 +6,7 @@ import numpy as np
 
 from .compared_source import (
     MIN_INSTANTS,
-    Source,
+    ComparedSource,
     display_unit,
     is_circular,
     min_disagreement,
@@ -18,7 +18,9 @@ ROUNDING = 1e-9  # of a source's range, below which an offset is one of arithmet
 NOISE_ERRORS = 3.0  # standard deviations of noise that are no disagreement
 
 
-def choice_warning(name: str, best: Source, reason: str, sources: Sequence[Source]) -> str:
+def choice_warning(
+    name: str, best: ComparedSource, reason: str, sources: Sequence[ComparedSource]
+) -> str:
     """Report the choice among the sources of a quantity, and how far the others differ.
 
     Parameters
@@ -39,7 +41,9 @@ def choice_warning(name: str, best: Source, reason: str, sources: Sequence[Sourc
     return f"{text}; --source {name}={others[0].stats.source} selects another"
 
 
-def _difference(best: Source, other: Source, sources: Sequence[Source]) -> str:
+def _difference(
+    best: ComparedSource, other: ComparedSource, sources: Sequence[ComparedSource]
+) -> str:
     """Describe how a source differs from the one used; empty within their noise."""
     unit, factor = display_unit(best.stats)
     if other.is_dead and not best.is_dead:

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping
 from shiplog.checks.channel_stats import ChannelStats, LogStats
 from shiplog.types import ChunkedLog
 
-from .compared_source import Source, sources_on_one_clock
-from .source_rules import Comparison, best_source
+from .compared_source import ComparedSource, sources_on_one_clock
+from .source_rules import SourceComparison, best_source
 from .source_warning import choice_warning
 
 _ORDER = ("heading", "position", "yaw_rate")  # quantities with which others are compared
@@ -52,15 +52,15 @@ def choose_sources(
     compared = dict.fromkeys((*order, *_ORDER))
     used = [c for c in stats if c.name in compared and _is_comparable(c)]
     clock, sources = sources_on_one_clock(log, used)
-    by_name: dict[str, list[Source]] = {}
+    by_name: dict[str, list[ComparedSource]] = {}
     for source in sources:
         by_name.setdefault(source.stats.name, []).append(source)
-    references: dict[str, Source] = {}
+    references: dict[str, ComparedSource] = {}
     result, warnings = {}, []
     for name in dict.fromkeys((*_ORDER, *order)):
         candidates = by_name.get(name, [])
         if name in several and name not in chosen:
-            best, reason = best_source(Comparison(name, candidates, references, clock))
+            best, reason = best_source(SourceComparison(name, candidates, references, clock))
             result[name] = best.stats.source
             warnings.append(choice_warning(name, best, reason, candidates))
             references[name] = best
