@@ -54,9 +54,12 @@ marked."""
 MONTE_CARLO_TEXT = """
 ## A simulated ship
 
-The identification paper's ship under the paper's noise, which contains a slow wave; 500 s at 10 Hz,
-{seeds} seeds for each table, yaw rate and speed measured, the α's given. Errors are in per cent of
-the true value.
+The identification paper's ship (vessel file `table1`) under the paper's noise, which contains a
+slow wave; 500 s at 10 Hz, {seeds} seeds for each table. Errors are in per cent of the true value.
+
+A fit is given the recorded yaw rate, speed, rudder and revolutions, and the true rudder parameters
+α. It is given no vessel file, no length, no steering gear and no settings: priors and noise model
+are the defaults. T3 and start values are given where a table states it.
 
 The bound is the Cramér-Rao bound: for the true coefficients and the noise as it was simulated,
 taken as Gaussian, with the standard deviation of each sample known. The initial state of the ship,

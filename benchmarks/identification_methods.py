@@ -25,10 +25,10 @@ MANOEUVRES = ("zigzag-20-20", "turning-circle-35")
 TEXT = """
 ## The methods compared
 
-The same ship and noise, {seeds} seeds, the α's given: the median error of each coefficient, in per
-cent of the true value; in the last two columns the rms difference between the trajectories of the
-estimated and of the true model under the rudder of the trial. A dash marks a method that in some
-seed does not determine the coefficient, or whose model diverges.
+The same ship, noise and inputs, {seeds} seeds, the α's given: the median error of each
+coefficient, in per cent of the true value; in the last two columns the rms difference between the
+trajectories of the estimated and of the true model under the rudder of the trial. A dash marks a
+method that in some seed does not determine the coefficient, or whose model diverges.
 
 The paper's scheme takes ẅ and v̇ from a filter that contains a model of the ship, and so needs a
 prior: given the true values it returns roughly the true values, given a prior wrong by

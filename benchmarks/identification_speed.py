@@ -51,7 +51,8 @@ def measure_fit_time(simulate: Callable[[float, str], Segment]) -> None:
         f"""
 ## The time of a fit
 
-Wall time on one core, compiled loops loaded, a 20/20 zig-zag; the first two lines under the paper's
+Wall time on one core, compiled loops loaded, a 20/20 zig-zag of the simulated ship with the inputs
+stated there; the first two lines under the paper's
 noise with its wave, the third under white noise. The peer is the same fit by
 `scipy.optimize.least_squares` with finite differences over `solve_ivp`, on both sides without
 wave, rudder offset and biases. It is given our start values, weights and loss; our time includes

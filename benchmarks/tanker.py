@@ -1,7 +1,6 @@
 """The turning circle of the tanker KVLCC2, predicted by the tool from zig-zags alone."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from io import BytesIO
 from math import degrees, radians
 from pathlib import Path
@@ -17,13 +16,13 @@ from analysis.identification.prediction import zigzag_overshoots
 from analysis.identification.runs import run_from_log
 from analysis.identification.validation import Validation, validate
 from analysis.replay.reading_options import ReadingOptions
-from shiplog import TrialLog, Vessel, load_vessel
+from shiplog import TrialLog, Vessel
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
 
 PROJECT = Path(__file__).resolve().parents[1]
 KVLCC2 = PROJECT.parent / "shared" / "data" / "kvlcc2"
-VESSEL: Vessel = replace(load_vessel("table1")[0], name="KVLCC2", length=320.0)
+VESSEL = Vessel("KVLCC2", coefficients=None, length=320.0)
 MARIN = ("marin/MARIN_FREE_KVLCC2_zz_10_m.dat", "marin/MARIN_FREE_KVLCC2_zz_20_m.dat")
 HSVA = tuple(
     f"hsva/HSVA_CPMC_KVLCC2_Z_{run}.dat"
@@ -44,11 +43,13 @@ INTRODUCTION = """
 ## The turning circle of a tanker from zig-zags
 
 The model tests of the KVLCC2 (SIMMAN 2008: MARIN, full-scale values; HSVA, scaled by Froude's
-law). Only the length of 320 m is given. The model is the one that `--model auto` selects by
-cross-validation over the zig-zags. The circle is MARIN's at 35°, to which nothing was fitted. It
-is simulated open loop from its initial state under its recorded rudder and revolutions, and
-evaluated from the instant at which the rudder has moved by 0.5°. Results that miss their goal are
-in bold."""
+law), read by the layouts `simman_marin.toml` and `simman_hsva.toml` of `sample_data`. `identify` is
+given these logs and a vessel file with the length of 320 m alone: no coefficients, no steering
+gear, no settings. The rudder parameters α, in models that have them, are the identification
+paper's. The model is the one that `--model auto` selects by cross-validation over the zig-zags. The
+circle is MARIN's at 35°, to which nothing was fitted. It is simulated open loop from its initial
+state under its recorded rudder and revolutions, and evaluated from the instant at which the rudder
+has moved by 0.5°. Results that miss their goal are in bold."""
 CAUTION_TEXT = """
 **These results are not wholly blind.** Three parts of the model with three degrees of freedom (the
 flow straightening at the rudder, the drag in drift, and the increase of thrust as the ship slows
@@ -73,8 +74,9 @@ MARIN's and the fit to both sets include these zig-zags, the fit to HSVA's does 
 recorded rudder the overshoots depend on the model and on the rudder offset, which no other run
 determines: the ship is unstable on a straight course, and half a degree of offset changes an
 overshoot by degrees. With the rudder controlled by the simulated heading the ship corrects itself:
-the simulation is given the initial speed and the execute of the test, in which the rudder was
-reversed at 10.11° and at 20.85°."""
+the simulation is given the initial speed (7.97 and 8.11 m/s), the revolutions (91.7 rpm), the rate
+of the rudder (2.32 °/s) and the execute of the test, in which the rudder was reversed at 10.11° and
+at 20.85°."""
 
 
 def tanker(figures: Path) -> None:

@@ -21,7 +21,7 @@ class _LastSamples:
 
     received_ns: int
     measured_ns: int
-    lag: float
+    lag: int
 
 
 @dataclass
@@ -70,8 +70,8 @@ class TimesCheck:
             self.first_ns = min(self.first_ns, int(times.min()))
             self.last_ns = max(self.last_ns, int(times.max()))
         self.is_steady = self.is_steady and is_sorted(received) and is_sorted(measured)
-        first = float(np.median(measured[:END_SAMPLES] - received[:END_SAMPLES]))
-        last = float(np.median(measured[-END_SAMPLES:] - received[-END_SAMPLES:]))
+        first = _median(measured[:END_SAMPLES] - received[:END_SAMPLES])
+        last = _median(measured[-END_SAMPLES:] - received[-END_SAMPLES:])
         changes = [last - first]
         if (before := self._last.get(topic)) is not None:
             changes.append(first - before.lag)
@@ -79,6 +79,11 @@ class TimesCheck:
             self.is_steady &= int(measured[0]) >= before.measured_ns
         self.is_steady &= max(map(abs, changes)) < MAX_LAG_CHANGE
         self._last[topic] = _LastSamples(int(received[-1]), int(measured[-1]), last)
+
+
+def _median(values: TimeArray) -> int:
+    """Return the upper median of a few values, faster than `np.median`."""
+    return int(np.sort(values)[len(values) // 2])
 
 
 def _in_file_order(blocks: Sequence[SampleBlock]) -> tuple[TimeArray, TimeArray]:
