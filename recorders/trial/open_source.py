@@ -10,9 +10,9 @@ from pathlib import Path
 
 from recorders.streams.format import StreamFormat
 from recorders.streams.line_files import read_lines
-from recorders.streams.options import options_text
 from recorders.streams.pace import paced
 from recorders.streams.reception_clock import ReceptionClock
+from recorders.streams.stream_options import options_text
 from recorders.streams.stream_source import StreamSource
 from recorders.transports.address import is_live, open_transport
 from recorders.transports.live_stream import LiveStream

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from recorders.streams.format import GROUP, StreamFormat
-from recorders.streams.options import parse_options
+from recorders.streams.stream_options import parse_options
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import load_extension
 from shiplog.types import ReadOnlyMapping

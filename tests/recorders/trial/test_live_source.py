@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import pytest
 from number_format import NUMBERS
 
-from recorders.streams.options import parse_options
 from recorders.streams.reception_clock import ReceptionClock
+from recorders.streams.stream_options import parse_options
 from recorders.trial import live_source
 from recorders.trial.live_source import LiveSource
 from recorders.trial.open_source import StreamRequest, open_streams

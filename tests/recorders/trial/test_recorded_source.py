@@ -7,8 +7,8 @@ import pytest
 from number_format import NUMBERS
 
 from recorders.record import record
-from recorders.streams.options import parse_options
 from recorders.streams.reception_clock import ReceptionClock
+from recorders.streams.stream_options import parse_options
 from recorders.trial.open_source import StreamRequest, open_streams
 from recorders.trial.recorded_source import RecordedSource
 from shiplog import read

@@ -1,9 +1,9 @@
-"""Tests of recorders.streams.options, with the options of the format of numbers."""
+"""Tests of recorders.streams.stream_options, with the options of the format of numbers."""
 
 import pytest
 from number_format import NUMBERS
 
-from recorders.streams.options import options_text, parse_options, parse_options_text
+from recorders.streams.stream_options import options_text, parse_options, parse_options_text
 from shiplog.errors import UsageError
 
 
