@@ -10,6 +10,7 @@ import pytest
 from fitted_runs import identify_auto
 from mcap_files import end_mcap_chunk
 from places import KVLCC2, LAYOUTS, PROJECT, SAMPLE_DATA
+from stderr_lines import foreign_lines
 
 from recorders.record import record
 from recorders.simulated.simulate import SimulatedTrial
@@ -84,7 +85,7 @@ def test_json_on_stdout_is_the_only_output_there(
 
 
 def test_a_changed_replay_fails_the_check_and_is_overlaid_on_its_reference(
-    recorded: Path, capsys: pytest.CaptureFixture[str]
+    recorded: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     log = read(recorded)
     write(log, "z.mcap")
@@ -96,9 +97,11 @@ def test_a_changed_replay_fails_the_check_and_is_overlaid_on_its_reference(
         for c in log
     )
     write(TrialLog("z", changed, {}, log.vessel_toml), "z.mcap")
-    capsys.readouterr()
+    capfd.readouterr()
     assert main(["check", "z.mcap", "--json", "z.json"]) == FAILURE
-    lines = capsys.readouterr().out.split("\n")
+    output = capfd.readouterr()
+    assert foreign_lines(output.err) == []
+    lines = output.out.split("\n")
     assert lines[1].startswith("  /speed/measured: largest difference 1e-06")
     assert Path("z.check.rrd").exists()
     assert json.loads(Path("z.json").read_text())[0]["ok"] is False

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from places import PROJECT, SAMPLE_DATA
+from stderr_lines import foreign_lines
 
 from shiplog.cli.main import main
 from shiplog.errors import ShiplogError
@@ -14,7 +15,6 @@ from shiplog.errors import ShiplogError
 README = (PROJECT / "README.md").read_text(encoding="utf-8")
 INSTALL = "pip install -e . && "
 TESTS = "pip install -e '.[test]' && pytest"  # run by CI itself
-OUR_STDERR = re.compile("(warning|review|vessel file|skipped[^:]*): ")  # and lines of no other
 
 
 def commands() -> list[str]:
@@ -61,8 +61,7 @@ def test_the_commands_run_as_written_and_only_shiplog_writes_to_stderr(
             continue
         assert code == 0, f"{command}\n{err}"
         assert out, command
-        foreign = [line for line in err.splitlines() if not OUR_STDERR.match(line)]
-        assert foreign == [], command
+        assert foreign_lines(err) == [], command
         for option in re.findall(r"(?:-o|--json) (\S+)", command):
             assert Path(option).stat().st_size > 0, command
     assert set(verbs) == {"replay", "convert", "record", "identify", "check"}

@@ -155,8 +155,11 @@ def test_a_run_without_a_heading_is_drawn() -> None:
     assert names == [name for name in MODEL_OUTPUTS if name in ("yaw_rate", "speed")]
 
 
-def test_the_same_identification_has_the_same_recording_id(review: Path, tmp_path: Path) -> None:
+def test_the_same_identification_has_the_same_recording_id_and_no_warning_of_rerun(
+    review: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     write_identification_review(ship(), tmp_path / "again.rrd")
+    assert capfd.readouterr().err == ""
     ids = [
         RrdReader(str(path)).recordings()[0].recording_id
         for path in (review, tmp_path / "again.rrd")
