@@ -4,6 +4,7 @@ The files stay the same to the last bit unless the simulation changes. After a c
 look at the replays, then run `shiplog check sample_data --update`.
 """
 
+from datetime import UTC, datetime
 from math import cos, radians
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,8 +12,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from recorders.record import record
+from recorders.simulated.printed_sentences import RATES, printed_sentences
 from recorders.simulated.sensors import suite
-from recorders.simulated.simulate import simulate
+from recorders.simulated.simulate import SimulatedTrial, simulate
 from shiplog import load_vessel, read, write
 from shiplog.vessel.presets import PRESETS
 
@@ -58,8 +60,32 @@ def main() -> None:
         write(trial.truth(TRUTH_HZ), HERE / f"{name}.truth.mcap")
         print(name)
     write_bridge_table(HERE / "bridge.csv")
+    write_sentences(HERE / "ship.nmea")
     for preset, vessel_text in PRESETS.items():
         (HERE / "vessels" / f"{preset}.toml").write_text(vessel_text, encoding="utf-8")
+
+
+def write_sentences(path: Path) -> None:
+    """Write a simulated zig-zag as a logger on board does: each sentence after its time."""
+    lines = (
+        f"{datetime.fromtimestamp(ns // 10**9, UTC):%Y-%m-%dT%H:%M:%S}.{ns // 10**6 % 1000:03d}Z"
+        f" {sentence}\r\n"
+        for ns, sentence in printed_sentences(ship_trial())
+    )
+    path.write_text("".join(lines), encoding="ascii", newline="")
+
+
+def ship_trial() -> SimulatedTrial:
+    """Return the trial of ``ship.nmea``."""
+    settings = {f"{name}.rate_hz": rate for name, rate in RATES.items()}
+    settings |= {"yaw_rate.white": radians(0.005), "heading.white": radians(0.05)}
+    return simulate(
+        load_vessel("table1")[0],
+        "zigzag-20-20",
+        duration_secs=500.0,
+        seed=6,
+        sensors=suite("paper", settings),
+    )
 
 
 def write_bridge_table(path: Path) -> None:

@@ -49,7 +49,8 @@ class StreamSource:
     prefix: str = ""
     options: str = ""
     _samples: SampleBuffer = field(init=False, repr=False)
-    _last_ns: int = field(default=0, init=False, repr=False)  # the last time of reception
+    _first_ns: int | None = field(default=None, init=False, repr=False)  # times of reception
+    _last_ns: int = field(default=0, init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._samples = SampleBuffer(self.prefix, self.name)
@@ -65,11 +66,17 @@ class StreamSource:
         known = {key: text for key, text in decoding.items() if text}
         return origin | known | dict(counts.notes) | rejected | invalid
 
+    @property
+    def duration_secs(self) -> float:
+        """The time from the first to the last packet so far, s."""
+        return 0.0 if self._first_ns is None else (self._last_ns - self._first_ns) * 1e-9
+
     def steps(self) -> Iterator[tuple[Recordable, ...]]:
         """Yield the samples, events and raw packets of each batch, or nothing, and of the end."""
         for batch in self.batches:
             self.decoder.decode(batch, self._samples)
             if batch:
+                self._first_ns = batch[0].received_ns if self._first_ns is None else self._first_ns
                 self._last_ns = batch[-1].received_ns
             self._add_warnings()
             raw = [self._raw(batch)] if self.keep_raw and batch else []

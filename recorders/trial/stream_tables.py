@@ -13,13 +13,15 @@ def stream_tables(streams: Iterable[StreamSource]) -> list[TextTable]:
     listed = list(streams)
     kinds = TextTable(
         "Packets by kind",
-        ("stream", "kind", "decoded", "not used"),
+        ("stream", "kind", "decoded", "per s", "marked\ninvalid", "not used"),
         _bounded(
             [
                 (
                     stream.name,
                     kind,
                     str(counts.accepted.get(kind, 0)),
+                    _rate(counts.accepted.get(kind, 0), stream.duration_secs),
+                    str(counts.flagged.get(kind, 0)),
                     str(counts.unused.get(kind, 0)),
                 )
                 for stream in listed
@@ -40,6 +42,10 @@ def stream_tables(streams: Iterable[StreamSource]) -> list[TextTable]:
         ),
     )
     return [table for table in (kinds, rejected) if table.rows]
+
+
+def _rate(packets: int, secs: float) -> str:
+    return f"{packets / secs:.3g}" if packets and secs > 0 else ""
 
 
 def _bounded(rows: list[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:

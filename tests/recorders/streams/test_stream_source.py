@@ -80,3 +80,10 @@ def test_notes_and_invalid_values_are_metadata() -> None:
     source.decoder.counts.flag("HETHS")
     assert source.metadata["latency_s.GP.RMC"] == "0.30"
     assert source.metadata["invalid.HETHS"] == "1"
+
+
+def test_the_duration_is_that_from_the_first_to_the_last_packet() -> None:
+    source = _source()
+    assert source.duration_secs == 0
+    list(source.chunks())
+    assert source.duration_secs == 2e-9
