@@ -9,17 +9,19 @@ from typing import Any
 import numpy as np
 
 from shiplog.mcap.clock_repair import mixed_times_in
-from shiplog.mcap.decode import McapContents, schema_of
-from shiplog.mcap.reader import open_mcap
+from shiplog.mcap.decode import McapContents, MessageCount, is_foreign, is_raw, schema_of
+from shiplog.mcap.raw_reader import raw_source
+from shiplog.mcap.reader import open_mcap, read, sample_count
 from shiplog.mcap.scan import scan
 from shiplog.mcap.stream import open_log
 from shiplog.mcap.summary import McapSummary, read_summary
 from shiplog.mcap.trial_log import build_trial_log
-from shiplog.types import Channel, Log, TrialLog
+from shiplog.types import Channel, Event, Log, TrialLog
 from shiplog.units import CATALOGUE, GEOGRAPHIC, display_conversion
 
 from .channel_stats import ChannelStats
 from .data_quality import MAX_IRREGULAR_SHARE
+from .event_table import events_to_json
 from .log_stats import compute_log_stats
 
 MAX_MESSAGES_TO_READ = 4_000_000  # of a finished file; of a longer one only the summary is read
@@ -107,6 +109,38 @@ class ForeignTopic:
 
 
 @dataclass(frozen=True)
+class RawTopic:
+    """The raw packets of one source in the whole file.
+
+    Attributes
+    ----------
+    topic
+        The topic, such as ``/raw/gyro``.
+    source
+        The source, such as ``gyro``.
+    format
+        The format by which the packets can be decoded again, such as ``nmea0183``.
+    packets
+        The number of packets.
+    size
+        Their size in the file before compression, bytes; None if unknown.
+    rate_hz
+        Their mean rate between the first and the last; None if unknown.
+    first_ns, last_ns
+        The first and last time of reception, ns since 1970-01-01 UTC; None if unknown.
+    """
+
+    topic: str
+    source: str
+    format: str
+    packets: int
+    size: int | None = None
+    rate_hz: float | None = None
+    first_ns: int | None = None
+    last_ns: int | None = None
+
+
+@dataclass(frozen=True)
 class LogInfo:
     """The content of a file, or of a part of it.
 
@@ -131,6 +165,10 @@ class LogInfo:
         Problems met in reading the file.
     data_lost
         Whether a part of the file could not be read.
+    raw
+        The topics of raw packets in the whole file.
+    events
+        What happened, in the order of time.
     """
 
     name: str
@@ -143,6 +181,8 @@ class LogInfo:
     finished: bool = True
     warnings: tuple[str, ...] = ()
     data_lost: bool = False
+    raw: tuple[RawTopic, ...] = ()
+    events: tuple[Event, ...] = ()
 
     @property
     def start_utc(self) -> str | None:
@@ -167,7 +207,8 @@ class LogInfo:
     def to_dict(self) -> dict[str, Any]:
         """Return the content as plain values for JSON."""
         names = ("start_utc", "duration_secs", "state")
-        return asdict(self) | {name: getattr(self, name) for name in names}
+        derived = {name: getattr(self, name) for name in names}
+        return asdict(self) | derived | events_to_json(self.events, self.start_ns)
 
 
 def read_log_info(
@@ -205,21 +246,23 @@ def read_log_info(
     contents = McapContents()
     with open_mcap(path) as stream:
         summary = read_summary(stream)
-        if summary and summary.statistics.message_count > MAX_MESSAGES_TO_READ:
+        if summary and sample_count(summary) > MAX_MESSAGES_TO_READ:
             if start is None and end is None:
-                return _info_of_summary(path.name, summary)
+                return _info_of_summary(path, summary)
             log = open_log(path, start, end)
-            return _info_of_log(log, _foreign_in_summary(summary), finished=True)
+            others = _foreign_in_summary(summary), _raw_in_summary(summary)
+            return _info_of_log(log, *others, finished=True)
         for _ in scan(stream, contents):
             pass
     log = build_trial_log(path, contents).between(start, end)
     mixed = mixed_times_in(contents.mixed_times, log.span_ns)
     log = replace(log, warnings=(*log.warnings, *(span.message for span in mixed)))
-    return _info_of_log(log, _foreign_in_contents(contents), finished=contents.finished)
+    others = _foreign_in_contents(contents), _raw_in_contents(contents)
+    return _info_of_log(log, *others, finished=contents.finished)
 
 
-def _info_of_summary(name: str, summary: McapSummary) -> LogInfo:
-    statistics = summary.statistics
+def _info_of_summary(path: Path, summary: McapSummary) -> LogInfo:
+    statistics, name = summary.statistics, path.name
     channels = []
     for channel_id, channel in sorted(summary.channels.items()):
         if schema_of(channel, summary.schemas) is not None:
@@ -240,6 +283,8 @@ def _info_of_summary(name: str, summary: McapSummary) -> LogInfo:
         summary.metadata,
         summary.vessel_toml is not None,
         warnings=(warning,),
+        raw=_raw_in_summary(summary),
+        events=read(path, channels=()).events,
     )
 
 
@@ -252,17 +297,47 @@ def _foreign_in_summary(summary: McapSummary) -> tuple[ForeignTopic, ...]:
             counts.get(channel_id, 0),
         )
         for channel_id, channel in sorted(summary.channels.items())
-        if schema_of(channel, schemas) is None
+        if is_foreign(channel, schemas)
     )
+
+
+def _raw_in_summary(summary: McapSummary) -> tuple[RawTopic, ...]:
+    counts = summary.statistics.channel_message_counts
+    return tuple(
+        RawTopic(
+            channel.topic,
+            raw_source(channel),
+            channel.metadata.get("format", ""),
+            counts.get(channel_id, 0),
+        )
+        for channel_id, channel in sorted(summary.channels.items())
+        if is_raw(channel, summary.schemas)
+    )
+
+
+def _raw_in_contents(contents: McapContents) -> tuple[RawTopic, ...]:
+    """Return the topics of raw packets in a file, which may have no summary."""
+    topics = []
+    for channel_id, record in sorted(contents.channels.items()):
+        if is_raw(record, contents.schemas):
+            count = contents.not_decoded.get(channel_id, MessageCount())
+            span = (count.first_ns, count.last_ns) if count.count else (None, None)
+            secs = (count.last_ns - count.first_ns) * 1e-9
+            rate = (count.count - 1) / secs if secs > 0 else None
+            source, packet_format = raw_source(record), record.metadata.get("format", "")
+            topics.append(
+                RawTopic(record.topic, source, packet_format, count.count, count.size, rate, *span)
+            )
+    return tuple(topics)
 
 
 def _foreign_in_contents(contents: McapContents) -> tuple[ForeignTopic, ...]:
     """Return the topics of other programs in a file, which may have no summary."""
     topics = []
     for channel_id, record in sorted(contents.channels.items()):
-        if schema_of(record, contents.schemas) is None:
+        if is_foreign(record, contents.schemas):
             schema = contents.schemas.get(record.schema_id)
-            messages = contents.foreign.get(channel_id)
+            messages = contents.not_decoded.get(channel_id)
             topics.append(
                 ForeignTopic(
                     record.topic,
@@ -275,13 +350,16 @@ def _foreign_in_contents(contents: McapContents) -> tuple[ForeignTopic, ...]:
     return tuple(topics)
 
 
-def _info_of_log(log: Log, foreign: tuple[ForeignTopic, ...], *, finished: bool) -> LogInfo:
+def _info_of_log(
+    log: Log, foreign: tuple[ForeignTopic, ...], raw: tuple[RawTopic, ...], *, finished: bool
+) -> LogInfo:
     stats = compute_log_stats(log)
     starts = [channel.span_ns[0] for channel in stats if channel.samples]
     ends = [channel.span_ns[1] for channel in stats if channel.samples]
     if not starts:
-        starts = [topic.first_ns for topic in foreign if topic.first_ns is not None]
-        ends = [topic.last_ns for topic in foreign if topic.last_ns is not None]
+        others: tuple[RawTopic | ForeignTopic, ...] = (*raw, *foreign)
+        starts = [topic.first_ns for topic in others if topic.first_ns is not None]
+        ends = [topic.last_ns for topic in others if topic.last_ns is not None]
     in_memory = {channel.key: channel for channel in log} if isinstance(log, TrialLog) else {}
     channels = tuple(
         _info_of_channel(channel, in_memory.get((channel.topic, channel.fields)))
@@ -298,6 +376,8 @@ def _info_of_log(log: Log, foreign: tuple[ForeignTopic, ...], *, finished: bool)
         finished,
         log.warnings,
         log.data_lost,
+        raw,
+        log.events,
     )
 
 

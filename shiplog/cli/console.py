@@ -11,6 +11,8 @@ from shiplog.files import atomic_write
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.text_table import TextTable
 
+from .printable import printable
+
 MIN_NAME_WIDTH = 12  # characters of a shortened cell in the first column
 EDGES, GAP = 4, 3  # of a printed table, in characters
 FIRST_ESTIMATE_SECS = 2.0  # of work, before the remaining time is estimated
@@ -96,7 +98,8 @@ def print_tables(tables: Sequence[TextTable], *, to_stderr: bool = False) -> Non
 
     console = Console(stderr=to_stderr, highlight=False, markup=False)  # [deg] is a unit
     for table in tables:
-        for number, part in enumerate(_fitted(table.columns, table.rows, console.width)):
+        rows = [tuple(map(printable, row)) for row in table.rows]
+        for number, part in enumerate(_fitted(table.columns, rows, console.width)):
             title = table.title if number == 0 else f"{table.title} (continued)"
             shown = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE)
             for i, heading in enumerate(part[0]):
@@ -105,7 +108,7 @@ def print_tables(tables: Sequence[TextTable], *, to_stderr: bool = False) -> Non
                 shown.add_row(*row)
             console.print(shown)
         for remark in table.remarks:
-            console.print(remark)
+            console.print(printable(remark))
         console.print()
 
 
@@ -165,15 +168,25 @@ def shortened(text: str, size: int) -> str:
     return f"{text[:head]}…{text[len(text) - (size - 1 - head) :]}"
 
 
+def _json_printable(line: str) -> str:
+    if line.isprintable():
+        return line
+    return "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in line)
+
+
 def print_warnings(warnings: Sequence[str]) -> None:
     """Print warnings on stderr, a line each."""
     for warning in warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+        print(f"warning: {printable(warning)}", file=sys.stderr)
 
 
 def write_json(value: object, where: str) -> None:
-    """Write a value as JSON to a file, or to stdout where its name is ``-``."""
-    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    """Write a value as JSON to a file, or to stdout where its name is ``-``.
+
+    Characters that do not print are escaped, as for a terminal.
+    """
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    text = "\n".join(map(_json_printable, text.split("\n"))) + "\n"
     if where == "-":
         sys.stdout.write(text)
         return

@@ -9,6 +9,7 @@ from shiplog.errors import ShiplogError
 from .console import print_tables, print_warnings, progress, write_json
 from .options import add_cut_options
 from .paths import require_distinct, require_inputs, require_outputs
+from .printable import printable
 from .verb import ExitCode, Verb
 
 
@@ -35,10 +36,10 @@ def _info(arguments: argparse.Namespace) -> ExitCode:
         write_json(info.to_dict(), arguments.json)
     else:
         start = f"from {info.start_utc}" if info.start_utc else "no samples"
-        print(f"{info.name}: {start}, {info.duration_secs:.1f} s, {info.state}")
+        print(f"{printable(info.name)}: {start}, {info.duration_secs:.1f} s, {info.state}")
         print_tables(info_tables(info))
         for key, value in info.metadata.items():
-            print(f"  {key}: {value}")
+            print(f"  {printable(key)}: {printable(value)}")
         print(f"  vessel.toml: {'attached' if info.has_vessel else 'none'}")
         print_warnings(info.warnings)
     return ExitCode.DATA_LOST if info.data_lost else ExitCode.OK

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 
-from shiplog.checks.info import ChannelInfo, ForeignTopic, LogInfo, ValueRange
+from shiplog.checks.event_table import event_table
+from shiplog.checks.info import ChannelInfo, ForeignTopic, LogInfo, RawTopic, ValueRange
 from shiplog.text_table import TextTable
 
 
 def info_tables(info: LogInfo) -> list[TextTable]:
-    """Return the channels of a log, their signs, and its topics of other programs.
+    """Return the channels of a log, their signs, its raw packets, foreign topics and events.
 
     Tables without rows are omitted.
     """
@@ -28,7 +29,13 @@ def info_tables(info: LogInfo) -> list[TextTable]:
         tuple(_foreign_row(topic, info) for topic in info.foreign),
         ("shiplog does not read these; their times are of reception, in s since the start.",),
     )
-    return [table for table in (channels, signs, foreign) if table.rows]
+    raw = TextTable(
+        "Raw packets",
+        ("topic", "packets", "rate\n[Hz]", "bytes", "format", "first [s]", "last [s]"),
+        tuple(_raw_row(topic, info) for topic in info.raw),
+    )
+    events = event_table(info.events, info.start_ns)
+    return [table for table in (channels, signs, raw, foreign, events) if table.rows]
 
 
 def info_overview(infos: Sequence[LogInfo]) -> TextTable:
@@ -84,10 +91,21 @@ def _remarks(channels: Sequence[ChannelInfo]) -> list[str]:
     return remarks
 
 
+def _raw_row(topic: RawTopic, info: LogInfo) -> tuple[str, ...]:
+    rate = "" if topic.rate_hz is None else f"{topic.rate_hz:.3g}"
+    size = "" if topic.size is None else str(topic.size)
+    return (topic.topic, str(topic.packets), rate, size, topic.format, *_span_cells(topic, info))
+
+
 def _foreign_row(topic: ForeignTopic, info: LogInfo) -> tuple[str, ...]:
+    return (topic.topic, str(topic.messages), topic.schema, *_span_cells(topic, info))
+
+
+def _span_cells(topic: RawTopic | ForeignTopic, info: LogInfo) -> tuple[str, str]:
+    """Return the first and the last time of a topic, in s since the start."""
     start_ns = info.start_ns or 0
-    times = (
+    first, last = (
         "" if at_ns is None else f"{(at_ns - start_ns) * 1e-9:.1f}"
         for at_ns in (topic.first_ns, topic.last_ns)
     )
-    return (topic.topic, str(topic.messages), topic.schema, *times)
+    return first, last

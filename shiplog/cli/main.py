@@ -17,6 +17,7 @@ from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import declared_entries, extension_names, load_extension
 from shiplog.version import __version__
 
+from .printable import printable
 from .verb import ExitCode, Verb
 
 GROUP = "shiplog.verbs"
@@ -93,7 +94,7 @@ class _UnneededModules(MetaPathFinder):
 
 
 def _fail(error: object, code: ExitCode) -> ExitCode:
-    print(f"shiplog: {' '.join(str(error).split())}", file=sys.stderr)
+    print(f"shiplog: {printable(' '.join(str(error).split()))}", file=sys.stderr)
     return code
 
 

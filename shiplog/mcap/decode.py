@@ -5,9 +5,10 @@ Others are kept as bytes, to be decoded one by one.
 """
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
+from typing import NamedTuple
 
 import numpy as np
 import zstandard
@@ -15,8 +16,9 @@ from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from numpy.typing import NDArray
 
-from shiplog.types import FloatArray, TimeArray
+from shiplog.types import Event, FloatArray, TimeArray
 
 from .clock_repair import MixedTimes
 from .locate import (
@@ -70,26 +72,58 @@ class SampleBlock:
 
 
 @dataclass
-class ForeignMessages:
-    """The messages of one topic of another program, counted but not decoded.
+class MessageCount:
+    """The messages of one topic that are counted but not decoded.
 
     Attributes
     ----------
     count
         The number of messages.
+    size
+        Their size in bytes.
     first_ns, last_ns
-        The earliest and the latest time of reception, ns.
+        The earliest and the latest time of reception, ns; of no messages, in the wrong order.
     """
 
-    count: int
-    first_ns: int
-    last_ns: int
+    count: int = 0
+    size: int = 0
+    first_ns: int = 2**63 - 1
+    last_ns: int = -(2**63)
 
-    def add(self, received_ns: TimeArray) -> None:
-        """Count further messages, given their (n,) times of reception."""
-        self.count += len(received_ns)
+    def add(self, heads: NDArray[np.void]) -> None:
+        """Count further messages, given their heads (n,)."""
+        received_ns = heads["received"].astype(np.int64)
+        self.count += len(heads)
+        self.size += int(record_sizes(heads).sum()) - MESSAGE_HEAD.itemsize * len(heads)
         self.first_ns = min(self.first_ns, int(received_ns.min()))
         self.last_ns = max(self.last_ns, int(received_ns.max()))
+
+
+@dataclass(frozen=True)
+class EventMessage:
+    """A message of the topic of events, as it is in the file.
+
+    Attributes
+    ----------
+    position
+        Its place in the file, common to all channels, as in `MessageColumns`.
+    time_ns
+        When it happened, ns since 1970-01-01 UTC.
+    data
+        The serialised message.
+    """
+
+    position: int
+    time_ns: int
+    data: bytes
+
+
+class RawBlock(NamedTuple):
+    """Raw packets of one channel in one MCAP chunk: its id, (n,) times of reception, n messages."""
+
+    channel_id: int
+    received_ns: TimeArray
+    messages: list[bytes]
 
 
 @dataclass
@@ -115,8 +149,16 @@ class McapContents:
         The number of such messages, by channel id.
     keep_undescribed
         Whether to keep them, because a later record may describe their channel.
-    foreign
-        The messages of other programs, by channel id.
+    not_decoded
+        The numbers of raw packets, and of messages of other programs, by channel id.
+    keep_raw
+        Whether to keep the raw packets in `raw_blocks` too.
+    raw_blocks
+        The raw packets not yet taken, in the order of the file.
+    event_messages
+        The events not yet decoded.
+    events
+        The events decoded so far.
     foreign_records
         The attachments and metadata records of other programs, in words; a dict for their order.
     metadata
@@ -152,7 +194,11 @@ class McapContents:
     undescribed: list[tuple[bytes, int, Offsets, int]] = field(default_factory=list)
     undescribed_counts: dict[int, int] = field(default_factory=dict)
     keep_undescribed: bool = True
-    foreign: dict[int, ForeignMessages] = field(default_factory=dict)
+    not_decoded: dict[int, MessageCount] = field(default_factory=dict)
+    keep_raw: bool = False
+    raw_blocks: list[RawBlock] = field(default_factory=list)
+    event_messages: list[EventMessage] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
     foreign_records: dict[str, None] = field(default_factory=dict)
     metadata: dict[str, str] = field(default_factory=dict)
     vessel_toml: str | None = None
@@ -317,11 +363,18 @@ def _collect_channel(
         if contents.keep_undescribed:
             contents.undescribed.append((data, channel_id, offsets, number))
         return
-    schema = schema_of(contents.channels[channel_id], contents.schemas)
+    channel = contents.channels[channel_id]
+    schema = schema_of(channel, contents.schemas)
+    if is_events(channel, contents.schemas):
+        contents.event_messages += _event_messages(data, offsets, number)
+        return
     if schema is None:
-        received = gather(data, offsets, MESSAGE_HEAD)["received"].astype(np.int64)
-        start = ForeignMessages(0, int(received[0]), int(received[0]))
-        contents.foreign.setdefault(channel_id, start).add(received)
+        count = contents.not_decoded.setdefault(channel_id, MessageCount())
+        count.add(gather(data, offsets, MESSAGE_HEAD))
+        if contents.keep_raw and is_raw(channel, contents.schemas):
+            heads, messages = _undecoded(data, offsets)
+            received = heads["received"].astype(np.int64)
+            contents.raw_blocks.append(RawBlock(channel_id, received, messages))
         return
     if contents.selected is not None and channel_id not in contents.selected:
         return
@@ -350,10 +403,21 @@ def _fixed_width_block(
     return SampleBlock(received, measured, values, number, offsets)
 
 
+def _event_messages(data: bytes, offsets: Offsets, number: int) -> Iterator[EventMessage]:
+    heads, messages = _undecoded(data, offsets)
+    positions = ((number << 32) + offsets).tolist()
+    return map(EventMessage, positions, heads["measured"].astype(np.int64).tolist(), messages)
+
+
 def _undecoded_block(data: bytes, offsets: Offsets, number: int) -> SampleBlock:
+    heads, messages = _undecoded(data, offsets)
+    received, measured = heads["received"].astype(np.int64), heads["measured"].astype(np.int64)
+    return SampleBlock(received, measured, messages, number, offsets)
+
+
+def _undecoded(data: bytes, offsets: Offsets) -> tuple[NDArray[np.void], list[bytes]]:
+    """Return the heads (n,) of messages, and n serialised messages."""
     heads = gather(data, offsets, MESSAGE_HEAD)
     starts = (offsets + MESSAGE_HEAD.itemsize).tolist()
     ends = (offsets + record_sizes(heads)).tolist()
-    messages = [data[start:end] for start, end in zip(starts, ends, strict=True)]
-    received, measured = heads["received"].astype(np.int64), heads["measured"].astype(np.int64)
-    return SampleBlock(received, measured, messages, number, offsets)
+    return heads, [data[start:end] for start, end in zip(starts, ends, strict=True)]

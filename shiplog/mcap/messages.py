@@ -6,12 +6,13 @@ PlotJuggler read it without knowing shiplog.
 """
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
 from google.protobuf.message import DecodeError, Message
 
-from shiplog.types import Channel, Event, FloatArray
+from shiplog.types import Channel, Event, EventLevel, FloatArray
 from shiplog.units import GEOGRAPHIC
 
 from .schema import EVENT, LOCATION_FIX, RAW, Schema, fill_message_rows, schema_for
@@ -81,6 +82,43 @@ def encode_event(event: Event) -> bytes:
     )
     message.timestamp.FromNanoseconds(event.time_ns)  # type: ignore[attr-defined]
     return message.SerializeToString(deterministic=True)
+
+
+def decode_event(data: bytes, time_ns: int) -> Event:
+    """Decode a ``foxglove.Log`` that happened at a time, ns.
+
+    Raises
+    ------
+    ValueError
+        It is no such message.
+
+    Examples
+    --------
+    >>> decode_event(encode_event(Event(0, "execute")), 5)
+    Event(time_ns=5, text='execute', source='operator', level=<EventLevel.INFO: 2>)
+    """
+    try:
+        message: Any = _message_type(EVENT).FromString(data)
+    except DecodeError as error:
+        raise ValueError(f"not {EVENT.name}") from error
+    level = EventLevel(min(max(message.level, EventLevel.INFO), EventLevel.ERROR))
+    return Event(time_ns, message.message, message.name, level)
+
+
+def decode_packet(data: bytes) -> bytes:
+    """Return the packet of a ``shiplog.Raw``, which may have other fields too.
+
+    Raises
+    ------
+    ValueError
+        It is no such message.
+    """
+    try:
+        message: Any = _message_type(RAW).FromString(data)
+    except DecodeError as error:
+        raise ValueError(f"not {RAW.name}") from error
+    packet: bytes = message.data
+    return packet
 
 
 @cache

@@ -13,7 +13,7 @@ from shiplog.errors import LogError, UsageError
 from shiplog.types import TimeArray, TrialLog
 
 from .clock_repair import MixedTimes, refuse_mixed_times
-from .decode import McapContents
+from .decode import McapContents, is_events, schema_of
 from .index_times import received_in_order
 from .records import MAGIC
 from .scan import scan
@@ -81,7 +81,7 @@ def read(
         The MCAP file.
     channels
         The channels to read, each named as in ``log[name]``. By default all. The log has them
-        in the order of the file.
+        in the order of the file, and all events.
     start_ns, end_ns
         Read the samples received from `start_ns` on and before `end_ns`, ns since 1970-01-01 UTC.
 
@@ -223,13 +223,31 @@ def _read_failure(path: Path, error: OSError) -> str:
 def _selected_ids(
     path: Path, contents: McapContents, keys: Collection[str] | None
 ) -> frozenset[int]:
-    """Return the ids of the described channels that are requested."""
+    """Return the ids of the described channels that are requested, and of the events."""
     by_id = channels_by_id(path, contents)
     if keys is None:
-        return frozenset(by_id)
+        return frozenset(by_id) | event_ids(contents)
     log = TrialLog(path.name, merge_by_topic(by_id.values()))
     selected = {log[key].key for key in keys}
-    return frozenset(id_ for id_, channel in by_id.items() if channel.key in selected)
+    ids = {id_ for id_, channel in by_id.items() if channel.key in selected}
+    return frozenset(ids | event_ids(contents))
+
+
+def event_ids(contents: McapContents) -> frozenset[int]:
+    """Return the ids of the described channels of events."""
+    return frozenset(
+        id_ for id_, channel in contents.channels.items() if is_events(channel, contents.schemas)
+    )
+
+
+def sample_count(summary: McapSummary) -> int:
+    """Return the number of samples in a file according to its summary."""
+    counts = summary.statistics.channel_message_counts
+    return sum(
+        counts.get(id_, 0)
+        for id_, channel in summary.channels.items()
+        if schema_of(channel, summary.schemas) is not None
+    )
 
 
 def _mcap_chunks_to_skip(
@@ -257,4 +275,5 @@ def _selected_part(log: TrialLog, keys: Collection[str] | None, span: ReceptionS
         for channel in log
         if any(channel is one for one in selected)
     ]
-    return replace(log, channels=tuple(parts))
+    events = tuple(event for event in log.events if not span.excludes(event.time_ns, event.time_ns))
+    return replace(log, channels=tuple(parts), events=events)

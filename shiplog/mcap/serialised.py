@@ -56,6 +56,27 @@ def serialise_packets(packets: RawPackets) -> SerialisedMessages:
     return SerialisedMessages(packets.received_ns, packets.received_ns, messages)
 
 
+def packet_of(message: bytes) -> bytes:
+    """Return the packet of a message ``shiplog.Raw``.
+
+    Raises
+    ------
+    ValueError
+        It is no such message.
+
+    Examples
+    --------
+    >>> packet_of(serialise_packets(RawPackets("a", "b", np.array([0]), (b"$X",))).messages[0])
+    b'$X'
+    """
+    for head_size in (2, 3, 4):
+        if message[:head_size] == _raw_head(len(message) - head_size):
+            return message[head_size:]
+    from .messages import decode_packet  # noqa: PLC0415 - written by another program
+
+    return decode_packet(message)
+
+
 def serialise_events(events: Sequence[Event], earliest_received_ns: int) -> SerialisedMessages:
     """Return events as messages ``foxglove.Log``, in the order of their times.
 
@@ -89,6 +110,8 @@ def concatenate_messages(parts: Sequence[SerialisedMessages]) -> SerialisedMessa
 @cache
 def _raw_head(length: int) -> bytes:
     """Return the tag and the length (a varint) before the bytes of a packet."""
+    if length < 0:
+        return b""
     head = bytearray(_DATA_TAG)
     while length > 0x7F:
         head.append(length & 0x7F | 0x80)

@@ -8,13 +8,13 @@ from typing import IO
 
 from mcap import records
 
-from shiplog.types import Channel, TrialLog
+from shiplog.types import Channel, Event, TrialLog
 from shiplog.types.inputs_in_force import inputs_in_force, with_inputs_in_force
 from shiplog.types.time_cut import TimeCut, empty_cut_error, resolve_cut
 
 from .clock_repair import MixedTimes, refuse_mixed_times
 from .decode import McapContents
-from .reader import contents_described_by, open_mcap, read_unchecked
+from .reader import contents_described_by, open_mcap, read_unchecked, sample_count
 from .scan import scan
 from .summary import are_in_order, read_summary
 from .times_check import TimesCheck
@@ -83,6 +83,14 @@ class LogFile:
     def data_lost(self) -> bool:
         """Whether a part of the file could not be read so far."""
         return self.outline.data_lost
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What happened during the trial, in the order of time."""
+        events = self.outline.events
+        for cut in self.cuts:
+            events = cut.events_within(events)
+        return events
 
     def select_sources(self, sources: Mapping[str, str]) -> "LogFile":
         """Return the log with a single source for each of the names given; see `Log`."""
@@ -202,7 +210,7 @@ def _open_unchecked(path: Path) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
         summary = read_summary(stream)
         if summary is None:
             return _open_by_scan(path, stream)
-        if summary.statistics.message_count <= MAX_SAMPLES_IN_MEMORY:
+        if sample_count(summary) <= MAX_SAMPLES_IN_MEMORY:
             return read_unchecked(path)
         mcap_chunks = summary.mcap_chunk_locations()
         if mcap_chunks is None:
@@ -217,14 +225,18 @@ def _open_unchecked(path: Path) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
 
 def _log_file(path: Path, contents: McapContents) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
     """Return a log in its file, or in memory where some times may need a repair."""
-    outline = build_trial_log(path, contents)
+    contents.event_messages = []  # of an earlier pass
     if _need_repair(path, contents):
         return read_unchecked(path)
+    outline = build_trial_log(path, contents)
     return LogFile(path, outline, contents.schemas, contents.channels), []
 
 
 def _need_repair(path: Path, described: McapContents) -> bool:
-    """Whether some times of a file may have to be changed or dropped, by one pass over it."""
+    """Whether some times of a file may have to be changed or dropped, by one pass over it.
+
+    Where none has, the contents that describe the file receive its events.
+    """
     contents = McapContents(
         dict(described.schemas), dict(described.channels), keep_undescribed=False
     )
@@ -234,6 +246,7 @@ def _need_repair(path: Path, described: McapContents) -> bool:
             check.add(contents.drain(), contents)
             if check.need_repair():
                 return True
+    described.event_messages = contents.event_messages
     return False
 
 

@@ -1,6 +1,6 @@
 """Conversion of a file's scanned contents to a `TrialLog`."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +54,8 @@ def build_trial_log(path: Path, contents: McapContents) -> TrialLog:
         contents.metadata,
         contents.vessel_toml,
         tuple(_warnings(contents)),
-        data_lost=contents.truncated or bool(contents.damage),
+        contents.truncated or bool(contents.damage),
+        tuple(contents.events),
     )
 
 
@@ -95,12 +96,51 @@ def _with_repaired_times(
     path: Path, columns: dict[int, MessageColumns], contents: McapContents
 ) -> dict[int, MessageColumns]:
     """Drop impossible times and remove steps of the clocks; the contents receive the warnings."""
+    as_recorded = columns
     columns, replaced = replace_unset_times(columns)
     columns, dropped = drop_impossible_times(columns)
     repair = repair_clock_steps(path.name, columns)
     contents.clock_warnings += replaced + dropped + repair.warnings
     contents.mixed_times += repair.mixed
+    _decode_events(contents, as_recorded, repair.columns)
     return repair.columns
+
+
+def _decode_events(
+    contents: McapContents,
+    as_recorded: Mapping[int, MessageColumns],
+    repaired: Mapping[int, MessageColumns],
+) -> None:
+    """Decode the events that are not yet, with times repaired as those of the samples."""
+    if not contents.event_messages:
+        return
+    from .messages import decode_event  # noqa: PLC0415 - protobuf takes long to import
+
+    events, contents.event_messages = contents.event_messages, []
+    is_changed = any(repaired[id_] is not channel for id_, channel in as_recorded.items())
+    for event in events:
+        shift = _shift_at(event.position, as_recorded, repaired) if is_changed else 0
+        try:
+            contents.events.append(decode_event(event.data, event.time_ns + shift))
+        except ValueError as error:
+            contents.damage.append(f"skipped an event: {error}")
+
+
+def _shift_at(
+    position: int,
+    as_recorded: Mapping[int, MessageColumns],
+    repaired: Mapping[int, MessageColumns],
+) -> int:
+    """Return by how much the time of the last sample before a place in the file was changed, ns."""
+    last, shift = -1, 0
+    for id_, channel in repaired.items():
+        row = int(np.searchsorted(channel.positions, position)) - 1
+        if row >= 0 and channel.positions[row] > last:
+            last = int(channel.positions[row])
+            original = as_recorded[id_]
+            then = original.received_ns[np.searchsorted(original.positions, last)]
+            shift = int(channel.received_ns[row] - then)
+    return shift
 
 
 def _warnings(contents: McapContents) -> list[str]:

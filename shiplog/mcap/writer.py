@@ -1,12 +1,13 @@
 """Writing of logs: whole trials, and samples, raw packets and events as they are recorded."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
+import numpy as np
 from mcap import records
 
 from shiplog.errors import UsageError
@@ -233,7 +234,11 @@ class LogWriter:
                 self._latest_ns = max(self._latest_ns, mcap_chunk.last_ns)
 
 
-def write(log: TrialLog, path: str | os.PathLike[str]) -> None:
+def write(
+    log: TrialLog,
+    path: str | os.PathLike[str],
+    raw: Iterable[Sequence[RawPackets]] = (),
+) -> None:
     """Write a whole trial to an MCAP file.
 
     Parameters
@@ -242,6 +247,8 @@ def write(log: TrialLog, path: str | os.PathLike[str]) -> None:
         The trial.
     path
         The file. It appears only when it is complete; until then an existing one is kept.
+    raw
+        The raw packets to keep beside it, in groups in the order of reception.
 
     Raises
     ------
@@ -254,7 +261,27 @@ def write(log: TrialLog, path: str | os.PathLike[str]) -> None:
         atomic_write(path) as part,
         LogWriter(part, metadata=log.metadata, vessel_toml=log.vessel_toml) as writer,
     ):
-        writer.write(*log.channels)
+        rest: tuple[Channel | Event, ...] = (*log.channels, *log.events)
+        for group in raw:
+            now, rest = _split_at(rest, max(int(p.received_ns.max()) for p in group if len(p)))
+            writer.write(*now, *group)
+        writer.write(*rest)
+
+
+def _split_at(
+    items: Sequence[Channel | Event], received_ns: int
+) -> tuple[tuple[Channel | Event, ...], tuple[Channel | Event, ...]]:
+    """Return what was received up to a time, and the rest."""
+    now: list[Channel | Event] = []
+    rest: list[Channel | Event] = []
+    for item in items:
+        if isinstance(item, Event):
+            (now if item.time_ns <= received_ns else rest).append(item)
+            continue
+        row = int(np.searchsorted(item.received_ns, received_ns, "right"))
+        now.append(item.part(0, row))
+        rest.append(item.part(row, len(item)))
+    return tuple(now), tuple(rest)
 
 
 def channel_metadata(channel: Channel) -> dict[str, str]:

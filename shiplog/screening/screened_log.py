@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from shiplog.checks.channel_stats import LogStats
-from shiplog.types import Channel, Log
+from shiplog.types import Channel, Event, Log
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +74,11 @@ class ScreenedLog:
     def data_lost(self) -> bool:
         """Whether a part of the file could not be read."""
         return self._log.data_lost
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What happened during the trial, in the order of time."""
+        return self._log.events
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """Iterate over the screened samples in chunks, each topic in the order of reception."""

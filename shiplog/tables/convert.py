@@ -1,5 +1,7 @@
 """Conversion between logs, tables and foreign tables, chosen by the endings of file names."""
 
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +12,12 @@ from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.checks.data_quality import times_in_words
 from shiplog.errors import LogError, UsageError
 from shiplog.mcap.clock_repair import refuse_mixed_times
+from shiplog.mcap.raw_reader import raw_groups
 from shiplog.mcap.reader import read_unchecked
 from shiplog.mcap.writer import write
 from shiplog.screening import screen_values
-from shiplog.types import TrialLog
+from shiplog.types import RawPackets, TrialLog
+from shiplog.types.time_cut import resolve_cut
 
 from .csv_form import CSV_MARK, read_csv, write_csv
 from .foreign import read_table
@@ -71,8 +75,11 @@ def convert(
         raise UsageError(f"source and target are the same file; name another target: {target}")
     is_mcap = layout is None and _suffix(source) == ".mcap"
     log, mixed = read_unchecked(source) if is_mcap else (_read_table(source, layout), [])
-    _require_samples(log, source)
-    log = log.between(start, end)
+    is_copy = is_mcap and target.suffix.lower() == ".mcap"
+    if not (is_copy and any(raw_groups(source))):  # a recording of raw packets alone is kept
+        _require_samples(log, source)
+    whole = log
+    log = whole.between(start, end)
     refuse_mixed_times(mixed, log.span_ns)
     warnings = list(log.warnings)
     if source.suffix.lower() == target.suffix.lower() == ".mcap":
@@ -84,9 +91,38 @@ def convert(
         if strict:
             refuse_contradictions(findings)
         warnings += [finding.text for finding in findings]
-    writers = {".mcap": write, ".csv": write_csv, ".parquet": write_parquet}
+    if target.suffix.lower() == ".mcap":
+        write(log, target, _raw_within(source, whole, start, end) if is_mcap else ())
+        return log, warnings
+    warnings += _dropped_raw(source) if is_mcap else []
+    writers = {".csv": write_csv, ".parquet": write_parquet}
     writers[target.suffix.lower()](log, target)
     return log, warnings
+
+
+def _raw_within(
+    source: Path, whole: TrialLog, start: float | str | None, end: float | str | None
+) -> Iterator[list[RawPackets]]:
+    """Yield the raw packets received within a cut of the whole log."""
+    cut = None
+    if start is not None or end is not None:
+        cut = resolve_cut(start, end, whole.span_ns, whole.name)
+    for group in raw_groups(source):
+        kept = group if cut is None else list(map(cut.packets_within, group))
+        if any(map(len, kept)):
+            yield [packets for packets in kept if len(packets)]
+
+
+def _dropped_raw(source: Path) -> list[str]:
+    """Report the raw packets that a table does not keep."""
+    packets: Counter[str] = Counter()
+    for group in raw_groups(source):
+        for each in group:
+            packets[each.topic] += len(each)
+    if not packets:
+        return []
+    counts = ", ".join(f"{count} of {topic}" for topic, count in packets.items())
+    return [f"a table keeps no raw packets, dropped are {counts}; convert to .mcap to keep them"]
 
 
 def _require_samples(log: TrialLog, source: Path) -> None:

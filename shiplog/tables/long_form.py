@@ -1,12 +1,12 @@
 """Long form of a trial: one row per sample and component, from which nothing is lost.
 
-What is not a number (units, sources, metadata, the vessel file, channels without samples) is in a
-header of JSON lines. A data frame carries it in its `attrs`, a CSV in comments, a Parquet file in
-the metadata of its schema.
+What is not a number (units, sources, metadata, events, the vessel file, channels without samples)
+is in a header of JSON lines. A data frame carries it in its `attrs`, a CSV in comments, a Parquet
+file in the metadata of its schema.
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from shiplog.errors import LogError
 from shiplog.mcap.schema import schema_for
-from shiplog.types import Channel, FloatArray, TimeArray, TrialLog
+from shiplog.types import Channel, Event, EventLevel, FloatArray, TimeArray, TrialLog
 from shiplog.units import did_you_mean
 
 if TYPE_CHECKING:  # slow to import: only what makes a frame waits for it
@@ -139,14 +139,31 @@ def row_labels(log: TrialLog) -> tuple[list[str], Codes, list[str], Codes]:
 
 
 def header_lines(log: TrialLog) -> str:
-    """Return the header: JSON lines of the metadata, of each channel, and of the vessel file."""
+    """Return the header: JSON lines of the metadata, channels, events and the vessel file."""
     lines = ["metadata " + _json(dict(log.metadata))]
     for c in log:
         entry = {"name": c.name, "source": c.source, "unit": c.unit, "fields": list(c.fields)}
         lines.append("channel " + _json(entry | {"metadata": dict(c.metadata)}))
+    lines += ["event " + _json(_event_entry(event)) for event in log.events]
     if log.vessel_toml is not None:
         lines += ["vessel " + _json(line) for line in log.vessel_toml.split("\n")]
     return "\n".join(lines)
+
+
+def _event_entry(event: Event) -> dict[str, str | int]:
+    return {
+        "time_ns": event.time_ns,
+        "text": event.text,
+        "source": event.source,
+        "level": event.level.name.lower(),
+    }
+
+
+def _event(time_ns: int, text: str, source: str, level: str) -> Event:
+    levels = {each.name.lower(): each for each in EventLevel}
+    if level not in levels:
+        raise ValueError(f"no level of an event: {level!r}; there are {', '.join(levels)}")
+    return Event(time_ns, text, source, levels[level])
 
 
 def _json(value: object) -> str:
@@ -182,7 +199,8 @@ def assemble(
     LogError
         The header cannot be read, or a row belongs to no channel of it.
     """
-    empty, metadata, vessel_toml = _read_header(name, header)
+    outline = _read_header(name, header)
+    empty = outline.channels
     place = {(c.topic, field): i for i, (c, field) in enumerate(_components(empty))}
     labels = zip(topics, fields, strict=True)
     of_row = np.fromiter((place.get(label, -1) for label in labels), np.int32, len(values))
@@ -197,12 +215,13 @@ def assemble(
     for channel in empty:
         channel_rows = [next(rows) for _ in field_names(channel)]
         channels.append(_filled(name, channel, channel_rows, measured_ns, received_ns, values))
-    return TrialLog(name, tuple(channels), metadata, vessel_toml)
+    return replace(outline, channels=tuple(channels))
 
 
-def _read_header(name: str, header: list[str]) -> tuple[list[Channel], dict[str, str], str | None]:
-    """Parse the channels, without samples, the metadata and the vessel file."""
+def _read_header(name: str, header: list[str]) -> TrialLog:
+    """Parse the log without its samples: channels, metadata, events and the vessel file."""
     metadata: dict[str, str] = {}
+    events: list[Event] = []
     channels: list[Channel] = []
     vessel: list[str] = []
     for line in header:
@@ -213,6 +232,8 @@ def _read_header(name: str, header: list[str]) -> tuple[list[Channel], dict[str,
                 metadata |= entry
             elif key == "channel":
                 channels.append(_empty_channel(**entry))
+            elif key == "event":
+                events.append(_event(**entry))
             elif key == "vessel":
                 vessel.append(entry)
             else:
@@ -221,10 +242,11 @@ def _read_header(name: str, header: list[str]) -> tuple[list[Channel], dict[str,
             raise LogError(
                 f"header line {line[:60]!r} cannot be read ({error}); convert the log again: {name}"
             ) from error
-    return channels, metadata, "\n".join(vessel) if vessel else None
+    vessel_toml = "\n".join(vessel) if vessel else None
+    return TrialLog(name, tuple(channels), metadata, vessel_toml, events=tuple(events))
 
 
-def _components(channels: list[Channel]) -> list[tuple[Channel, str]]:
+def _components(channels: Sequence[Channel]) -> list[tuple[Channel, str]]:
     return [(channel, field) for channel in channels for field in field_names(channel)]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from .arrays import ReadOnlyMapping, is_sorted
 from .channel import Channel
 from .channels_by_name import ChannelsByName
+from .event import Event
 from .inputs_in_force import inputs_in_force, with_inputs_in_force
 from .time_cut import empty_cut_error, resolve_cut
 
@@ -41,6 +42,8 @@ class TrialLog(ChannelsByName[Channel]):
         Problems met in reading the file: an unfinished file, damage, topics of other programs.
     data_lost
         Whether a part of the file could not be read.
+    events
+        What happened during the trial, in the order of time.
 
     Examples
     --------
@@ -58,8 +61,11 @@ class TrialLog(ChannelsByName[Channel]):
     vessel_toml: str | None = None
     warnings: tuple[str, ...] = ()
     data_lost: bool = False
+    events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
+        events = tuple(sorted(self.events, key=lambda event: event.time_ns))
+        object.__setattr__(self, "events", events)
         object.__setattr__(self, "metadata", ReadOnlyMapping(self.metadata))
         topics = [channel.key for channel in self.channels]
         if len(set(topics)) < len(topics):
@@ -112,7 +118,8 @@ class TrialLog(ChannelsByName[Channel]):
         channels = with_inputs_in_force(channels, samples)
         metadata = {**self.metadata, "cut": cut.text(self.name)}
         name = cut.name_of_part(self.name)
-        return replace(self, name=name, channels=channels, metadata=metadata)
+        events = cut.events_within(self.events)
+        return replace(self, name=name, channels=channels, metadata=metadata, events=events)
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """Iterate over the samples in chunks, all channels cut at the same times of reception.

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Protocol, Self
 
 from .channel import Channel
+from .event import Event
 
 
 class ChunkedLog(Protocol):
@@ -41,6 +42,10 @@ class Log(ChunkedLog, Protocol):
     @property
     def data_lost(self) -> bool:
         """Whether a part of the file could not be read."""
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What happened during the trial, in the order of time."""
 
     def select_sources(self, sources: Mapping[str, str]) -> Self:
         """Return the log with a single source for each of the names given.

@@ -1,15 +1,19 @@
 """Cut of a log by measured time: its bounds as people write them, and its samples."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from datetime import UTC, date, datetime, time, timedelta
 from math import isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shiplog.errors import UsageError
 
+from .arrays import TimeArray
 from .channel import Channel
+from .event import Event
+from .raw_packets import RawPackets
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _DAY_NS = 86_400 * 10**9
@@ -43,6 +47,23 @@ class TimeCut:
         if len(rows) and rows[-1] - rows[0] == len(rows) - 1:
             return channel.part(int(rows[0]), int(rows[-1]) + 1)  # without a copy
         return channel.take(rows)
+
+    def events_within(self, events: Iterable[Event]) -> tuple[Event, ...]:
+        """Return the events within the cut; one that begins or ends with the log is open there."""
+        events = list(events)
+        rows = self._rows(np.array([event.time_ns for event in events], np.int64))
+        return tuple(events[row] for row in rows)
+
+    def packets_within(self, packets: RawPackets) -> RawPackets:
+        """Return the raw packets received within the cut, which is open as for events."""
+        rows = self._rows(packets.received_ns)
+        data = tuple(packets.data[row] for row in rows)
+        return replace(packets, received_ns=packets.received_ns[rows], data=data)
+
+    def _rows(self, times: TimeArray) -> NDArray[np.intp]:
+        after = (times >= self.start_ns) | (self.start_ns <= self.log_span_ns[0])
+        before = (times < self.end_ns) | (self.end_ns > self.log_span_ns[1])
+        return np.flatnonzero(after & before)
 
     def name_of_part(self, name: str) -> str:
         """Return the name of a log with the bounds of the cut, in s since the log's start.
