@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from shiplog.mcap.clock_repair import mixed_times_in
-from shiplog.mcap.decode import McapContents, MessageCount, is_foreign, is_raw, schema_of
+from shiplog.mcap.decode import McapContents, MessageCount, is_events, is_foreign, is_raw, schema_of
 from shiplog.mcap.raw_reader import raw_source
 from shiplog.mcap.reader import open_mcap, read, sample_count
 from shiplog.mcap.scan import scan
@@ -284,8 +284,14 @@ def _info_of_summary(path: Path, summary: McapSummary) -> LogInfo:
         summary.vessel_toml is not None,
         warnings=(warning,),
         raw=_raw_in_summary(summary),
-        events=read(path, channels=()).events,
+        events=_events_of(path, summary),
     )
+
+
+def _events_of(path: Path, summary: McapSummary) -> tuple[Event, ...]:
+    """Read the events of a long file, from the few MCAP chunks that have any."""
+    has_events = any(is_events(each, summary.schemas) for each in summary.channels.values())
+    return read(path, channels=()).events if has_events else ()
 
 
 def _foreign_in_summary(summary: McapSummary) -> tuple[ForeignTopic, ...]:
