@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from shiplog.cli.options import (
     add_cut_options,
+    add_derive_option,
     add_source_option,
     assigned_sources,
 )
@@ -27,6 +28,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         help="length between perpendiculars, such as 320; precedes that of the vessel file",
     )
     add_source_option(parser)
+    add_derive_option(parser)
     parser.add_argument(
         "--strict", action="store_true", help="refuse a log with a contradiction in unit or sign"
     )
@@ -48,7 +50,8 @@ def reading_options(arguments: argparse.Namespace) -> "ReadingOptions":
 
     sources = assigned_sources(arguments.source)
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
-    return ReadingOptions(vessel, arguments.length, sources, arguments.strict)
+    derive = tuple(arguments.derive)
+    return ReadingOptions(vessel, arguments.length, sources, arguments.strict, derive)
 
 
 def show_review(path: str | Path, *, view: bool) -> None:

@@ -99,6 +99,7 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
         (*OPTIONAL_CHANNELS, "position"),
         purpose="an identification",
         sources=options.sources,
+        derive=options.derive,
     )
     stats = screened.screening.stats
     toml = log.vessel_toml

@@ -4,7 +4,7 @@ The first pass collects statistics of the raw channels and defines the clock; th
 the log, collects statistics of the signals and fits the regression of the whole trial.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,7 @@ from shiplog.types import ChunkedLog, FloatArray, Log
 from shiplog.vessel.settings import MIN_WINDOW_SECS
 
 from .channel_warnings import channel_warnings, end_warnings, late_channel_warnings
+from .reading_options import ReadingOptions
 
 REQUIRED_CHANNELS = (*PAPER_OUTPUTS, *PAPER_INPUTS)
 OPTIONAL_CHANNELS = ("heading", "position")
@@ -83,7 +84,7 @@ class SecondPass:
 
 
 def first_pass(
-    log: Log, vessel: Vessel, sources: Mapping[str, str], on_progress: ProgressCallback
+    log: Log, vessel: Vessel, options: ReadingOptions, on_progress: ProgressCallback
 ) -> FirstPass:
     """Screen a log and define the clock of its replay.
 
@@ -93,8 +94,8 @@ def first_pass(
         The log as recorded.
     vessel
         The vessel, whose steering gear follows an order of the rudder.
-    sources
-        The source to use, by the name of a quantity that has several.
+    options
+        Of these the sources of channels, and the channels to derive.
     on_progress
         Called with the step and its share done.
 
@@ -105,7 +106,12 @@ def first_pass(
     """
     on_progress("check the log", 0.0)
     screened = screen_log(
-        log, REQUIRED_CHANNELS, OPTIONAL_CHANNELS, purpose="a replay", sources=sources
+        log,
+        REQUIRED_CHANNELS,
+        OPTIONAL_CHANNELS,
+        purpose="a replay",
+        sources=options.sources,
+        derive=options.derive,
     )
     stats = screened.screening.stats
     clock = choose_clock(screened, stats, channels=REQUIRED_CHANNELS, optional=("heading",))

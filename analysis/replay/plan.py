@@ -133,7 +133,7 @@ def plan_replay(
     vessel, origin = _stated_vessel(log, options.vessel, settings or {})
     vessel = with_length(vessel, options.length) or vessel
     vessel, kind = _with_filter(vessel, filter)
-    first = first_pass(log, vessel, options.sources, on_progress)
+    first = first_pass(log, vessel, options, on_progress)
     second = second_pass(first, vessel, on_progress, strict=options.strict)
     on_progress("choose the model", 0.0)
     with naming_contradictions(second.contradictions):

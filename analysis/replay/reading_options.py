@@ -23,6 +23,9 @@ class ReadingOptions:
         default it is chosen by comparing them.
     strict
         Refuse a log whose channels contradict each other in unit or sign, instead of a warning.
+    derive
+        The channels that are derived where a log lacks them: ``yaw_rate`` from the heading,
+        ``speed`` from the speed over ground. Warnings state their noise.
 
     Examples
     --------
@@ -36,6 +39,7 @@ class ReadingOptions:
     length: float | None = None
     sources: Mapping[str, str] = field(default_factory=dict)
     strict: bool = False
+    derive: tuple[str, ...] = ()
 
 
 DEFAULT_OPTIONS = ReadingOptions()

@@ -77,6 +77,10 @@ def _log(findings: Findings) -> JsonObject:
         "samples": clock.count,
         "metadata": findings.metadata,
         "channels": {channel.topic: _channel(channel) for channel in log_stats},
+        "derived": {
+            f"/{each.name}/{each.source}": each.metadata
+            for each in findings.plan.screening.derivations
+        },
     }
 
 

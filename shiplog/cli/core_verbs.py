@@ -7,7 +7,7 @@ from pathlib import Path
 from shiplog.errors import ShiplogError
 
 from .console import print_tables, print_warnings, progress, write_json
-from .options import add_cut_options
+from .options import add_cut_options, add_derive_option
 from .paths import require_distinct, require_inputs, require_outputs
 from .printable import printable
 from .verb import ExitCode, Verb
@@ -85,6 +85,7 @@ def _configure_convert(parser: argparse.ArgumentParser) -> None:
         "--layout", type=Path, help="the columns of a foreign table: a TOML file (docs/tables.md)"
     )
     add_cut_options(parser)
+    add_derive_option(parser)
     parser.add_argument(
         "--strict", action="store_true", help="refuse a table with a contradiction in unit or sign"
     )
@@ -103,6 +104,7 @@ def _convert(arguments: argparse.Namespace) -> ExitCode:
             start=arguments.start,
             end=arguments.end,
             strict=arguments.strict,
+            derive=arguments.derive,
         )
     print_warnings(warnings)
     samples = sum(len(channel) for channel in log.channels)

@@ -37,6 +37,18 @@ def add_source_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_derive_option(parser: argparse.ArgumentParser) -> None:
+    """Add the repeatable option ``--derive``."""
+    parser.add_argument(
+        "--derive",
+        action="append",
+        default=[],
+        metavar="CHANNEL",
+        help="derive a channel that a log lacks: yaw_rate from the heading, or speed from the "
+        "speed over ground; a warning states its noise",
+    )
+
+
 def assigned_sources(texts: Sequence[str]) -> dict[str, str]:
     """Parse the values of the option ``--source``: the source by the name of its channel."""
     return assigned_texts(texts, "--source", "yaw_rate=TI")

@@ -1,11 +1,24 @@
 """Screening: a log as its users take it, with one source of each quantity and no unusable value.
 
 `screen_log` decides from statistics of the whole log what is used; a `ScreenedLog` applies the
-decisions chunk by chunk. Replay and identification read every log through it. Imports nothing of
-`shiplog.tables`, `shiplog.resampling` or `shiplog.vessel`.
+decisions chunk by chunk. A quantity that a log lacks is derived from another on demand. Replay and
+identification read every log through it. Imports nothing of `shiplog.tables`, `shiplog.resampling`
+or `shiplog.vessel`.
 """
 
-from .screen import screen_log, screen_values
+from .derivation_plan import DERIVED_FROM, plan_derivations
+from .derived_log import Derivation, DerivedLog
+from .screen import screen_log
 from .screened_log import ScreenedLog, Screening
+from .value_screen import screen_values
 
-__all__ = ["ScreenedLog", "Screening", "screen_log", "screen_values"]
+__all__ = [
+    "DERIVED_FROM",
+    "Derivation",
+    "DerivedLog",
+    "ScreenedLog",
+    "Screening",
+    "plan_derivations",
+    "screen_log",
+    "screen_values",
+]

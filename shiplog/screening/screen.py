@@ -5,12 +5,13 @@ from dataclasses import replace
 
 from shiplog.checks.channel_stats import LogStats
 from shiplog.checks.data_quality import data_warnings
-from shiplog.checks.log_stats import compute_log_stats
 from shiplog.errors import LogError
 from shiplog.types import Log
 
-from .screened_log import ScreenedLog, Screening
-from .sources import choose_sources
+from .derivation_plan import derivation_remedy, plan_derivations
+from .derived_log import DerivedLog
+from .screened_log import ScreenedLog
+from .value_screen import screen_values
 
 
 def screen_log(
@@ -20,6 +21,7 @@ def screen_log(
     *,
     purpose: str,
     sources: Mapping[str, str] | None = None,
+    derive: Sequence[str] = (),
 ) -> ScreenedLog:
     """Decide what is used of a log, and return the log without the rest.
 
@@ -34,9 +36,14 @@ def screen_log(
     sources
         The source to use, by the name of a quantity that has several. By default it is chosen
         by comparing them.
+    derive
+        Names of quantities that are derived from others where the log lacks them, some of
+        ``yaw_rate`` and ``speed``.
 
     Raises
     ------
+    UsageError
+        A quantity cannot be derived.
     LogError
         A required quantity or a source is missing, or a channel cannot be used as it is.
 
@@ -48,49 +55,30 @@ def screen_log(
     >>> screened.warnings
     ()
     """
-    screened = screen_values(log, (*required, *optional), sources=sources)
+    derivations = plan_derivations(log, derive, sources) if derive else ()
+    whole = DerivedLog(log, derivations) if derivations else log
+    screened = screen_values(whole, (*required, *optional), sources=sources)
     stats = screened.screening.stats
-    _require_channels(stats, required, purpose)
+    _require_channels(whole, stats, required, purpose, sources)
     names = (*required, *(name for name in optional if name in stats))
-    warnings = (*screened.screening.warnings, *data_warnings(stats, names))
-    return ScreenedLog(log, replace(screened.screening, warnings=warnings))
+    derived = (each.warning for each in derivations)
+    warnings = (*derived, *screened.screening.warnings, *data_warnings(stats, names))
+    screening = replace(screened.screening, warnings=warnings, derivations=derivations)
+    return ScreenedLog(log, screening)
 
 
-def screen_values(
-    log: Log, names: Sequence[str], *, sources: Mapping[str, str] | None = None
-) -> ScreenedLog:
-    """Return a log with one source of each quantity and no unusable value, whatever it lacks.
-
-    No channel is required, and defects of a single channel are neither refused nor reported.
-
-    Parameters
-    ----------
-    log
-        The log as recorded.
-    names
-        Names of the quantities that are used, where the log has them.
-    sources
-        As in `screen_log`.
-
-    Raises
-    ------
-    LogError
-        A source is missing.
-    """
-    chosen = dict(sources or {})
-    selected = log.select_sources(chosen) if chosen else log
-    all_stats = compute_log_stats(log, strict=True, sources=chosen)
-    stats = all_stats.select_sources(chosen)
-    present = tuple(name for name in names if name in stats)
-    found, warnings = choose_sources(selected, stats, present, chosen)
-    return ScreenedLog(log, Screening(all_stats, chosen | found, tuple(warnings)))
-
-
-def _require_channels(stats: LogStats, required: Sequence[str], purpose: str) -> None:
+def _require_channels(
+    log: Log,
+    stats: LogStats,
+    required: Sequence[str],
+    purpose: str,
+    sources: Mapping[str, str] | None,
+) -> None:
     missing = [name for name in required if name not in stats]
     if missing:
         present = ", ".join(sorted({channel.name for channel in stats}))
         raise LogError(
             f"no channel {missing[0]!r} in {stats.name}; it has {present or 'no channels'}; "
             f"{purpose} needs {', '.join(required)}"
+            f"{''.join(derivation_remedy(log, name, sources) for name in missing)}"
         )

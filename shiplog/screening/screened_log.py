@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from shiplog.checks.channel_stats import LogStats
 from shiplog.types import Channel, Event, Log
 
+from .derived_log import Derivation, DerivedLog
+
 
 @dataclass(frozen=True, eq=False)
 class Screening:
@@ -20,11 +22,14 @@ class Screening:
         The chosen source, by the name of each quantity that has several or was chosen by the user.
     warnings
         Problems of the data, each in a sentence.
+    derivations
+        The channels that are derived from others.
     """
 
     all_stats: LogStats
     sources: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    derivations: tuple[Derivation, ...] = ()
 
     @property
     def stats(self) -> LogStats:
@@ -46,7 +51,8 @@ class ScreenedLog:
     """
 
     def __init__(self, log: Log, screening: Screening) -> None:
-        self._log = log.select_sources(screening.sources) if screening.sources else log
+        whole = DerivedLog(log, screening.derivations) if screening.derivations else log
+        self._log = whole.select_sources(screening.sources) if screening.sources else whole
         self.screening = screening
         self._stats = {(stats.topic, stats.fields): stats for stats in screening.stats}
 

@@ -1,7 +1,7 @@
 """Conversion between logs, tables and foreign tables, chosen by the endings of file names."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,8 +15,8 @@ from shiplog.mcap.clock_repair import refuse_mixed_times
 from shiplog.mcap.raw_reader import raw_groups
 from shiplog.mcap.reader import read_unchecked
 from shiplog.mcap.writer import write
-from shiplog.screening import screen_values
-from shiplog.types import RawPackets, TrialLog
+from shiplog.screening import DerivedLog, plan_derivations, screen_values
+from shiplog.types import RawPackets, TrialLog, concatenate_channels
 from shiplog.types.time_cut import resolve_cut
 
 from .csv_form import CSV_MARK, read_csv, write_csv
@@ -35,6 +35,7 @@ def convert(
     start: float | str | None = None,
     end: float | str | None = None,
     strict: bool = False,
+    derive: Sequence[str] = (),
 ) -> tuple[TrialLog, list[str]]:
     """Convert a file to another format.
 
@@ -51,6 +52,8 @@ def convert(
         The part to convert, as `TrialLog.between` takes them; by default all.
     strict
         Refuse a foreign table whose channels contradict each other in unit or sign.
+    derive
+        The channels to add that the log lacks, some of ``yaw_rate`` and ``speed``.
 
     Returns
     -------
@@ -82,6 +85,9 @@ def convert(
     log = whole.between(start, end)
     refuse_mixed_times(mixed, log.span_ns)
     warnings = list(log.warnings)
+    if derive:
+        log, derived = _with_derived(log, derive)
+        warnings += derived
     if source.suffix.lower() == target.suffix.lower() == ".mcap":
         log, sort_warnings = sorted_by_time(log)
         warnings += sort_warnings
@@ -123,6 +129,15 @@ def _dropped_raw(source: Path) -> list[str]:
         return []
     counts = ", ".join(f"{count} of {topic}" for topic, count in packets.items())
     return [f"a table keeps no raw packets, dropped are {counts}; convert to .mcap to keep them"]
+
+
+def _with_derived(log: TrialLog, names: Sequence[str]) -> tuple[TrialLog, list[str]]:
+    """Return the log with derived channels, each marked in its metadata, and their warnings."""
+    derivations = plan_derivations(log, names)
+    chunks = [chunk[len(log) :] for chunk in DerivedLog(log, derivations).chunks()]
+    derived = [concatenate_channels(parts) for parts in zip(*chunks, strict=True)]
+    warnings = [each.warning for each in derivations]
+    return replace(log, channels=(*log.channels, *derived)), warnings
 
 
 def _require_samples(log: TrialLog, source: Path) -> None:
