@@ -142,7 +142,7 @@ class Replay:
         for signals, held, following in held_throughout(resampled, hold):
             adjoint = next(adjoints) if adjoints is not None else None
             yield stages.step(signals, held, following, adjoint)
-        self._findings = stages.findings(dict(self._log.metadata))
+        self._findings = stages.findings(self._log)
 
     @property
     def findings(self) -> Findings:

@@ -8,6 +8,7 @@ from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit
 from analysis.regression.sliding import CoefficientHistory
 from shiplog import Signals
+from shiplog.types import Event
 
 from .plan import Plan
 from .residuals import ResidualSummary
@@ -63,6 +64,8 @@ class Findings:
         How the track is known, in words.
     warnings
         Those of the plan and those of the replay.
+    events
+        The events of the log, in the order of time.
     """
 
     plan: Plan
@@ -74,6 +77,7 @@ class Findings:
     changes: tuple[Change, ...]
     track_origin: str
     warnings: tuple[str, ...]
+    events: tuple[Event, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from analysis.regression.changes import ShipChangeTest
 from analysis.regression.coefficients import CoefficientStage
 from shiplog import Signals
 from shiplog.ships.paper import PAPER_OUTPUTS
+from shiplog.types import Log
 
 from .estimator_design import diverged, make_estimators
 from .passes import weak_form_on_clock
@@ -89,15 +90,15 @@ class Stages:
             self.tracker.step(signals, *(estimates.states[:, i] for i in OUTPUT_STATES)),
         )
 
-    def findings(self, metadata: dict[str, str]) -> Findings:
-        """Return the findings, once all chunks were replayed."""
+    def findings(self, log: Log) -> Findings:
+        """Return the findings, once all chunks of the log were replayed."""
         residuals = tuple(test.result() for test in self._residual_tests)
         changes = self._change_test.result()
         warnings = [residual.warning for residual in residuals if residual.warning]
         warnings += _excess_warnings(self._plan, self._observer.excess_share)
         return Findings(
             plan=self._plan,
-            metadata=metadata,
+            metadata=dict(log.metadata),
             residuals=residuals,
             disturbances=self._observer.result(),
             yaw=self._yaw.result(),
@@ -105,6 +106,7 @@ class Stages:
             changes=changes,
             track_origin=self.tracker.origin,
             warnings=(*self._plan.warnings, *warnings, *map(str, changes)),
+            events=log.events,
         )
 
     def _estimates(

@@ -51,5 +51,6 @@ def _markdown_list(items: Iterable[str]) -> str:
 
 def _markdown_table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     columns = [column or " " for column in columns]
-    lines = [columns, ["---"] * len(columns), *rows]
+    cells = ([cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows)
+    lines = [columns, ["---"] * len(columns), *cells]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)

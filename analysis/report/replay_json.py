@@ -14,6 +14,7 @@ from analysis.regression.coefficients import CoefficientFit
 from analysis.replay.replay_results import Findings
 from shiplog import __version__
 from shiplog.checks.channel_stats import ChannelStats
+from shiplog.checks.event_table import events_to_json
 from shiplog.ships.paper import COEFFICIENT_UNITS
 from shiplog.vessel.settings import settings_dict
 
@@ -29,7 +30,8 @@ def replay_json(findings: Findings) -> JsonObject:
     -------
     dict
         ``log``, ``model``, ``settings``, ``residuals`` (by output), ``wave``, ``disturbances``,
-        ``coefficients``, ``changes``, ``windows`` (by equation), ``track_origin``, ``warnings``.
+        ``coefficients``, ``changes``, ``windows`` (by equation), ``track_origin``, ``warnings``,
+        ``events`` and ``events_omitted``, their number beyond those listed.
     """
     plan = findings.plan
     result = {
@@ -62,7 +64,7 @@ def replay_json(findings: Findings) -> JsonObject:
         "windows": {"yaw": _windows(findings.yaw), "surge": _windows(findings.surge)},
         "track_origin": findings.track_origin,
         "warnings": list(findings.warnings),
-    }
+    } | events_to_json(findings.events, plan.log_stats.span_ns[0])
     return _without_nan(result)  # type: ignore[no-any-return]
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.replay.replay_results import Findings
 from analysis.replay.residuals import ResidualSummary
+from shiplog.checks.event_table import event_table
 from shiplog.text_table import TextTable
 from shiplog.units import CATALOGUE, conversion_factor
 
@@ -21,7 +22,7 @@ def replay_tables(findings: Findings) -> tuple[TextTable, ...]:
     -------
     tuple of TextTable
         The log, the filter's residuals, the disturbances and the coefficients; then the changes of
-        coefficients within the trial, where there are any.
+        coefficients within the trial and the events, where there are any.
     """
     return (
         _log_table(findings),
@@ -29,6 +30,7 @@ def replay_tables(findings: Findings) -> tuple[TextTable, ...]:
         _disturbance_table(findings),
         _coefficient_table(findings),
         *_change_tables(findings),
+        *_event_tables(findings),
     )
 
 
@@ -36,6 +38,12 @@ def replay_markdown(findings: Findings) -> str:
     """Return the results of a replay as a page in Markdown, the table of the log last."""
     log, *results = replay_tables(findings)
     return markdown_page(findings.plan.name, (*results, log), findings.warnings)
+
+
+def _event_tables(findings: Findings) -> tuple[TextTable, ...]:
+    if not findings.events:
+        return ()
+    return (event_table(findings.events, findings.plan.log_stats.span_ns[0]),)
 
 
 def _log_table(findings: Findings) -> TextTable:

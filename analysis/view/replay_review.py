@@ -23,6 +23,7 @@ from .rerun_io import (
     plot_view,
     save_recording,
     send_chart,
+    send_events,
     send_points,
     send_style,
     send_text,
@@ -94,7 +95,7 @@ class ReplayReview:
         yaw, surge = equation_panels(findings, drawn)
         coefficients, chart = history_panels(findings, drawn), draw_track(findings, drawn)
         further = self._further.panels()
-        page = _replay_page(yaw, surge, coefficients, chart)
+        page = _replay_page(yaw, surge, coefficients, chart, has_events=bool(findings.events))
         rr.send_blueprint(_blueprint(page, further), recording=recording)
         _send_properties(recording, findings)
         send_text(recording, "summary", text + LEGEND + (FURTHER_LEGEND if further else ""))
@@ -106,6 +107,8 @@ class ReplayReview:
                     send_points(recording, entity, series, start_ns)
         if chart is not None:
             send_chart(recording, "track", chart, start_ns)
+        if findings.events:
+            send_events(recording, "events", findings.events, start_ns)
         recording.flush()
 
 
@@ -197,9 +200,17 @@ def _blueprint(page: rrb.Container, further: list[Panel]) -> rrb.Blueprint:
 
 
 def _replay_page(
-    yaw: list[Panel], surge: list[Panel], coefficients: list[Panel], chart: TrackChart | None
+    yaw: list[Panel],
+    surge: list[Panel],
+    coefficients: list[Panel],
+    chart: TrackChart | None,
+    *,
+    has_events: bool,
 ) -> rrb.Container:
-    """Lay out one page: yaw and surge on the left; track, summary and coefficients on the right."""
+    """Lay out one page: yaw and surge on the left; track, summary and coefficients on the right.
+
+    The events of the log are a list of texts below these.
+    """
     plots = rrb.Horizontal(
         *(rrb.Vertical(*map(plot_view, column), row_shares=ROW_SHARES) for column in (yaw, surge))
     )
@@ -210,5 +221,9 @@ def _replay_page(
     side: list[rrb.View | rrb.Container] = [rrb.Horizontal(*top, column_shares=shares)]
     if coefficients:
         side.append(rrb.Grid(*map(plot_view, coefficients), grid_columns=3, name="coefficients"))
-    right = rrb.Vertical(*side, row_shares=[2, 3][: len(side)])
+    row_shares = [2, 3][: len(side)]
+    if has_events:
+        side.append(rrb.TextLogView(origin="events", name="events"))
+        row_shares.append(1)
+    right = rrb.Vertical(*side, row_shares=row_shares)
     return rrb.Horizontal(plots, right, column_shares=[1, 1], name="replay")

@@ -1,7 +1,7 @@
 """Rerun recordings: series, text and track charts sent to them, views and blueprints."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -10,13 +10,14 @@ import rerun.blueprint as rrb
 
 from shiplog.errors import ShiplogError
 from shiplog.files import atomic_write
-from shiplog.types import FloatArray
+from shiplog.types import Event, EventLevel, FloatArray
 
 from .panels import Panel
 from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Series
 from .track_chart import TrackChart
 
 MAX_ROWS = 1 << 16  # sent at once
+EVENT_LEVELS = {EventLevel.INFO: "INFO", EventLevel.WARNING: "WARN", EventLevel.ERROR: "ERROR"}
 WHOLE_RUN = rrb.TimeAxis(
     view_range=rr.TimeRange(
         start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
@@ -75,6 +76,20 @@ def _times(time_secs: FloatArray, start_ns: int) -> list[rr.TimeColumn]:
         rr.TimeColumn("time", duration=since.astype("m8[ns]")),
         rr.TimeColumn("stamp", timestamp=(start_ns + since).astype("M8[ns]")),
     ]
+
+
+def send_events(
+    recording: rr.RecordingStream, entity: str, events: Sequence[Event], start_ns: int
+) -> None:
+    """Send events as a log of texts with their levels."""
+    stamps = np.array([event.time_ns for event in events], np.int64)
+    times = [
+        rr.TimeColumn("time", duration=(stamps - start_ns).astype("m8[ns]")),
+        rr.TimeColumn("stamp", timestamp=stamps.astype("M8[ns]")),
+    ]
+    texts = [f"{event.source}: {event.text}" for event in events]
+    levels = [EVENT_LEVELS[event.level] for event in events]
+    recording.send_columns(entity, times, rr.TextLog.columns(text=texts, level=levels))
 
 
 def send_text(recording: rr.RecordingStream, entity: str, text: str) -> None:

@@ -8,6 +8,7 @@ from analysis.replay.replay import analyse
 from analysis.replay.replay_results import Analysis
 from analysis.report.replay_json import replay_json
 from shiplog import TrialLog
+from shiplog.types import Event
 
 
 def test_the_json_has_the_documented_keys(zigzag_analysis: Analysis) -> None:
@@ -50,3 +51,11 @@ def test_the_settings_and_the_wave_are_in_the_json(zigzag_log: TrialLog) -> None
     assert found["wave"]["frequency"] == 0.6
     assert {"yaw", "yaw_as_rudder", "surge", "yaw_wave", "surge_wave"} == set(found["disturbances"])
     assert replay_json(analyse(zigzag_log).findings)["wave"] is None
+
+
+def test_the_events_of_the_log_are_in_the_json(zigzag_log: TrialLog) -> None:
+    event = Event(zigzag_log.span_ns[0] + 10**10, "execute")
+    found = replay_json(analyse(replace(zigzag_log, events=(event,))).findings)
+    (entry,) = found["events"]
+    assert (entry["text"], entry["since_start_secs"], entry["level"]) == ("execute", 10.0, "info")
+    assert found["events_omitted"] == 0

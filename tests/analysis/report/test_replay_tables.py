@@ -6,6 +6,7 @@ from analysis.replay.replay import analyse
 from analysis.replay.replay_results import Analysis
 from analysis.report.replay_tables import replay_markdown, replay_tables
 from shiplog import TrialLog
+from shiplog.types import Event
 
 
 def test_the_papers_wave_colours_the_innovations(zigzag_analysis: Analysis) -> None:
@@ -48,3 +49,17 @@ def test_the_filter_is_named_on_the_page(zigzag_log: TrialLog) -> None:
 def test_warnings_are_on_the_page(zigzag_analysis: Analysis) -> None:
     page = replay_markdown(replace(zigzag_analysis.findings, warnings=("the gyro slept",)))
     assert "## Warnings\n\n- the gyro slept" in page
+
+
+def test_events_are_listed_and_cannot_break_the_page(zigzag_analysis: Analysis) -> None:
+    start_ns = zigzag_analysis.findings.plan.log_stats.span_ns[0]
+    event = Event(start_ns + 10**10, "execute | 20\nstarboard")
+    findings = replace(zigzag_analysis.findings, events=(event,))
+    assert replay_tables(findings)[-1].rows[0][1:] == (
+        "10.0",
+        "info",
+        "operator",
+        "execute | 20\nstarboard",
+    )
+    assert "execute \\| 20 starboard |" in replay_markdown(findings)
+    assert "## Events" not in replay_markdown(zigzag_analysis.findings)

@@ -31,6 +31,7 @@ from analysis.view.viewer import view_review
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog.errors import ShiplogError
+from shiplog.types import Event, EventLevel
 from shiplog.vessel.vessel_parser import load_vessel
 
 RERUN = shutil.which("rerun", path=str(Path(sys.executable).parent))
@@ -447,3 +448,28 @@ def test_the_command_writes_a_review_without_a_warning_of_rerun(tmp_path: Path) 
     assert done.returncode == 0, done.stderr
     assert foreign_lines(done.stderr) == []
     assert all(layout(review, "TimeAxis:view_range"))
+
+
+def test_events_are_texts_with_their_levels_on_both_timelines(
+    analysis: Analysis, review: Path, tmp_path: Path
+) -> None:
+    start_ns = analysis.signals.start_ns
+    events = (
+        Event(start_ns + 60 * 10**9, "execute, 20 starboard"),
+        Event(start_ns + 61 * 10**9, "no data", "gps", EventLevel.WARNING),
+    )
+    path = tmp_path / "events.rrd"
+    findings = replace(analysis.findings, events=events)
+    write_replay_review(replace(analysis, findings=findings), path, text="")
+    (batch,) = (
+        chunk.to_record_batch()
+        for chunk in RrdReader(path).stream()
+        if chunk.entity_path == "/events"
+    )
+    texts = [row[0] for row in batch["TextLog:text"].to_pylist()]
+    assert texts == ["operator: execute, 20 starboard", "gps: no data"]
+    assert [row[0] for row in batch["TextLog:level"].to_pylist()] == ["INFO", "WARN"]
+    since = batch["time"].to_numpy(zero_copy_only=False).astype(np.int64)
+    assert since.tolist() == [60 * 10**9, 61 * 10**9]
+    assert "events" in layout(path, "ViewBlueprint:display_name")
+    assert "events" not in layout(review, "ViewBlueprint:display_name")
