@@ -11,8 +11,8 @@ from analysis.filters.smoother import Adjoint, smoothed
 from analysis.regression.changes import ShipChangeTest
 from analysis.regression.coefficients import CoefficientStage
 from shiplog import Signals
+from shiplog.screening import ScreenedLog
 from shiplog.ships.paper import PAPER_OUTPUTS
-from shiplog.types import Log
 
 from .estimator_design import diverged, make_estimators
 from .passes import weak_form_on_clock
@@ -90,7 +90,7 @@ class Stages:
             self.tracker.step(signals, *(estimates.states[:, i] for i in OUTPUT_STATES)),
         )
 
-    def findings(self, log: Log) -> Findings:
+    def findings(self, log: ScreenedLog) -> Findings:
         """Return the findings, once all chunks of the log were replayed."""
         residuals = tuple(test.result() for test in self._residual_tests)
         changes = self._change_test.result()

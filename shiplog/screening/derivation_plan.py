@@ -6,7 +6,7 @@ import numpy as np
 
 from shiplog.checks.channel_stats import ChannelStats
 from shiplog.errors import LogError, ShiplogError, UsageError
-from shiplog.types import FloatArray, Log
+from shiplog.types import ChunkedLog, FloatArray, Log
 from shiplog.units import did_you_mean
 
 from .derived_log import Derivation
@@ -66,7 +66,7 @@ def plan_derivations(
     return tuple(found)
 
 
-def _heading_rate(log: Log, base: ChannelStats) -> HeadingRate:
+def _heading_rate(log: ChunkedLog, base: ChannelStats) -> HeadingRate:
     parts: list[FloatArray] = []
     for chunk in log.chunks():
         heading = base.select(chunk)
