@@ -6,7 +6,8 @@ block ``\s:GR0001,n:12*hh\``.
 """
 
 import re
-from collections.abc import Iterator
+from itertools import product
+from string import hexdigits
 from typing import NamedTuple
 
 from recorders.streams.packets import MAX_PACKET_BYTES
@@ -16,6 +17,10 @@ _PIECE = re.compile(rb"(?:\\[^\\]*\\)?[$!][^$!\\]*|[^$!]+")  # a sentence with i
 _TAG_PARAMETER = re.compile(r"([a-z]):([ -~]+)")
 _SOURCE = re.compile(r"[A-Za-z0-9_-]{1,15}")
 _MAX_TAG_NUMBER = 10**15
+_CHECKSUMS = {bytes(two): int(bytes(two), 16) for two in product(hexdigits.encode(), repeat=2)}
+_SHORT = 128  # bytes of nearly all sentences
+_SHIFTS = (512, 256, 128, 64, 32, 16, 8)
+_LONG_SHIFTS = (16384, 8192, 4096, 2048, 1024, *_SHIFTS)  # of up to MAX_PACKET_BYTES
 
 
 class FramingError(Exception):
@@ -64,19 +69,16 @@ class Sentence(NamedTuple):
     tag: TagBlock = NO_TAG
 
 
-def split_packet(data: bytes) -> Iterator[bytes]:
-    """Yield the lines of a packet: usually one; of a datagram perhaps several.
+def split_packet(data: bytes) -> list[bytes]:
+    """Return the lines of a packet: usually one; of a datagram perhaps several.
 
-    A line into which another sentence was cut is yielded in parts, of which the last may be whole.
+    A line into which another sentence was cut is returned in parts, of which the last may be whole.
     """
     data = data.removeprefix(DATAGRAM_HEADER).strip(b"\r\n\0 \t")
-    lines = data.splitlines() if b"\n" in data or b"\r" in data else (data,)
-    for line in lines:
-        if line.count(b"$") + line.count(b"!") <= 1:
-            if line:
-                yield line
-        else:
-            yield from _PIECE.findall(line)
+    lines = data.splitlines() if b"\n" in data or b"\r" in data else [data]
+    if len(lines) == 1 and data.count(b"$") + data.count(b"!") == 1:
+        return lines
+    return [piece for line in lines for piece in _PIECE.findall(line)]
 
 
 def parse_sentence(line: bytes, *, require_checksum: bool = True) -> Sentence:
@@ -143,21 +145,14 @@ def checksum(body: bytes) -> int:
     '12'
     """
     folded = int.from_bytes(body)
-    bits = 8
-    while bits < 8 * len(body):
-        bits *= 2
-    while bits > 8:  # a byte; halves are folded over each other
-        bits //= 2
-        folded = (folded >> bits) ^ (folded & ((1 << bits) - 1))
-    return folded
+    for shift in _SHIFTS if len(body) <= _SHORT else _LONG_SHIFTS:
+        folded ^= folded >> shift  # halves over each other, down to a byte
+    return folded & 0xFF
 
 
 def _require_checksum(body: bytes, digits: bytes) -> None:
-    try:
-        stated = int(digits, 16) if len(digits) == 2 else -1
-    except ValueError:
-        stated = -1
-    if stated < 0:
+    stated = _CHECKSUMS.get(digits)
+    if stated is None:
         raise FramingError("malformed checksum")
     if stated != checksum(body):
         raise FramingError("wrong checksum")

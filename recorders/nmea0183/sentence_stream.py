@@ -138,7 +138,8 @@ def _derive_times(
         if day is None:
             counts.warn("the lines have no date: counted from 1970-01-01; state it with --date")
         return even_times(batches, midnight_ns(day), arguments.interval)
-    tagged = sum(sentence.tag.time_ns is not None for sentence in sentences_of(head))
+    tag_lines = [packet for packet in head if b"\\" in packet.data]
+    tagged = sum(sentence.tag.time_ns is not None for sentence in sentences_of(tag_lines))
     if tagged > _MOST * len(head):
         return tag_times(batches)
     reference = find_reference(head, day)

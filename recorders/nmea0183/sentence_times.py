@@ -1,5 +1,6 @@
 """Times of a file without time stamps, from the UTC times in its own sentences."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
@@ -10,12 +11,13 @@ from shiplog.tables.printed_times import DAY_NS
 
 from .framing import FramingError, Sentence, parse_sentence, split_packet
 from .gnss_clock import ROLLOVER_NS, Warn, rollovers
-from .utc_fields import Utc, nearest_ns, utc_of
+from .utc_fields import TIMED, Utc, nearest_ns, utc_of
 
 MAX_HELD = 200_000  # lines that wait for the next time
 _GAP_RATIO, _MIN_GAP_NS = 10, 5 * 10**9  # longer between two times than usual: lines are missing
 _MAX_BACK = 10  # times that run backwards one after the other: then the receiver's clock was set
 _SECOND_NS = 10**9
+_TIMED_LINE = re.compile("|".join(sorted(TIMED)).encode())
 _REMEDY = "state the time between its lines with --interval (in s), or record it with time stamps"
 
 
@@ -55,7 +57,7 @@ def sentences_of(packets: Sequence[Packet]) -> Iterator[Sentence]:
 def _times_of(packets: Sequence[Packet]) -> dict[tuple[str, str], list[Utc]]:
     """Return the times in sentences by talker and formatter."""
     times: dict[tuple[str, str], list[Utc]] = {}
-    for sentence in sentences_of(packets):
+    for sentence in sentences_of([p for p in packets if _TIMED_LINE.search(p.data)]):
         if (utc := _utc(sentence)) is not None:
             times.setdefault((sentence.talker, sentence.formatter), []).append(utc)
     return times
@@ -174,6 +176,7 @@ class SentenceTimes:
 
     def __init__(self, reference: TimeReference, warn: Warn) -> None:
         self._reference, self._warn = reference, warn
+        self._mark = reference.formatter.encode()  # only lines with it are parsed
         self._held: list[Packet] = []  # since the last time, or since the start
         self._first = 0  # the held line whose time is known, once it is
         self._time_ns: int | None = None  # of that line
@@ -204,7 +207,7 @@ class SentenceTimes:
 
     def _time_of(self, packet: Packet) -> int | None:
         """Return the time of a line of the reference, ns, if it is a new one."""
-        if self._reference.formatter.encode() not in packet.data:
+        if self._mark not in packet.data:
             return None
         for sentence in sentences_of([packet]):
             is_reference = sentence[:2] == (self._reference.talker, self._reference.formatter)
@@ -253,7 +256,7 @@ class SentenceTimes:
             time_ns = start_ns + round(number * line_ns)
             if limit_ns is not None and limit_ns > start_ns:
                 time_ns = min(time_ns, limit_ns)
-            done.append(packet._replace(received_ns=time_ns))
+            done.append(Packet(packet.data, time_ns, packet.origin))
         return done
 
     def _continue(self) -> list[Packet]:
