@@ -26,6 +26,15 @@ def pytest_configure(config: pytest.Config) -> None:
     subprocess.run([*command, "-o", os.devnull], stdout=quiet, stderr=quiet, check=False)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files that take longest first, so that parallel workers end at about one time.
+
+    These are the tests of whole programs, beside this file, and those of identification.
+    """
+    root = Path(__file__).parent
+    items.sort(key=lambda item: (item.path.parent != root, "identification" not in item.path.parts))
+
+
 @pytest.fixture(scope="session")
 def recordings() -> Path:
     """Return the folder of the real recordings; skip the test where it does not exist."""

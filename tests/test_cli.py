@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fitted_runs import identify_auto
 from mcap_files import end_mcap_chunk
 from places import KVLCC2, LAYOUTS, PROJECT, SAMPLE_DATA
 from stderr_lines import foreign_lines
@@ -17,7 +16,6 @@ from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Channel, LogWriter, TrialLog, read, write
 from shiplog.cli.main import main
 from shiplog.cli.verb import ExitCode
-from shiplog.vessel.vessel_parser import parse_vessel
 
 OK, FAILURE, USAGE, DATA_LOST = ExitCode
 
@@ -563,21 +561,6 @@ def test_a_ship_of_another_model_is_identified_written_simulated_and_replayed(
     output = capsys.readouterr()
     assert "first model, fitted to this log" in output.out
     assert "has only a model 'norrbin'" in output.err
-
-
-@pytest.mark.xdist_group("auto")
-def test_the_best_model_is_chosen_on_the_command_line() -> None:
-    run = identify_auto()
-    assert run.exit_code == OK
-    result = json.loads(run.stdout)
-    assert result["model"]["name"] == run.ship.model.name
-    assert result["model"]["name"] in ("burylin", "burylin-tied")
-    scores = [each["score"] for each in result["models"]]
-    assert scores == sorted(scores)
-    assert "Models by cross-validation" in run.stderr
-    assert "model 1 of 7" in run.stderr
-    vessel = parse_vessel(run.vessel_toml, "best.toml")
-    assert vessel.model is None  # the paper's model needs no section [model]
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,6 @@ from benchmarks.distortion_matrix import (
 from benchmarks.distortions import CASES, Case, cases, identified_cases
 from benchmarks.undistorted import Condition, conditions, false_alarms
 
-pytestmark = pytest.mark.xdist_group("distortions")
-
 
 @pytest.fixture(scope="module")
 def outcomes() -> list[Outcome]:

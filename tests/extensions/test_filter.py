@@ -53,11 +53,13 @@ for i, bandwidth in enumerate((ratio[0]**0.25, ratio[1]**0.5)):
 
 
 @pytest.fixture(scope="module")
-def environment(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
-    target = tmp_path_factory.mktemp("filter")
-    (target / "broken.py").write_text("import no_such_module\n", encoding="utf-8")
-    declare(target, "broken", "shiplog.filters", broken="broken:BROKEN")
-    return installed("filter", target)
+def environment(
+    tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config
+) -> Mapping[str, str]:
+    folder = tmp_path_factory.mktemp("broken")
+    (folder / "broken.py").write_text("import no_such_module\n", encoding="utf-8")
+    declare(folder, "broken", "shiplog.filters", broken="broken:BROKEN")
+    return installed("filter", pytestconfig, folder)
 
 
 def test_the_page_shows_the_files_of_the_package() -> None:

@@ -21,8 +21,8 @@ print(record(CsvSource(Path("run.csv")), "python.mcap"))
 
 
 @pytest.fixture(scope="module")
-def environment(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
-    return installed("recorder", tmp_path_factory.mktemp("recorder"))
+def environment(pytestconfig: pytest.Config) -> Mapping[str, str]:
+    return installed("recorder", pytestconfig)
 
 
 @pytest.fixture

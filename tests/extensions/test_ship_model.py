@@ -38,8 +38,8 @@ TRUTH = {"a": -0.5, "a2": -1.5, "k": 0.5, "f": -0.5, "g": -0.05, "h": 0.05}
 
 
 @pytest.fixture(scope="module")
-def environment(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
-    return installed("ship_model", tmp_path_factory.mktemp("ship_model"))
+def environment(pytestconfig: pytest.Config) -> Mapping[str, str]:
+    return installed("ship_model", pytestconfig)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, environment: Mapping[str, s
     """A folder with a vessel file of the model and a simulated run of it."""
     folder = tmp_path_factory.mktemp("runs")
     (folder / "ship.toml").write_text(VESSEL, encoding="utf-8")
-    simulate = "record simulate pseudo-random --duration 400 --noise none --vessel ship.toml"
+    simulate = "record simulate pseudo-random --duration 150 --noise none --vessel ship.toml"
     done = run_shiplog(environment, folder, *simulate.split(), "-o", "run.mcap")
     assert done.returncode == 0, done.stderr
     return folder

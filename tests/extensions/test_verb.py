@@ -16,8 +16,8 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def environment(packages: Path) -> Mapping[str, str]:
-    return installed("verb", packages)
+def environment(packages: Path, pytestconfig: pytest.Config) -> Mapping[str, str]:
+    return installed("verb", pytestconfig, packages)
 
 
 def test_the_page_shows_the_files_of_the_package() -> None:

@@ -4,24 +4,62 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import pytest
 from places import PROJECT
 
 EXTENSIONS = PROJECT / "tests" / "extensions"
 
 
-def installed(name: str, target: Path) -> Mapping[str, str]:
-    """Install the package tests/extensions/NAME; return the environment in which it is found."""
+def installed(name: str, config: pytest.Config, *folders: Path) -> Mapping[str, str]:
+    """Install the package tests/extensions/NAME; return the environment in which it is found.
+
+    It is kept in pytest's cache under a hash of its files: numba caches the machine code of a
+    function by the place of its file.
+
+    Parameters
+    ----------
+    name
+        The folder of the package.
+    config
+        Has the cache.
+    folders
+        Further folders of installed packages.
+    """
+    source = EXTENSIONS / name
+    digest = sha256(b"".join(file.read_bytes() for file in sorted(source.glob("*.*")))).hexdigest()
+    target = config.cache.mkdir("extensions") / f"{name}-{digest[:16]}"
+    if not target.exists():
+        _install(source, target)
+    path = os.pathsep.join(map(str, (*folders, target, PROJECT)))
+    return os.environ | {"PYTHONPATH": path}
+
+
+def _install(source: Path, target: Path) -> None:
+    """Install a package into a folder, which has its name only once it is complete."""
     options = ("--quiet", "--no-deps", "--no-index", "--no-build-isolation")
-    done = subprocess.run(
-        [sys.executable, "-m", "pip", "install", *options, "--target", target, EXTENSIONS / name],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return os.environ | {"PYTHONPATH": os.pathsep.join((str(target), str(PROJECT)))}
+    with TemporaryDirectory(dir=target.parent) as part:
+        done = subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "pip",
+                "install",
+                *options,
+                "--target",
+                f"{part}/packages",
+                source,
+            ],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        complete = Path(part) / "packages"
+        complete.rename(target)
 
 
 def run_shiplog(

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fitted_runs import identify_auto
 from trial_logs import as_log
 
 from analysis.identification.identified_ship import IdentifiedShip
-from analysis.identification.identify import STEPS, _best_fit, identify
+from analysis.identification.identify import STEPS, identify
 from analysis.identification.model_selection import rank_models
 from analysis.identification.prediction import predict
 from analysis.identification.runs import run_from_log
@@ -71,7 +70,6 @@ def with_values(log: TrialLog, **values: float) -> TrialLog:
 # ---- results
 
 
-@pytest.mark.xdist_group("tied ship")
 def test_intervals_from_several_logs_contain_the_true_parameters() -> None:
     ship, truth = tied_ship(), VESSEL.coefficients._asdict()
     for name, (low, high) in zip(ship.uncertainty.names, ship.uncertainty.interval, strict=True):
@@ -84,7 +82,6 @@ def test_intervals_from_several_logs_contain_the_true_parameters() -> None:
     assert ship.warnings == ()
 
 
-@pytest.mark.xdist_group("tied ship")
 def test_validation_logs_are_predicted_with_manoeuvring_indices() -> None:
     circle, zigzag = tied_ship().validations
     assert circle.rms["yaw_rate"] < radians(0.02)
@@ -101,27 +98,10 @@ def test_validation_logs_are_predicted_with_manoeuvring_indices() -> None:
     assert indices["period"].measured == pytest.approx(2 * (406.2 - 275.8), abs=10)
 
 
-@pytest.mark.xdist_group("auto")
-def test_auto_takes_the_model_that_best_predicts_the_run_held_out() -> None:
-    ship = identify_auto().ship
-    assert ship.candidates[0].model is ship.model
-    assert ship.model.name in ("burylin", "burylin-tied")
-    assert len(ship.candidates) == 7
-    assert "Models by cross-validation" in identification_tables(ship)[0].title
-
-
-@pytest.mark.xdist_group("auto")
-def test_the_best_model_whose_simulation_does_not_diverge_is_taken() -> None:
-    first, second, *others = identify_auto().ship.candidates
-    assert _best_fit([first, second, *others]) is first.fit
-    assert _best_fit([replace(first, fit=None), second, *others]) is second.fit
-    with pytest.raises(LogError, match="simulation of every model diverges"):
-        _best_fit([replace(first, fit=None)])
-
-
 def test_a_fixed_t3_selects_the_tied_form() -> None:
-    assert identify([a_log()], fixed={"T3": 0.5}).model.name == "burylin-tied"
-    assert identify([a_log()]).model.name == "burylin"
+    log = a_log(seconds=200.0)
+    assert identify([log], fixed={"T3": 0.5}).model.name == "burylin-tied"
+    assert identify([log]).model.name == "burylin"
 
 
 def test_ties_are_consistent_with_data_of_a_tied_ship_and_contradicted_by_others() -> None:
@@ -141,7 +121,6 @@ def test_ties_are_consistent_with_data_of_a_tied_ship_and_contradicted_by_others
 # ---- vessel file
 
 
-@pytest.mark.xdist_group("tied ship")
 def test_the_vessel_file_holds_the_identified_ship() -> None:
     ship = tied_ship()
     text = vessel_toml(ship)
@@ -212,7 +191,7 @@ def test_logs_that_carry_different_ships_are_rejected() -> None:
         identify([a_log()], validation_logs=[a_log(seed=1, toml=LONG)])
     # filter settings do not make another ship
     filtered = TOML.replace("process_ratio = 2.5e-5", "process_ratio = 1e-4")
-    assert identify([a_log(), a_log(seed=1, toml=filtered)]).vessel == VESSEL
+    assert identify([a_log(), a_log(seed=1, toml=filtered)], "nomoto").vessel == VESSEL
 
 
 def test_logs_of_different_ships_under_one_vessel_file_give_a_warning() -> None:
@@ -223,7 +202,7 @@ def test_logs_of_different_ships_under_one_vessel_file_give_a_warning() -> None:
     speed = log["speed"]
     faster = replace(speed, values=3 * speed.values)
     scaled = replace(log, channels=tuple(faster if c is speed else c for c in log.channels))
-    inconsistent = identify([a_log(seed=1), replace(scaled, name="scaled.mcap")])
+    inconsistent = identify([a_log(seed=1), replace(scaled, name="scaled.mcap")], "nomoto")
     assert any("scaled.mcap starts with" in warning for warning in inconsistent.warnings)
 
 
@@ -236,9 +215,9 @@ def test_a_rudder_of_opposite_sign_gives_a_warning() -> None:
 
 
 def test_an_assumed_length_gives_a_warning_and_a_given_one_is_used() -> None:
-    ship = identify([a_log()], "slipstream")
+    ship = identify([a_log(seconds=200.0)], "slipstream")
     assert any("length is not given; 150 m" in warning for warning in ship.warnings)
-    given = identify([a_log(toml=LONG)], "slipstream")
+    given = identify([a_log(toml=LONG, seconds=200.0)], "slipstream")
     assert given.fit.problem.scale.secs == pytest.approx(200.0 / given.fit.problem.scale.speed)
     assert not any("length" in warning for warning in given.warnings)
 
@@ -297,13 +276,14 @@ def test_the_same_data_under_two_names_are_rejected() -> None:
 
 
 def test_logs_of_one_name_are_numbered() -> None:
-    ship = identify([replace(a_log(), name="a.mcap"), replace(a_log(seed=1), name="a.mcap")])
+    logs = [replace(a_log(seed=seed), name="a.mcap") for seed in (0, 1)]
+    ship = identify(logs, "nomoto")
     assert [run.name for run in ship.runs] == ["a.mcap", "a.mcap (2)"]
 
 
 def test_two_approach_speeds_are_the_same_ship() -> None:
     slow = TOML.replace("approach_rpm = 80.0", "approach_rpm = 60.0")
-    ship = identify([a_log(), a_log(seed=1, toml=slow)])
+    ship = identify([a_log(), a_log(seed=1, toml=slow)], "nomoto")
     assert ship.vessel is not None
 
 
@@ -343,17 +323,17 @@ def test_a_parameter_near_zero_is_identifiable() -> None:
 
 @pytest.mark.parametrize("missing", ["sway", "heading"])
 def test_a_channel_missing_in_one_run_is_fitted_in_the_others(missing: str) -> None:
-    log = a_log(seed=1)
-    speed = log["speed"]
+    one, other = (a_log(seed=seed, seconds=200.0) for seed in (0, 1))
+    speed = other["speed"]
     sway = replace(speed, name="sway", values=np.zeros(len(speed)))
-    whole = replace(a_log(), channels=(*a_log().channels, replace(sway, name="sway")))
-    ship = identify([whole, without(log, missing)], "slipstream")
+    whole = replace(one, channels=(*one.channels, sway))
+    ship = identify([whole, without(other, missing)], "slipstream")
     assert missing in ship.fit.problem.outputs
     assert np.isfinite(ship.fit.parameters).all()
 
 
 def test_drift_lag_without_sway_has_histories() -> None:
-    ship = identify([a_log()], "drift-lag")
+    ship = identify([a_log(seconds=200.0)], "drift-lag")
     assert "Td" in ship.uncertainty.unidentifiable
     assert np.isfinite(ship.histories[0].values[0, 0]).all()
 
@@ -383,7 +363,7 @@ def test_differing_halves_of_a_single_log_are_named_halves() -> None:
 
 def test_identifier_settings_do_not_make_another_ship() -> None:
     windowed = TOML + "\n[identifier]\nwindow_secs = 300.0\n"
-    assert identify([a_log(), a_log(seed=1, toml=windowed)]).vessel is not None
+    assert identify([a_log(), a_log(seed=1, toml=windowed)], "nomoto").vessel is not None
 
 
 def test_a_fixed_parameter_must_lie_within_the_model_s_limits() -> None:
@@ -394,7 +374,6 @@ def test_a_fixed_parameter_must_lie_within_the_model_s_limits() -> None:
 # ---- the public function
 
 
-@pytest.mark.xdist_group("tied ship")
 def test_a_result_pickles_and_copies() -> None:
     ship = tied_ship()
     for again in (pickle.loads(pickle.dumps(ship)), deepcopy(ship)):  # noqa: S301 - our own

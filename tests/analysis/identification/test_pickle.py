@@ -16,8 +16,6 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import load_vessel
 
-pytestmark = pytest.mark.xdist_group("fitted")  # these files share fits
-
 Copy = Callable[[Any], Any]
 
 

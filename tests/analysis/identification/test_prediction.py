@@ -76,7 +76,6 @@ def circle_errors(fit: OutputError) -> dict[str, float]:
     }
 
 
-@pytest.mark.xdist_group("marin zigzags")
 def test_turning_circle_is_predicted_from_marin_zigzags() -> None:
     errors = circle_errors(marin_zigzag_fit())
     assert abs(errors["advance"]) < 3
@@ -139,7 +138,6 @@ def test_simulated_zigzag_has_the_overshoots_of_an_independent_simulation() -> N
     np.testing.assert_allclose(np.degrees(overshoots)[:2], [16.355, 14.744], atol=0.01)
 
 
-@pytest.mark.xdist_group("marin zigzags")
 def test_first_overshoots_of_the_tanker_are_predicted() -> None:
     fit = marin_zigzag_fit()
     for angle, measured in ((10, 9.39), (20, 15.59)):

@@ -11,8 +11,6 @@ from analysis.identification.fit.uncertainty import uncertainty
 from analysis.identification.prior_sensitivity import PriorSensitivity, prior_sensitivity
 from shiplog.ships import Model, ship_model
 
-pytestmark = pytest.mark.xdist_group("fitted")  # these files share fits
-
 
 def with_prior(model: Model, name: str, std: float) -> Model:
     """Return the model with a prior on one of its parameters."""

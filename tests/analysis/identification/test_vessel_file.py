@@ -29,7 +29,6 @@ from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.ship import ship_from_vessel
 from shiplog.vessel.vessel_parser import parse_vessel
 
-MODELS = [pytest.param(name, marks=pytest.mark.xdist_group(f"identified {name}")) for name in SHIPS]
 NOISE = {"yaw_rate.white": 1e-4, "speed.white": 0.03, "heading.white": 1e-3, "sway.white": 0.03}
 RUNS = ("zigzag-20-20", "pseudo-random", "turning-circle-35-port")
 SECOND_ORDER = ("slipstream", "drift-lag", "three-dof")
@@ -68,7 +67,7 @@ def exact_motion(vessel: Vessel, run: str) -> dict[str, FloatArray]:
 # ---- round trip
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", SHIPS)
 def test_the_intervals_of_each_model_contain_the_true_parameters(name: str) -> None:
     ship, _ = identified(name)
     # in the true scale: the measured speed of the straight run contains noise
@@ -81,7 +80,7 @@ def test_the_intervals_of_each_model_contain_the_true_parameters(name: str) -> N
     assert set(estimates.unidentifiable) <= {"f2"}
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", SHIPS)
 def test_the_file_holds_the_identified_model(name: str) -> None:
     ship, text = identified(name)
     vessel = parse_vessel(text, "v.toml")
@@ -93,7 +92,7 @@ def test_the_file_holds_the_identified_model(name: str) -> None:
     assert f"a = {ship.parameters.get('a')!r}  # ± " in text or name == "three-dof"
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", SHIPS)
 def test_the_identified_ship_manoeuvres_like_the_true_one(name: str) -> None:
     _, text = identified(name)
     true = parse_vessel(toml_of(name) + GEAR, name)
@@ -108,7 +107,7 @@ def test_the_identified_ship_manoeuvres_like_the_true_one(name: str) -> None:
 # ---- the paper's model in the same file
 
 
-@pytest.mark.parametrize("name", [m for m in MODELS if m.values[0] in SECOND_ORDER])
+@pytest.mark.parametrize("name", SECOND_ORDER)
 def test_the_papers_model_of_the_same_logs_is_written_for_replay(name: str) -> None:
     _, text = identified(name)
     paper = parse_vessel(text, "v.toml").paper_coefficients
@@ -118,20 +117,19 @@ def test_the_papers_model_of_the_same_logs_is_written_for_replay(name: str) -> N
     np.testing.assert_allclose(paper, alone, rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", [m for m in MODELS if m.values[0] not in SECOND_ORDER])
+@pytest.mark.parametrize("name", [name for name in SHIPS if name not in SECOND_ORDER])
 def test_the_papers_model_of_a_first_order_ship_is_stable_and_turns_or_is_absent(name: str) -> None:
     c = parse_vessel(identified(name)[1], "v.toml").coefficients
     assert c is None or (c.d > 0 > c.a)
 
 
-@pytest.mark.xdist_group("identified slipstream")
 def test_a_papers_model_with_a_rudder_of_opposite_sign_is_not_written() -> None:
     reversed_log = with_rudder_reversed(logs_of("slipstream")[0])
     turned = replace(identified("slipstream")[0], fit=identify([reversed_log], "slipstream").fit)
     assert parse_vessel(vessel_toml(turned), "v.toml").coefficients is None
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", SHIPS)
 def test_each_model_s_log_is_replayed_with_the_written_file(name: str) -> None:
     log = replace(logs_of(name)[0], vessel_toml=identified(name)[1])
     replayed = analyse(log)
@@ -148,7 +146,6 @@ def with_rudder_reversed(log: TrialLog) -> TrialLog:
     return replace(log, channels=tuple(turned if c is rudder else c for c in log.channels))
 
 
-@pytest.mark.xdist_group("identified slipstream")
 def test_the_papers_model_among_the_candidates_is_not_fitted_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -163,7 +160,6 @@ def diverges(*_: object, **__: object) -> None:
     raise LogError("the model burylin diverges on these segments")
 
 
-@pytest.mark.xdist_group("identified norrbin")
 def test_where_the_papers_model_diverges_the_identified_one_is_written_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -186,7 +182,6 @@ def test_where_the_papers_model_diverges_the_identified_one_is_written_alone(
     assert replayed.findings.plan.vessel.coefficients == without.findings.plan.vessel.coefficients
 
 
-@pytest.mark.xdist_group("identified three-dof")
 def test_length_gear_and_alphas_come_from_the_file_a_log_carries() -> None:
     _, text = identified("three-dof")
     carried = text.replace("alpha3 = 0.0654", "alpha3 = 0.05")
@@ -214,7 +209,6 @@ def without_length() -> IdentifiedShip:
     return identify([as_log(trial) for trial in segments], "three-dof")
 
 
-@pytest.mark.xdist_group("without length")
 def test_an_assumed_length_is_marked() -> None:
     text = vessel_toml(without_length())
     (line,) = [line for line in text.split("\n") if line.startswith("length")]
@@ -222,7 +216,6 @@ def test_an_assumed_length_is_marked() -> None:
     assert parse_vessel(text, "v.toml").length == 150.0
 
 
-@pytest.mark.xdist_group("without length")
 def test_values_that_are_not_identifiable_are_marked_with_their_origin() -> None:
     ship = without_length()  # no sway was measured
     estimates = ship.uncertainty
@@ -236,7 +229,6 @@ def test_values_that_are_not_identifiable_are_marked_with_their_origin() -> None
         assert f"{remark}: one of many values that fit them" in lines[name]
 
 
-@pytest.mark.xdist_group("identified nomoto")
 def test_a_model_without_identifiable_parameters_is_written_in_comments() -> None:
     ship, _ = identified("nomoto")
     estimates = ship.uncertainty
@@ -251,7 +243,6 @@ def test_a_model_without_identifiable_parameters_is_written_in_comments() -> Non
         assert (vessel.length, vessel.gear_given) == (LENGTH, ("max", "rate"))
 
 
-@pytest.mark.xdist_group("identified nomoto")
 def test_a_gear_that_is_not_given_is_not_written() -> None:
     ship, _ = identified("nomoto")
     text = vessel_toml(replace(ship, vessel=Vessel("", None, length=LENGTH)))
@@ -260,7 +251,6 @@ def test_a_gear_that_is_not_given_is_not_written() -> None:
     assert parse_vessel(text, "v.toml").gear_given == ()
 
 
-@pytest.mark.xdist_group("identified nomoto")
 def test_every_value_of_a_fit_that_has_not_converged_is_marked() -> None:
     ship, _ = identified("nomoto")
     minimum = replace(ship.fit.minimum, converged=False)
@@ -275,7 +265,6 @@ def test_every_value_of_a_fit_that_has_not_converged_is_marked() -> None:
         assert "(*)" not in {row[0]: row[1] for row in identification_tables(ship)[0].rows}[name]
 
 
-@pytest.mark.xdist_group("identified nomoto")
 def test_a_model_that_does_not_fit_the_ship_is_written_with_a_caution() -> None:
     ship, _ = identified("nomoto")
     wide = replace(ship.uncertainty, std=np.full(len(ship.uncertainty.names), 100.0))

@@ -18,8 +18,6 @@ from analysis.regression.coefficients import fit_coefficients
 from analysis.regression.weak_form import weak_form
 from shiplog import load_vessel
 
-pytestmark = pytest.mark.xdist_group("fitted")  # these files share fits
-
 PRIOR = load_vessel("table1")[0].coefficients
 
 

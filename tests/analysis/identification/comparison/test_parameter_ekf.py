@@ -20,8 +20,6 @@ from analysis.identification.fit.problem import Nuisance
 from analysis.identification.fit.uncertainty import uncertainty
 from shiplog.ships import ship_model
 
-pytestmark = pytest.mark.xdist_group("fitted")  # these files share fits
-
 
 @pytest.mark.parametrize("model", ["burylin", "burylin-tied", "norrbin"])
 def test_an_update_is_the_joint_least_squares_of_prior_and_samples(model: str) -> None:

@@ -62,7 +62,6 @@ def test_the_halves_of_a_run_agree(manoeuvre: str) -> None:
         assert agreement.contradiction == 1.0
 
 
-@pytest.mark.xdist_group("mixed")
 def test_the_log_of_another_ship_is_named_and_nothing_is_identifiable() -> None:
     ship = mixed()
     (warning,) = [w for w in ship.warnings if "contradict each other" in w]
@@ -71,7 +70,6 @@ def test_the_log_of_another_ship_is_named_and_nothing_is_identifiable() -> None:
     assert set(ship.uncertainty.unidentifiable) == set(ship.uncertainty.names)
 
 
-@pytest.mark.xdist_group("mixed")
 def test_contradicting_runs_do_not_inflate_the_noise_of_one_output() -> None:
     """Without a limit, reweighting would ignore one output, the speed first."""
     fit = mixed().fit

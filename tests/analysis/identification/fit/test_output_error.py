@@ -72,7 +72,6 @@ def test_tied_fits_of_zigzags_reach_the_required_accuracy() -> None:
         assert max(median[name] for name in ("f", "g", "h")) <= 1.5
 
 
-@pytest.mark.xdist_group("free fits")
 def test_free_fits_reach_the_cramer_rao_bound_and_their_intervals_hold_the_truth() -> None:
     fits = [free_fit(seed) for seed in range(8)]
     estimates = [uncertainty(fit) for fit in fits]
@@ -211,7 +210,6 @@ def test_a_wave_is_detected_and_none_in_white_noise() -> None:
     assert swell_frequency(noise, std, 0.1) == pytest.approx(0.1, rel=0.03)
 
 
-@pytest.mark.xdist_group("free fits")
 def test_a_fitted_swell_does_not_count_as_slow_noise() -> None:
     fit = free_fit(6)
     assert len(fit.problem.waves[0]) == 1
