@@ -69,7 +69,7 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
     options = reading_options(arguments)
     output = _replay_output(arguments)
     from analysis.replay.plan import plan_replay
-    from analysis.replay.precompile import compiling_beside
+    from analysis.replay.precompile import compile_tests, compiling_beside
     from analysis.replay.replay import Replay
     from analysis.report.replay_json import replay_json
     from analysis.report.replay_tables import replay_markdown, replay_tables
@@ -88,6 +88,7 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
         from analysis.view.replay_review import open_replay_review
 
         if compilation:
+            compile_tests()
             compilation.wait()
         replay = Replay(log, plan, on_progress=on_progress)
         with open_replay_review(plan, output, full=arguments.full) as review:

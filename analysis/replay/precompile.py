@@ -1,8 +1,8 @@
 """Compilation of the loops of filter, observer and windows in a second process, on a first run.
 
-Numba compiles in one thread. On the first run on a computer the loops of the plan are compiled in
-the process of the replay, and those of the estimators and of the windows in a second one, so that
-both take about as long. Both keep the machine code in the same cache.
+Numba compiles in one thread. On the first run on a computer the loops of the plan and of the tests
+are compiled in the process of the replay, and those of the estimators and of the windows in a
+second one, so that both take about as long. Both keep the machine code in the same cache.
 """
 
 import subprocess
@@ -15,8 +15,12 @@ import numpy as np
 from analysis.disturbance.observer import observe_disturbance
 from analysis.filters.factory import filter_states
 from analysis.filters.noise_model import NoiseModel
-from analysis.regression.sliding import WindowedRegression
+from analysis.regression.changes import ChangeTest
+from analysis.regression.newey_west import window_variances
+from analysis.regression.sliding import fit_regression
 from analysis.regression.weak_form import Equation, Rows
+from analysis.regression.window_qr import empty_window, push_rows
+from analysis.replay.residuals import whiteness
 from shiplog.compiled import is_compiled
 from shiplog.types import Signals
 from shiplog.vessel.settings import FilterSettings
@@ -77,11 +81,30 @@ def compile_windows() -> None:
 
     The plan compiles the solver.
     """
+    rows = _example_rows()
+    state = empty_window(SAMPLES, len(rows.equation.names))
+    push_rows(state, rows.regressors, rows.target, rows.excitation)
+
+
+def compile_tests() -> None:
+    """Compile the loops of residual tests, change tests and standard errors by running them once.
+
+    The process of the replay does so after its plan, while the second one is busy.
+    """
+    rows = _example_rows()
+    fit_regression(rows)
+    ChangeTest(rows.equation, len(rows.target)).add(rows)
+    whiteness(rows.target)
+    p = len(rows.equation.names)
+    spans, wanted = np.zeros((1, 2), np.int64), np.zeros(1, np.bool_)
+    window_variances(np.zeros((p + 1, 1)), spans, wanted, np.zeros((p, 1)), np.zeros((p, p, 1)), 1)
+
+
+def _example_rows() -> Rows:
     equation = Equation(("a", "d"), 1.0, 20.0)
     time_secs = np.arange(50.0)
     X = np.column_stack((np.sin(time_secs / 25), np.cos(time_secs / 40)))
-    rows = Rows(equation, time_secs, X[:, 0], X, X[:, 0], 0.1)
-    WindowedRegression(equation, SAMPLES).step(rows)
+    return Rows(equation, time_secs, X[:, 0], X, X[:, 0], 0.1)
 
 
 if __name__ == "__main__":

@@ -22,10 +22,7 @@ NMEA, NBP = DATA / "nmea0183", DATA / "openrvdas"
 ROB, PLAKA = NMEA / "rob-2025-11-20.nmea", NMEA / "plaka.log"
 N2KD = NMEA / "n2kd-183-merrimac.log"
 REASON = "the recordings are not in ../shared/data"
-pytestmark = [
-    pytest.mark.skipif(not NMEA.is_dir() or not NBP.is_dir(), reason=REASON),
-    pytest.mark.xdist_group("nmea0183_recordings"),
-]
+pytestmark = pytest.mark.skipif(not NMEA.is_dir() or not NBP.is_dir(), reason=REASON)
 NEEDS = "a replay needs yaw_rate, speed, rudder, rpm"
 
 
