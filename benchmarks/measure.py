@@ -195,11 +195,15 @@ class Process:
     ----------
     secs
         Its duration.
+    processor_secs
+        The processor time of it and of the processes it started; None where the system does not
+        report it.
     peak_bytes
         Its peak of resident memory; None where the system does not report it.
     """
 
     secs: float
+    processor_secs: float | None
     peak_bytes: int | None
 
 
@@ -228,7 +232,21 @@ def run(command: list[str], environment: Mapping[str, str] | None = None) -> Pro
     if done.returncode:
         raise SkippedError(f"{' '.join(command[1:4])} failed: {_last_line(done.stderr)}")
     result = json.loads(done.stdout.splitlines()[-1])
-    return Process(result["secs"], result["peak_bytes"])
+    return Process(**result)
+
+
+def processor_secs(command: list[str]) -> float:
+    """Run a command and return its processor time, which other processes hardly change.
+
+    Raises
+    ------
+    SkippedError
+        The command failed, or the system does not report the time.
+    """
+    secs = run(command).processor_secs
+    if secs is None:
+        raise SkippedError("this system does not report the processor time of a process")
+    return secs
 
 
 def _last_line(text: str) -> str:

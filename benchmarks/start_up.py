@@ -1,11 +1,12 @@
 """The start of a replay: the process with and without a cache of compiled loops."""
 
 import sys
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from .bench import Bench
-from .measure import Comparison, Limit, SkippedError, run
+from .measure import Comparison, Limit, SkippedError, processor_secs, run
 
 SAMPLE = Path(__file__).resolve().parents[1] / "sample_data" / "zigzag_20_20.mcap"
 REPLAY = "`shiplog replay` of 10 min"
@@ -16,23 +17,20 @@ def start_up_lines(bench: Bench) -> list[Comparison]:
     out = str(bench.folder / "start_up.rrd")
     command = [sys.executable, "-m", "shiplog", "replay", str(SAMPLE), "-o", out]
 
-    def replay() -> float:
-        return run(command).secs
-
     return [
         Comparison(
             f"{REPLAY}, to .rrd",
             '`python -c "import numba, rerun"`',
-            replay,
-            lambda: run([sys.executable, "-c", "import numba, rerun"]).secs,
+            partial(processor_secs, command),
+            partial(processor_secs, [sys.executable, "-c", "import numba, rerun"]),
             Limit(at_most=2.0),
-            note="whole processes, loops in the cache",
+            note="processor time of whole processes, loops in the cache",
         ),
         Comparison(
             f"{REPLAY}, first run on a machine",
             "a later run",
             lambda: first_run_secs(command, bench.folder),
-            replay,
+            lambda: run(command).secs,
             Limit(at_most_secs=12.0),
             note="whole processes; limit for two quiet cores",
             verify=_skip_compilation if bench.short else None,

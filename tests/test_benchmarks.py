@@ -186,6 +186,13 @@ def test_a_long_log_repeats_the_day_with_shifted_times(trial: TrialLog, tmp_path
     assert log.vessel_toml == trial.vessel_toml
 
 
+def test_the_processor_time_of_a_process_leaves_out_its_waits() -> None:
+    waiting = measure.run([sys.executable, "-c", "import time; time.sleep(0.5)"])
+    if waiting.processor_secs is None:
+        pytest.skip("this system does not report the processor time of a process")
+    assert 0 < waiting.processor_secs < waiting.secs - 0.4
+
+
 def test_the_memory_reported_for_a_process_is_its_own_and_not_ours() -> None:
     ballast = np.ones(50_000_000)  # 400 MB
     small = measure.run([sys.executable, "-c", "pass"])
