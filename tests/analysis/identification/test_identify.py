@@ -276,14 +276,14 @@ def test_the_same_data_under_two_names_are_rejected() -> None:
 
 
 def test_logs_of_one_name_are_numbered() -> None:
-    logs = [replace(a_log(seed=seed), name="a.mcap") for seed in (0, 1)]
+    logs = [replace(a_log(seed=seed, seconds=200.0), name="a.mcap") for seed in (0, 1)]
     ship = identify(logs, "nomoto")
     assert [run.name for run in ship.runs] == ["a.mcap", "a.mcap (2)"]
 
 
 def test_two_approach_speeds_are_the_same_ship() -> None:
     slow = TOML.replace("approach_rpm = 80.0", "approach_rpm = 60.0")
-    ship = identify([a_log(), a_log(seed=1, toml=slow)], "nomoto")
+    ship = identify([a_log(seconds=200.0), a_log(seed=1, seconds=200.0, toml=slow)], "nomoto")
     assert ship.vessel is not None
 
 
@@ -363,7 +363,8 @@ def test_differing_halves_of_a_single_log_are_named_halves() -> None:
 
 def test_identifier_settings_do_not_make_another_ship() -> None:
     windowed = TOML + "\n[identifier]\nwindow_secs = 300.0\n"
-    assert identify([a_log(), a_log(seed=1, toml=windowed)], "nomoto").vessel is not None
+    logs = [a_log(seconds=200.0), a_log(seed=1, seconds=200.0, toml=windowed)]
+    assert identify(logs, "nomoto").vessel is not None
 
 
 def test_a_fixed_parameter_must_lie_within_the_model_s_limits() -> None:

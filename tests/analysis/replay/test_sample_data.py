@@ -1,5 +1,6 @@
 """The sample logs agree with their references and come near to their truths."""
 
+from functools import cache
 from itertools import combinations
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from places import KVLCC2, SAMPLE_DATA
 
 from analysis.check.compare import compare, logs_in
 from analysis.replay.replay import analyse
-from shiplog import load_vessel, read
+from shiplog import TrialLog, load_vessel, read
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
 from shiplog.vessel.presets import PRESETS
@@ -84,12 +85,16 @@ def test_the_vessel_files_are_the_presets() -> None:
 RUNS = sorted(KVLCC2.glob("*/*.dat"))
 
 
+@cache
+def kvlcc2_log(run: Path) -> TrialLog:
+    return read_table(run, load_layout(SAMPLE_DATA / "layouts" / f"simman_{run.parent.name}.toml"))
+
+
 @pytest.mark.skipif(not RUNS, reason="the SIMMAN data are not in ../shared/data/kvlcc2")
 @pytest.mark.parametrize(("kind", "smooth"), KINDS)
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
 def test_every_filter_replays_every_run_of_the_kvlcc2(run: Path, kind: str, smooth: bool) -> None:
-    log = read_table(run, load_layout(SAMPLE_DATA / "layouts" / f"simman_{run.parent.name}.toml"))
-    found = analyse(log, settings={"filter.kind": kind, "filter.smooth": smooth})
+    found = analyse(kvlcc2_log(run), settings={"filter.kind": kind, "filter.smooth": smooth})
     assert np.isfinite(found.estimates.states).all()
     assert np.isfinite(found.estimates.stds).all()
     assert found.estimates.rejected.mean() < 0.01
