@@ -18,8 +18,12 @@ from shiplog.compiled import is_compiled
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Compile the loops of a replay once, before parallel workers each compile them."""
-    if hasattr(config, "workerinput") or is_compiled("analysis"):
+    """Compile the loops of a replay once, before the workers of all tests each compile them.
+
+    A run of chosen tests compiles only what these need.
+    """
+    is_worker, chosen = hasattr(config, "workerinput"), pytest.Config.ArgsSource.ARGS
+    if is_worker or config.args_source is chosen or is_compiled("analysis"):
         return
     command = [sys.executable, "-m", "shiplog", "replay", SAMPLE_DATA / "zigzag_20_20.mcap"]
     quiet = subprocess.DEVNULL
