@@ -5,6 +5,7 @@ are compiled in the process of the replay, and those of the estimators and of th
 second one, so that both take about as long. Both keep the machine code in the same cache.
 """
 
+import gc
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -26,6 +27,7 @@ from shiplog.types import Signals
 from shiplog.vessel.settings import FilterSettings
 from shiplog.vessel.vessel_parser import load_vessel
 
+RARE_COLLECTION = 20_000  # new objects before a search for garbage; compilation makes little
 SAMPLES = 400
 DT_SECS = 1.0
 
@@ -108,6 +110,7 @@ def _example_rows() -> Rows:
 
 
 if __name__ == "__main__":
+    gc.set_threshold(RARE_COLLECTION)
     kind, smooth = sys.argv[1:]
     compile_estimators(FilterSettings(kind=kind or None, smooth=bool(smooth)))
     compile_windows()

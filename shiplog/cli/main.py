@@ -4,6 +4,7 @@ Results go to stdout, everything else to stderr. Only the verb that is asked for
 """
 
 import argparse
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -21,6 +22,8 @@ from .printable import printable
 from .verb import ExitCode, Verb
 
 GROUP = "shiplog.verbs"
+# new objects before a collection of garbage: what an import creates is kept, and not worth a search
+RARE_COLLECTION = 20_000
 ORDER = ("record", "info", "convert", "replay", "identify", "check")  # others follow by name
 
 
@@ -47,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return ExitCode.USAGE
         verb: Verb = parsed.verb
         if is_process:
-            sys.meta_path.insert(0, _UnneededModules(verb.unneeded))
+            _prepare_process(verb)
         code = verb.run(parsed)
         sys.stdout.flush()
     except UsageError as error:
@@ -62,6 +65,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         code = _fail("interrupted; no output is incomplete", ExitCode.FAILURE)
     return code
+
+
+def _prepare_process(verb: Verb) -> None:
+    """Prepare the process for the work of one verb, most of which is the import of libraries."""
+    sys.meta_path.insert(0, _UnneededModules(verb.unneeded))
+    gc.set_threshold(RARE_COLLECTION)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # on small matrices threads only wait
 
 
 class _EmptyModule(Loader):
