@@ -19,8 +19,8 @@ shaft = "port"
 
 
 @pytest.fixture(scope="module")
-def environment(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
-    return installed("stream_format", tmp_path_factory.mktemp("stream_format"))
+def environment(pytestconfig: pytest.Config) -> Mapping[str, str]:
+    return installed("stream_format", pytestconfig)
 
 
 @pytest.fixture
