@@ -3,7 +3,8 @@
 Imports everything else of `recorders`; nothing imports it.
 """
 
+from .decode_verb import DECODE
 from .mark_verb import MARK
 from .record_verb import RECORD
 
-__all__ = ["MARK", "RECORD"]
+__all__ = ["DECODE", "MARK", "RECORD"]
