@@ -172,7 +172,7 @@ class GnssClock:
                 continue
             listed = ", ".join(f"{formatter} {secs:.2f} s" for formatter, secs in late.items())
             if max(map(abs, late.values())) < _MIN_OFFSET_SECS and min(late.values()) > 0:
-                cause = "the receiver is late; --time gnss stamps its samples with its own time"
+                cause = "the receiver is late; with --time gnss its samples have its own time"
             else:
                 cause = "the recorder's clock is wrong by about as much"
             self._warn(f"{source}: reception minus GNSS time is {listed}: {cause}", None)

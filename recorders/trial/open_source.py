@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from recorders.streams.format import StreamFormat
-from recorders.streams.line_files import read_lines
+from recorders.streams.line_files import peek, read_lines
 from recorders.streams.pace import paced
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.streams.stream_options import options_text
@@ -155,7 +155,11 @@ def _live(request: StreamRequest, transport: Transport, clock: ReceptionClock) -
 
 
 def _recorded(request: StreamRequest) -> StreamSource:
-    opened = request.format.open_file(read_lines(request.address), request.options)
+    _, lines = peek(read_lines(request.address), 1)  # where it cannot be read, the error names it
+    try:
+        opened = request.format.open_file(lines, request.options)
+    except LogError as error:
+        raise LogError(f"{error}: {request.address}") from error
     batches = opened.batches if request.pace is None else paced(opened.batches, request.pace)
     return StreamSource(
         request.name,

@@ -106,7 +106,7 @@ def test_plaka_yields_speeds_wind_depth_and_positions_and_asks_for_its_date(tmp_
 
 
 def test_n2kd_has_no_time_and_is_read_with_an_interval(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"the file has no time.*--interval"):
+    with pytest.raises(LogError, match=r"the file has no time.*--interval.*: .*n2kd-183"):
         Recorded(tmp_path, N2KD)
     recorded = Recorded(tmp_path, N2KD, options=("--interval", "0.2"))
     assert recorded.counts[0].rejected == {}
