@@ -382,5 +382,6 @@ def _require_determined(name: str, model: ForceModel, interval: float) -> None:
     if wave is not None and model.degree is not None and wave <= slow:
         raise UsageError(
             f"in {name} a wave of {wave:.3g} rad/s cannot be separated from the slow part, followed"
-            f" at {slow:.3g} rad/s; lower disturbance.{name}_frequency, {remedy}"
+            f" at {slow:.3g} rad/s; lower disturbance.{name}_frequency, raise"
+            f" disturbance.wave_frequency, {remedy}"
         )

@@ -133,7 +133,7 @@ def _half_rate(dt_secs: float, interval: float, frequency: float | None) -> floa
     half_rate = pi / (as_number("interval", interval, least=1.0) * dt_secs)
     if frequency is not None and frequency >= half_rate:
         raise UsageError(
-            f"the wave's frequency is {frequency:g} rad/s, and a sample every"
+            f"filter.wave_frequency is {frequency:g} rad/s, and a sample every"
             f" {interval * dt_secs:g} s resolves none above {half_rate:g}; state a lower one"
         )
     return half_rate

@@ -1,11 +1,14 @@
 """Design of a replay's filter and disturbance observer, and the cause where it fails."""
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 
 from analysis.disturbance.observer import ForceObserver, force_models
 from analysis.filters.base import Filter
+from analysis.signals.hold import last_inputs
 from shiplog import LogError
-from shiplog.errors import UsageError
+from shiplog.errors import ShiplogError, UsageError
 
 from .plan import Plan, changed_settings, with_default_settings
 
@@ -33,8 +36,7 @@ def make_estimators(plan: Plan) -> tuple[Filter, ForceObserver]:
     try:
         return _design(plan)
     except DESIGN_ERRORS as error:
-        with np.errstate(over="ignore", invalid="ignore"):
-            names = _unsuitable_settings(plan)
+        names = _unsuitable_settings(plan, _can_be_designed, changed_settings(plan.vessel))
         if names:
             raise UsageError(
                 f"{names} does not suit this log or its model: {error}: {plan.name}"
@@ -45,7 +47,7 @@ def make_estimators(plan: Plan) -> tuple[Filter, ForceObserver]:
 def _design(plan: Plan) -> tuple[Filter, ForceObserver]:
     model, noise, stats = plan.vessel.paper_coefficients, plan.noise, plan.stats
     settings = plan.disturbance_settings
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         filter_ = plan.filter_kind.make(model, noise, stats, plan.vessel.filter)
         return filter_, ForceObserver(
             model,
@@ -57,20 +59,46 @@ def _design(plan: Plan) -> tuple[Filter, ForceObserver]:
         )
 
 
-def _unsuitable_settings(plan: Plan) -> str:
-    """Name the settings without which the design succeeds; "" where it fails without any."""
-    changed = changed_settings(plan.vessel)
-    for names in (*((name,) for name in changed), tuple(changed)):
+def _unsuitable_settings(
+    plan: Plan, works: Callable[[Plan], bool], changed: Mapping[str, object]
+) -> str:
+    """Name the settings without which a plan works; "" where it does not without any.
+
+    Parameters
+    ----------
+    plan
+        The plan, which does not work.
+    works
+        Whether a plan works.
+    changed
+        The settings to try, with their values; the kind of filter is the last one.
+    """
+    one_by_one = sorted(changed, key=lambda name: name == "filter.kind")
+    for names in (*((name,) for name in one_by_one), tuple(changed)):
         try:
-            _design(with_default_settings(plan, names))
+            with np.errstate(all="ignore"):
+                suitable = works(with_default_settings(plan, names))
         except (*DESIGN_ERRORS, LogError):
             continue
-        return ", ".join(f"{name} = {changed[name]}" for name in names)
+        if suitable:
+            return ", ".join(f"{name} = {changed[name]}" for name in names)
     return ""
 
 
-def diverged(plan: Plan, reason: str = "") -> LogError:
-    """Return the error for estimators that diverge; it names the model and the changed settings.
+def _can_be_designed(plan: Plan) -> bool:
+    _design(plan)
+    return True
+
+
+def _stays_finite(plan: Plan) -> bool:
+    """Whether the filter is finite on the first part of the trial."""
+    filter_, _ = _design(plan)
+    estimates = filter_.step(plan.stats.head, last_inputs(plan.stats.head))
+    return bool(np.isfinite(estimates.states).all())
+
+
+def diverged(plan: Plan, reason: str = "") -> ShiplogError:
+    """Return the error for estimators that diverge: due to a setting, or else to the model.
 
     Parameters
     ----------
@@ -78,9 +106,24 @@ def diverged(plan: Plan, reason: str = "") -> LogError:
         The plan of the replay.
     reason
         Why the design failed, if it did, such as `` (overflow)``.
+
+    Returns
+    -------
+    UsageError or LogError
+        The first names a setting without which the filter does not diverge; the second the model
+        and the changed settings. A large process noise follows any log, so that neither it nor the
+        kind of filter is tried.
     """
-    changed = [f"{name} = {value}" for name, value in changed_settings(plan.vessel).items()]
-    settings = f", or remove the settings {', '.join(changed)}" if changed else ""
+    changed = changed_settings(plan.vessel)
+    tried = {n: v for n, v in changed.items() if n not in ("filter.kind", "filter.process_ratio")}
+    names = _unsuitable_settings(plan, _stays_finite, tried) if tried else ""
+    if names:
+        return UsageError(
+            f"{names} makes the filter diverge{reason}; remove it or choose another value: "
+            f"{plan.name}"
+        )
+    listed = ", ".join(f"{name} = {value}" for name, value in changed.items())
+    settings = f", or remove the settings {listed}" if listed else ""
     return LogError(
         f"the filter or the disturbance observer diverges{reason}: the model "
         f"({plan.model_origin}) or the settings do not fit this log; give another model with "

@@ -113,12 +113,15 @@ class Stages:
         self, held: Signals, following: Mapping[str, float], adjoint: Adjoint | None
     ) -> Estimates:
         """Filter the next chunk, and smooth it where `adjoint` is given."""
-        if adjoint is None:
-            estimates = self._filter.step(held, following)
-        else:
-            tracing = smoothable(self._filter)
-            filtered, trace = tracing.trace(held, following)
-            estimates = smoothed(tracing, held, following, filtered, trace, adjoint)
+        try:
+            if adjoint is None:
+                estimates = self._filter.step(held, following)
+            else:
+                tracing = smoothable(self._filter)
+                filtered, trace = tracing.trace(held, following)
+                estimates = smoothed(tracing, held, following, filtered, trace, adjoint)
+        except np.linalg.LinAlgError as error:  # of a gain that is designed anew at each instant
+            raise diverged(self._plan, f" ({error})") from error
         if not np.all(np.isfinite(estimates.states)):
             raise diverged(self._plan)
         return estimates

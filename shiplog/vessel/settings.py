@@ -86,21 +86,21 @@ class FilterSettings:
 
     kind: str | None = _choice(_filter_names, None)
     smooth: bool = _flag()
-    gate: float = _number(6.0, positive=True, most=1e9)
-    yaw_rate_std: float | None = _number(positive=True, most=10.0)
-    speed_std: float | None = _number(positive=True, most=100.0)
-    process_ratio: float | None = _number(positive=True, most=1e12)
+    gate: float = _number(6.0, positive=True, least=1e-6, most=1e9)
+    yaw_rate_std: float | None = _number(positive=True, least=1e-7, most=1.0)
+    speed_std: float | None = _number(positive=True, least=1e-4, most=100.0)
+    process_ratio: float | None = _number(positive=True, least=1e-12, most=1e6)
     as_printed: bool = _flag()
-    yaw_bandwidth: float | None = _number(positive=True, most=1e3)
-    surge_bandwidth: float | None = _number(positive=True, most=1e3)
+    yaw_bandwidth: float | None = _number(positive=True, least=1e-6, most=1e3)
+    surge_bandwidth: float | None = _number(positive=True, least=1e-6, most=1e3)
     shift: float = _number(0.1, least=0.0, most=1e3)
     damping: float = _number(0.0, least=0.0, most=1e6)
-    yaw_decay: float | None = _number(positive=True, most=1e3)
-    surge_decay: float | None = _number(positive=True, most=1e3)
+    yaw_decay: float | None = _number(positive=True, least=1e-6, most=1e3)
+    surge_decay: float | None = _number(positive=True, least=1e-6, most=1e3)
     wave: bool = _flag()
-    wave_frequency: float | None = _number(positive=True, most=1e3)
-    wave_damping: float | None = _number(positive=True, most=1.0)
-    wave_std: float | None = _number(positive=True, most=10.0)
+    wave_frequency: float | None = _number(positive=True, least=1e-6, most=1e3)
+    wave_damping: float | None = _number(positive=True, least=1e-6, most=1.0)
+    wave_std: float | None = _number(positive=True, least=1e-8, most=1.0)
 
     @property
     def chosen(self) -> str:
@@ -129,9 +129,9 @@ class DisturbanceSettings:
 
     models: tuple[str, ...] = _choice(DISTURBANCES, ("constant",), several=True)
     spectrum: str = _choice(SPECTRA, "butterworth")
-    yaw_frequency: float = _number(0.05, positive=True, most=1e3)
-    surge_frequency: float = _number(0.02, positive=True, most=1e3)
-    wave_frequency: float | None = _number(positive=True, most=1e3)
+    yaw_frequency: float = _number(0.05, positive=True, least=1e-6, most=1e3)
+    surge_frequency: float = _number(0.02, positive=True, least=1e-6, most=1e3)
+    wave_frequency: float | None = _number(positive=True, least=1e-6, most=1e3)
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def test_the_default_filter_can_model_a_wave_where_one_is_set() -> None:
         ("filter", "gate", 0, "filter.gate must be positive, got 0"),
         ("filter", "gate", "6", "filter.gate must be a number, got '6'"),
         ("filter", "shift", -0.1, "filter.shift must lie between 0 and 1000, got -0.1"),
-        ("filter", "wave_damping", 2.0, "filter.wave_damping must lie between -inf and 1, got 2"),
+        ("filter", "wave_damping", 2.0, "filter.wave_damping must lie between 1e-06 and 1, got 2"),
         ("filter", "speed_std", float("nan"), "filter.speed_std must be finite, got nan"),
         ("filter", "yaw_rate_std", True, "filter.yaw_rate_std must be a number, got True"),
         ("filter", "shfit", 0.1, "unknown key 'filter.shfit', did you mean 'shift'?"),
