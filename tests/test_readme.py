@@ -45,7 +45,7 @@ def new_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_commands_run_as_written_and_only_shiplog_writes_to_stderr(
     new_folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Fits are not made, as they take a minute; that their command is valid is checked."""
+    """Fits take a minute, and a viewer needs a screen: only what they are given is checked."""
 
     def not_fitted(*_: object, **__: object) -> None:
         raise ShiplogError("not fitted")
@@ -54,6 +54,9 @@ def test_the_commands_run_as_written_and_only_shiplog_writes_to_stderr(
     shutil.copy(new_folder / "sample_data" / "vessels" / "table1.toml", "vessel.toml")
     verbs = []
     for command in commands():
+        if command.startswith("rerun "):
+            assert Path(command.split()[1]).is_file(), command
+            continue
         code, (out, err) = run(command), capfd.readouterr()
         verbs.append(command.split()[1])
         if verbs[-1] == "identify" and "--help" not in command:
