@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from math import isnan
 
 from recorders.streams.counts import StreamCounts
+from recorders.streams.gnss_clock import GnssClock
 from recorders.streams.packets import Packet
 from recorders.streams.sample_buffer import MAX_TOPICS, SampleBuffer
 
 from .environment_sentences import ENVIRONMENT
 from .framing import FramingError, Sentence, parse_sentence, split_packet
-from .gnss_clock import GnssClock
 from .navigation_sentences import NAVIGATION
 from .steering_sentences import STEERING, Values
 from .transducer_sentences import TRANSDUCERS, MotionUnit
@@ -71,7 +71,11 @@ class SentenceDecoder:
         self._decoders = (
             STEERING | NAVIGATION | ENVIRONMENT | TRANSDUCERS | {"PSXN": MotionUnit().decode}
         )
-        self._clock = GnssClock(self.counts.warn, received_is_known=self._options.received_is_known)
+        self._clock = GnssClock(
+            self.counts.warn,
+            received_is_known=self._options.received_is_known,
+            remedy="with --time gnss its samples have its own time",
+        )
         self._lines: dict[str, int] = {}  # the last line count by sender
 
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
@@ -83,12 +87,8 @@ class SentenceDecoder:
     def finish(self, samples: SampleBuffer) -> None:  # noqa: ARG002 - of the protocol
         """Report the latencies of the receivers."""
         self._clock.finish()
-        for source, formatter, latency in self._clock.latencies():
-            middle, low, high = latency.quantiles()
-            self.counts.note(
-                f"latency_s.{source}.{formatter}",
-                f"{middle:.3f} (90 % from {low:.3f} to {high:.3f})",
-            )
+        for key, text in self._clock.notes():
+            self.counts.note(key, text)
 
     def _decode_line(self, line: bytes, received_ns: int, samples: SampleBuffer) -> None:
         try:

@@ -5,13 +5,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
+from recorders.streams.gnss_clock import ROLLOVER_NS, Utc, Warn, nearest_ns, rollovers
 from recorders.streams.packets import NO_TIME, Batches, Packet
 from shiplog.errors import LogError, UsageError
 from shiplog.tables.printed_times import DAY_NS
 
 from .framing import FramingError, Sentence, parse_sentence, split_packet
-from .gnss_clock import ROLLOVER_NS, Warn, rollovers
-from .utc_fields import TIMED, Utc, nearest_ns, utc_of
+from .utc_fields import TIMED, utc_of
 
 MAX_HELD = 200_000  # lines that wait for the next time
 _GAP_RATIO, _MIN_GAP_NS = 10, 5 * 10**9  # longer between two times than usual: lines are missing

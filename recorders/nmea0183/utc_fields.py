@@ -2,30 +2,14 @@
 
 from collections.abc import Callable
 from datetime import date
-from typing import NamedTuple
 
-from shiplog.tables.printed_times import DAY_NS, HALF_DAY_NS
+from recorders.streams.gnss_clock import Utc
 
 from .navigation_sentences import FIX_MODES, has_fix, has_mode, has_valid_rmc
 from .sentence_values import is_valid, text_at
 
 _EPOCH = date(1970, 1, 1).toordinal()
 _CENTURY_BREAK = 80  # years of two digits from here on are of the 20th century: GPS began in 1980
-
-
-class Utc(NamedTuple):
-    """Time in a sentence.
-
-    Attributes
-    ----------
-    clock_ns
-        The time of day, ns.
-    day
-        The date, days since 1970-01-01; None where the sentence has none.
-    """
-
-    clock_ns: int
-    day: int | None
 
 
 def utc_of(formatter: str, fields: list[str]) -> Utc | None:
@@ -45,11 +29,6 @@ def utc_of(formatter: str, fields: list[str]) -> Utc | None:
     """
     reader = _READERS.get(formatter)
     return None if reader is None else reader(fields)
-
-
-def nearest_ns(clock_ns: int, reference_ns: int) -> int:
-    """Return the time with this time of day that is nearest to a reference, ns."""
-    return reference_ns + (clock_ns - reference_ns + HALF_DAY_NS) % DAY_NS - HALF_DAY_NS
 
 
 def _clock(text: str) -> int | None:

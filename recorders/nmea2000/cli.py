@@ -2,10 +2,11 @@
 
 import argparse
 from datetime import UTC, datetime, timedelta
-from itertools import chain
 from typing import TYPE_CHECKING
 
+from recorders.streams.counts import StreamCounts
 from recorders.streams.format import OpenedFile, StreamFormat
+from recorders.streams.line_files import peek
 from recorders.streams.packets import Batches
 from shiplog.errors import LogError, UsageError
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
     from .pgn_decoder import PgnDecoder
 
+HEAD_LINES = 5000  # of a file, from which the format is detected
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -50,8 +52,8 @@ def _open_file(batches: Batches, options: argparse.Namespace) -> OpenedFile:
     from .line_times import LineTimes
     from .pgn_decoder import PgnDecoder
 
-    first = next(filter(None, batches), [])
-    lines = [packet.data for packet in first]
+    head, batches = peek(batches, HEAD_LINES)
+    lines = [packet.data for packet in head]
     line_format = find_format(options.line_format) if options.line_format else detect_format(lines)
     if line_format is None:
         raise LogError(
@@ -61,8 +63,10 @@ def _open_file(batches: Batches, options: argparse.Namespace) -> OpenedFile:
     decoder = PgnDecoder()
     decoder.set_format(line_format, lines)
     start_ns = _instant_ns(options.start) if options.start else None
+    for _ in LineTimes(line_format, start_ns, StreamCounts()).apply(iter([head])):
+        pass  # stamps that cannot be times are found before anything is recorded
     times = LineTimes(line_format, start_ns, decoder.counts)
-    return OpenedFile(times.apply(chain([first], batches)), decoder)
+    return OpenedFile(times.apply(batches), decoder)
 
 
 def _instant_ns(text: str) -> int:

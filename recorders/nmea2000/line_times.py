@@ -16,6 +16,7 @@ DAY_NS = 86400 * SECOND_NS
 MAX_BACK_NS = 60 * SECOND_NS  # by which stamps of a whole file may go back: gateways send in bursts
 MAX_FRAMES_PER_SEC = 8000  # two buses: 250 kbit/s are some 1900 frames of 8 bytes a second, or 3700
 FEW_FRAMES = 2000  # a burst of a gateway that had no connection
+MAX_WAITING = 10_000  # lines without a stamp, for the next stamp
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _DATE = re.compile(rb"(\d{4}-\d\d-\d\d)[T\- ](\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?Z?")
 
@@ -72,7 +73,8 @@ class LineTimes:
             lines = held + self._with_stamps(batch)
             # a stamp is judged by the next one: the last lines wait for it
             known = [i for i, (_, stamp) in enumerate(lines) if stamp is not None]
-            end = known[-1] if known else 0
+            last = known[-1] if known else 0
+            end = last if len(lines) - last < MAX_WAITING else len(lines)
             yield self._with_times(lines, end)
             held = lines[end:]
         if held:
@@ -106,6 +108,8 @@ class LineTimes:
                 packets.append(Packet(packet.data, self._time_ns, packet.origin))
             elif after is not None:  # a header
                 packets.append(Packet(packet.data, self._instant(after), packet.origin))
+            else:
+                self._counts.reject("no time stamp")
         self._require_possible()
         return packets
 

@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 
 from recorders.streams.counts import StreamCounts
+from recorders.streams.gnss_clock import GnssClock, Utc
 from recorders.streams.packets import Packet
 from recorders.streams.sample_buffer import SampleBuffer
 
 from .library import FastPacketAssembly, FrameError, fields, is_fast
 from .line_formats import FRAME_BYTES, Frame, LineFormat, detect_format, is_assembled
-from .pgns import READINGS
+from .pgns import DAY_SECS, READINGS
 
 FAST_PGNS = frozenset(pgn for pgn in READINGS if is_fast(pgn))
 
@@ -35,6 +36,7 @@ class PgnDecoder:
         self.line_format = line_format
         self._assembled = line_format is not None and bool(line_format.assembled)
         self._assembly = FastPacketAssembly()
+        self._clock = GnssClock(self._counts.warn)
         self._kinds: dict[tuple[int, int], str] = {}
 
     @property
@@ -57,7 +59,11 @@ class PgnDecoder:
                 self._decode_line(line, packet.received_ns, samples)
 
     def finish(self, samples: SampleBuffer) -> None:
-        """Do nothing: what waits are parts of messages, of no value without the others."""
+        """Report the latencies of the receivers; parts of messages are of no value."""
+        del samples
+        self._clock.finish()
+        for key, text in self._clock.notes():
+            self._counts.note(key, text)
 
     def _decode_line(self, line: bytes, received_ns: int, samples: SampleBuffer) -> None:
         line_format = self.line_format
@@ -97,6 +103,8 @@ class PgnDecoder:
             if value is None:
                 continue
             source = f"{frame.source}.{part}" if part else str(frame.source)
+            if channel == "gnss_time" and isinstance(value, float):
+                value = self._corrected(frame, value, received_ns)  # noqa: PLW2901 - of a rollover
             if isinstance(value, tuple):
                 added += samples.add_position(source, value, received_ns)
             else:
@@ -105,6 +113,13 @@ class PgnDecoder:
             self._counts.accept(self._kind(frame))
         else:
             self._counts.skip(f"{frame.pgn} without a value")
+
+    def _corrected(self, frame: Frame, secs: float, received_ns: int) -> float:
+        """Compare the time of a receiver with that of reception, and correct a rollover of it."""
+        days, clock_secs = divmod(secs, DAY_SECS)
+        utc = Utc(round(clock_secs * 1e9), int(days))
+        time_ns = self._clock.set_time(str(frame.source), f" {frame.pgn}", utc, received_ns)
+        return secs if time_ns is None else time_ns * 1e-9
 
     def _kind(self, frame: Frame) -> str:
         """Return the text by which the messages of one sender and PGN are counted."""

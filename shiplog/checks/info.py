@@ -25,6 +25,7 @@ from .event_table import events_to_json
 from .log_stats import compute_log_stats
 
 MAX_MESSAGES_TO_READ = 4_000_000  # of a finished file; of a longer one only the summary is read
+_GEOGRAPHIC_UNITS = dict(zip(GEOGRAPHIC, ("deg", "deg", "m"), strict=True))
 
 
 @dataclass(frozen=True)
@@ -422,4 +423,4 @@ def _ranges(stats: ChannelStats, channel: Channel | None) -> Iterator[ValueRange
         finite = values[np.isfinite(values)]
         if len(finite):
             low, high = float(finite.min()) * scale, float(finite.max()) * scale
-            yield ValueRange(field, "deg" if field in GEOGRAPHIC[:2] else unit, low, high)
+            yield ValueRange(field, _GEOGRAPHIC_UNITS.get(field, unit), low, high)

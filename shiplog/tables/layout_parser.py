@@ -78,6 +78,29 @@ def parse_layout(text: str, where: str) -> Layout:
     return _LayoutParser(parse_toml(text, where, KIND, LayoutError), where).layout()
 
 
+def parse_columns(
+    sections: Mapping[str, Any], where: str
+) -> tuple[Mapping[str, Column], list[str]]:
+    """Parse the sections of channels and of a position, without those of a table as a whole.
+
+    Parameters
+    ----------
+    sections
+        The sections by the name of the channel, as in a layout file.
+    where
+        Name of the file, for messages.
+
+    Returns
+    -------
+    columns
+        Columns by role, as in `Layout.columns`; they are numbered, as there is no header.
+    errors
+        The errors of all sections.
+    """
+    parser = _LayoutParser(sections, where)
+    return parser.columns()
+
+
 class _LayoutParser:
     """The sections of one layout file, parsed one after the other, and their errors."""
 
@@ -109,6 +132,18 @@ class _LayoutParser:
         if self._errors:
             raise LayoutError(list_errors(self._errors, KIND, self._where))
         return self._made()
+
+    def columns(self) -> tuple[Mapping[str, Column], list[str]]:
+        """Return the columns of a file without a section of time, and all errors."""
+        for key, value in self._table.items():
+            if not isinstance(value, dict):
+                self._errors.append(unknown_key(key, CATALOGUE))
+            elif key.partition(".")[0] == "position":
+                self._parse_position(key, value)
+            else:
+                self._parse_channel(key, value)
+        self._find_shared_columns()
+        return self._columns, self._errors
 
     def _made(self) -> Layout:
         """Return the layout of sections without errors."""
@@ -307,16 +342,17 @@ class _LayoutParser:
         geographic = any(role.partition(".")[0] == "latitude" for role in self._columns)
         if geographic and "froude_scale" in self._top:
             errors.append("froude_scale cannot be applied to latitude and longitude")
+        errors += [
+            f"{role} names the column {column.place!r}, which needs header = true"
+            for role, column in self._columns.items()
+            if isinstance(column.place, str) and not self._top.get("header")
+        ]
         self._find_shared_columns()
 
     def _find_shared_columns(self) -> None:
-        """Check that no column has two roles, and that names stand in a header."""
+        """Check that no column has two roles."""
         taken: dict[int | str, str] = {}
         for role, column in self._columns.items():
-            if isinstance(column.place, str) and not self._top.get("header"):
-                self._errors.append(
-                    f"{role} names the column {column.place!r}, which needs header = true"
-                )
             if column.place in taken:
                 self._errors.append(
                     f"{role} and {taken[column.place]} name the same column {column.place}"

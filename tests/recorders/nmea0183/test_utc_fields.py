@@ -4,7 +4,8 @@ from datetime import UTC, datetime
 
 import pytest
 
-from recorders.nmea0183.utc_fields import Utc, nearest_ns, utc_of
+from recorders.nmea0183.utc_fields import utc_of
+from recorders.streams.gnss_clock import Utc, nearest_ns
 
 HOUR_NS = 3600 * 10**9
 DAY_NS = 24 * HOUR_NS

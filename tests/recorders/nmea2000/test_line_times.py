@@ -140,6 +140,13 @@ def test_a_header_has_the_time_of_the_line_after_it_and_a_comment_that_before_it
     assert times_of("canboat", lines)[0] == [SECOND_NS] * 3
 
 
+def test_lines_that_wait_for_a_stamp_are_bounded_in_number() -> None:
+    comments = [b"# comment"] * 30_000
+    times, counts = times_of("canboat", [*comments, canboat("1970-01-01T00:00:01Z"), *comments])
+    assert sum(counts.rejected.values()) + len(times) == 60_001
+    assert 10_000 <= counts.rejected["no time stamp"] <= 30_000
+
+
 def test_lines_without_times_are_refused() -> None:
     with pytest.raises(LogError, match="no line has a time"):
         times_of("candump", [b"  can0  09F1121B   [2]  FF 10"] * 3)

@@ -144,6 +144,29 @@ def test_our_values_are_those_of_the_librarys_own_decoder() -> None:
         assert values == ([] if rate is None else [rate])
 
 
+def _system_time(secs: float, utc_secs: float) -> bytes:
+    days, clock = divmod(utc_secs, 86_400)
+    data = struct.pack("<BBHI", 0xFF, 0xF0, int(days), round(clock * 10_000))
+    return candump(126992, data, time=secs)
+
+
+def test_the_latency_of_a_receiver_is_noted_and_a_late_one_warned_about() -> None:
+    lines = [_system_time(1.7e9 + n + 0.4, 1.7e9 + n) for n in range(100)]
+    decoded = decode_file(NMEA2000, lines)
+    assert decoded.values("/gnss_time/27")[0] == pytest.approx(1.7e9)
+    assert decoded.counts.notes["latency_s.27.126992"].startswith("0.400 ")
+    assert decoded.counts.warnings == (
+        "27: reception minus GNSS time is 126992 0.40 s: the receiver is late",
+    )
+
+
+def test_a_rollover_of_the_gps_week_is_corrected_with_a_warning() -> None:
+    lines = [_system_time(1.7e9 + n, 1.7e9 + n - 1024 * 7 * 86_400) for n in range(3)]
+    decoded = decode_file(NMEA2000, lines)
+    assert decoded.values("/gnss_time/27") == [pytest.approx(1.7e9 + n, abs=1e-3) for n in range(3)]
+    assert "1024 weeks early" in decoded.counts.warnings[0]
+
+
 def test_no_damaged_frame_raises_an_exception_and_every_line_is_counted() -> None:
     lines = fix_frames() + [
         candump(pgn, bytes(range(8))) for pgn in (127245, 127250, 128259, 129025, 129026, 130306)

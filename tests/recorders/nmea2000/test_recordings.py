@@ -18,7 +18,9 @@ Channels = dict[str, Channel]
 
 
 def _record(path: Path, log: Path, *options: str) -> tuple[Channels, StreamCounts]:
-    opened = NMEA2000.open_file(file_batches(file_lines(path)), options_of(NMEA2000, *options))
+    opened = NMEA2000.open_file(
+        file_batches(file_lines(path), 1000), options_of(NMEA2000, *options)
+    )
     source = StreamSource("bus", "nmea2000", opened.batches, opened.decoder, origin=path.name)
     record(source, log)
     return {c.topic: c for c in shiplog.read(log).channels}, opened.decoder.counts

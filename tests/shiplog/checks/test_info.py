@@ -36,6 +36,20 @@ def test_a_finished_log_is_described_with_rates_and_ranges(
     assert info.to_dict()["duration_secs"] == pytest.approx(500, abs=0.1)
 
 
+def test_the_altitude_of_a_fix_is_in_metres(tmp_path: Path) -> None:
+    at = np.arange(10) * 10**8
+    fixes = np.tile([54.0, 10.0, 12.5], (10, 1))
+    with LogWriter(tmp_path / "fix.mcap") as writer:
+        fields = ("latitude", "longitude", "altitude")
+        writer.write(Channel("position", "27", "deg", at, at, fixes, fields))
+    ranges = read_log_info(tmp_path / "fix.mcap").channels[0].ranges
+    assert [(r.component, r.unit, r.highest) for r in ranges] == [
+        ("latitude", "deg", 54.0),
+        ("longitude", "deg", 10.0),
+        ("altitude", "m", 12.5),
+    ]
+
+
 def test_an_unfinished_log_is_described_by_reading_it(tmp_path: Path) -> None:
     at = np.arange(100) * 10**8
     writer = LogWriter(tmp_path / "cut.mcap", metadata={"ship": "test"})

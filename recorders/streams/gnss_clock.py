@@ -4,13 +4,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 
 from shiplog.checks.quantiles import Quantiles
-from shiplog.tables.printed_times import DAY_NS
-
-from .utc_fields import Utc, nearest_ns
+from shiplog.tables.printed_times import DAY_NS, HALF_DAY_NS
 
 ROLLOVER_NS = 1024 * 7 * DAY_NS  # the GPS week of ten bits begins again at 0
 MAX_ROLLOVERS = 2
@@ -25,6 +24,26 @@ _MAX_SOURCES = 64
 
 Warn = Callable[[str, int | None], None]
 """Takes a warning and its time, ns since 1970-01-01 UTC; None is the end of the stream."""
+
+
+class Utc(NamedTuple):
+    """Time in a sentence or message.
+
+    Attributes
+    ----------
+    clock_ns
+        The time of day, ns.
+    day
+        The date, days since 1970-01-01; None where there is none.
+    """
+
+    clock_ns: int
+    day: int | None
+
+
+def nearest_ns(clock_ns: int, reference_ns: int) -> int:
+    """Return the time with this time of day that is nearest to a reference, ns."""
+    return reference_ns + (clock_ns - reference_ns + HALF_DAY_NS) % DAY_NS - HALF_DAY_NS
 
 
 def rollovers(utc_ns: int, reference_ns: int) -> int:
@@ -103,11 +122,14 @@ class GnssClock:
         Receives warnings: a rollover, a jump, a date that contradicts the times of reception.
     received_is_known
         Whether the times of reception are known; if not, there are no latencies.
+    remedy
+        What to do about a late receiver, for the warning; empty where there is nothing to do.
     """
 
-    def __init__(self, warn: Warn, *, received_is_known: bool = True) -> None:
+    def __init__(self, warn: Warn, *, received_is_known: bool = True, remedy: str = "") -> None:
         self._warn = warn
         self._received_is_known = received_is_known
+        self._remedy = f"; {remedy}" if remedy else ""
         self._receivers: dict[str, _Receiver] = {}
 
     def set_time(self, source: str, formatter: str, utc: Utc, received_ns: int) -> int | None:
@@ -154,11 +176,13 @@ class GnssClock:
             return receiver.utc_ns + round(since_ns / receiver.period_ns) * receiver.period_ns
         return time_ns
 
-    def latencies(self) -> Iterator[tuple[str, str, Latency]]:
-        """Yield source, formatter and latency of each timed kind of sentence."""
+    def notes(self) -> Iterator[tuple[str, str]]:
+        """Yield the latency of each kind of sentence, as key and text for the metadata of a log."""
         for source, receiver in self._receivers.items():
             for formatter, latency in receiver.latencies.items():
-                yield source, formatter, latency
+                middle, low, high = latency.quantiles()
+                key = f"latency_s.{source}.{formatter.strip()}"
+                yield key, f"{middle:.3f} (90 % from {low:.3f} to {high:.3f})"
 
     def finish(self) -> None:
         """Report latencies that matter, one warning for each receiver."""
@@ -170,9 +194,9 @@ class GnssClock:
             }
             if not late:
                 continue
-            listed = ", ".join(f"{formatter} {secs:.2f} s" for formatter, secs in late.items())
+            listed = ", ".join(f"{kind.strip()} {secs:.2f} s" for kind, secs in late.items())
             if max(map(abs, late.values())) < _MIN_OFFSET_SECS and min(late.values()) > 0:
-                cause = "the receiver is late; with --time gnss its samples have its own time"
+                cause = f"the receiver is late{self._remedy}"
             else:
                 cause = "the recorder's clock is wrong by about as much"
             self._warn(f"{source}: reception minus GNSS time is {listed}: {cause}", None)

@@ -1,10 +1,9 @@
-"""Tests of recorders.nmea0183.gnss_clock."""
+"""Tests of recorders.streams.gnss_clock."""
 
 import numpy as np
 import pytest
 
-from recorders.nmea0183.gnss_clock import ROLLOVER_NS, GnssClock, Latency, rollovers
-from recorders.nmea0183.utc_fields import Utc
+from recorders.streams.gnss_clock import ROLLOVER_NS, GnssClock, Latency, Utc, rollovers
 
 SECOND_NS = 10**9
 DAY_NS = 86_400 * SECOND_NS
