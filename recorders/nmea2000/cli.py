@@ -37,12 +37,10 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 
 def _make_decoder(options: argparse.Namespace) -> "PgnDecoder":
-    """Make the decoder of a live stream; the first line shows its format."""
+    """Make the decoder of packets with times; the first line shows their format."""
     from .line_formats import find_format
     from .pgn_decoder import PgnDecoder
 
-    if options.start:
-        raise UsageError("--start is for files: what is received live has a time; omit it")
     return PgnDecoder(find_format(options.line_format) if options.line_format else None)
 
 

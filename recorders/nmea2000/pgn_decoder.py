@@ -70,7 +70,7 @@ class PgnDecoder:
         if line_format is None:
             line_format = detect_format([line])
             if line_format is None:
-                self._counts.reject("line of no known format")
+                self._count_unknown(line)
                 return
             self.set_format(line_format, [line])
         try:
@@ -83,6 +83,13 @@ class PgnDecoder:
                 self._add(frame, data, received_ns, samples)
         except FrameError as error:
             self._counts.reject(str(error))
+
+    def _count_unknown(self, line: bytes) -> None:
+        """Count a line before the first one of a known format."""
+        if line.startswith(b"#") or not line.strip():
+            self._counts.skip("comment or status")
+        else:
+            self._counts.reject("line of no known format")
 
     def _message(self, frame: Frame) -> bytes | None:
         """Return the data of the whole message, or None where frames of it are still missing."""

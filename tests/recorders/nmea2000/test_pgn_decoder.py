@@ -109,9 +109,14 @@ def test_a_file_of_no_known_format_is_refused_with_the_known_ones() -> None:
         decode_file(NMEA2000, [b"$HEHDT,123.4,T*12"])
 
 
-def test_a_start_is_of_files_and_a_date() -> None:
-    with pytest.raises(UsageError, match="--start is for files"):
-        decode_live(NMEA2000, [], "--start", "2026-11-29")
+def test_raw_lines_of_a_file_are_decoded_again_with_its_options() -> None:
+    lines = [b"# format=FAST", canboat(129029, FIX)]
+    decoded = decode_live(NMEA2000, lines, "--start", "2026-11-29")
+    assert decoded.channels["/position/27.gnss"].received_ns.tolist() == [10**8]
+    assert decoded.counts.rejected == {}
+
+
+def test_a_start_is_a_date() -> None:
     with pytest.raises(UsageError, match="takes a date"):
         decode_file(NMEA2000, [b"17:33:21.107 R 09F1121B FF"], "--start", "29.11.2026")
 
