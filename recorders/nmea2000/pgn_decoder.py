@@ -36,7 +36,7 @@ class PgnDecoder:
         self.line_format = line_format
         self._assembled = line_format is not None and bool(line_format.assembled)
         self._assembly = FastPacketAssembly()
-        self._clock = GnssClock(self._counts.warn)
+        self._clock = GnssClock(self._warn)
         self._kinds: dict[tuple[int, int], str] = {}
 
     @property
@@ -127,6 +127,10 @@ class PgnDecoder:
         utc = Utc(round(clock_secs * 1e9), int(days))
         time_ns = self._clock.set_time(str(frame.source), f" {frame.pgn}", utc, received_ns)
         return secs if time_ns is None else time_ns * 1e-9
+
+    def _warn(self, text: str, time_ns: int | None) -> None:
+        """Keep a warning about a receiver, whose address it begins with."""
+        self._counts.warn(f"address {text}", time_ns)
 
     def _kind(self, frame: Frame) -> str:
         """Return the text by which the messages of one sender and PGN are counted."""

@@ -161,7 +161,7 @@ def test_the_latency_of_a_receiver_is_noted_and_a_late_one_warned_about() -> Non
     assert decoded.values("/gnss_time/27")[0] == pytest.approx(1.7e9)
     assert decoded.counts.notes["latency_s.27.126992"].startswith("0.400 ")
     assert decoded.counts.warnings == (
-        "27: reception minus GNSS time is 126992 0.40 s: the receiver is late",
+        "address 27: reception minus GNSS time is 126992 0.40 s: the receiver is late",
     )
 
 
