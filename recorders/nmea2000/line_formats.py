@@ -47,12 +47,15 @@ class Frame(NamedTuple):
         The address of the receiver; 255 for all.
     data
         The bytes.
+    bus
+        The name of the bus where the line has one; else empty.
     """
 
     pgn: int
     source: int
     destination: int
     data: bytes
+    bus: bytes = b""
 
 
 @dataclass(frozen=True)
@@ -208,11 +211,11 @@ def _parse_canboat(match: re.Match[bytes]) -> Frame:
 
 def _parse_candump(match: re.Match[bytes]) -> Frame:
     if match["packed"] is not None:
-        return _can_frame(match["id"], _bytes(match["packed"]))
+        return _can_frame(match["id"], _bytes(match["packed"]))._replace(bus=match["bus"])
     data = unhexlify(b"".join(match["spaced"].split()))
     if len(data) != int(match["length"]):
         raise FrameError("number of data bytes differs from the one stated")
-    return _can_frame(match["id"], data)
+    return _can_frame(match["id"], data)._replace(bus=match["bus"])
 
 
 def _parse_yacht_devices(match: re.Match[bytes]) -> Frame:
@@ -256,7 +259,8 @@ CANDUMP = LineFormat(
     StampKind.INSTANT,
     False,
     re.compile(
-        rb"\s*(?:\((?P<stamp>[\d.: -]{1,40})\)\s+)?[A-Za-z]\w{0,15}\s+(?:[RT]X\s+\S\s+\S\s+)?"
+        rb"\s*(?:\((?P<stamp>[\d.: -]{1,40})\)\s+)?(?P<bus>[A-Za-z]\w{0,15})\s+"
+        rb"(?:[RT]X\s+\S\s+\S\s+)?"
         rb"(?P<id>[0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})"
         rb"(?:#(?P<packed>[0-9A-Fa-f]{0,16})"
         rb"|\s+\[(?P<length>\d)\](?P<spaced>(?:\s+[0-9A-Fa-f]{2}){0,8}))"

@@ -12,6 +12,8 @@ from .line_formats import FRAME_BYTES, Frame, LineFormat, detect_format, is_asse
 from .pgns import DAY_SECS, READINGS
 
 FAST_PGNS = frozenset(pgn for pgn in READINGS if is_fast(pgn))
+ADDRESS_CLAIM = 60928
+NULL_ADDRESS = 254  # of devices that have found no address
 
 
 class PgnDecoder:
@@ -38,6 +40,9 @@ class PgnDecoder:
         self._assembly = FastPacketAssembly()
         self._clock = GnssClock(self._warn)
         self._kinds: dict[tuple[int, int], str] = {}
+        self._names: dict[int, bytes] = {}  # the NAMEs of devices by address (ISO 11783-5)
+        self._bus: bytes | None = None
+        self._has_other_bus = False
 
     @property
     def counts(self) -> StreamCounts:
@@ -77,8 +82,12 @@ class PgnDecoder:
             frame = line_format.frame(line)
             if frame is None:
                 self._counts.skip("comment or status")
+            elif not self._is_of_our_bus(frame, received_ns):
+                self._counts.reject("frame of another bus")
             elif frame.pgn not in READINGS:
                 self._counts.skip(str(frame.pgn))
+                if frame.pgn == ADDRESS_CLAIM:
+                    self._check_claim(frame, received_ns)
             elif (data := self._message(frame)) is not None:
                 self._add(frame, data, received_ns, samples)
         except FrameError as error:
@@ -90,6 +99,30 @@ class PgnDecoder:
             self._counts.skip("comment or status")
         else:
             self._counts.reject("line of no known format")
+
+    def _is_of_our_bus(self, frame: Frame, received_ns: int) -> bool:
+        """Whether a frame is of the bus of the first one: addresses repeat on another."""
+        if self._bus is None:
+            self._bus = frame.bus
+        if frame.bus == self._bus:
+            return True
+        if not self._has_other_bus:
+            self._has_other_bus = True
+            self._counts.warn(
+                f"frames of {frame.bus.decode()} beside those of {self._bus.decode()} are not "
+                "recorded, as their addresses may be the same; record each bus apart",
+                received_ns,
+            )
+        return False
+
+    def _check_claim(self, frame: Frame, received_ns: int) -> None:
+        """Warn where an address is claimed by another device than before."""
+        if frame.source >= NULL_ADDRESS:
+            return
+        name = self._names.setdefault(frame.source, frame.data)
+        if name != frame.data:
+            self._names[frame.source] = frame.data
+            self._warn(f"{frame.source} is that of another device from here on", received_ns)
 
     def _message(self, frame: Frame) -> bytes | None:
         """Return the data of the whole message, or None where frames of it are still missing."""

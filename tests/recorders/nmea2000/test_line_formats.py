@@ -43,7 +43,9 @@ CASES = [(name, parser, line) for name, (parser, lines) in LINES.items() for lin
 @pytest.mark.parametrize(("name", "parser", "line"), CASES)
 def test_a_line_has_the_frame_that_the_library_finds(name: str, parser: str, line: bytes) -> None:
     _, pgn, source, destination, data = _canboat.parse_line(parser, line.decode())
-    assert FORMATS[name].frame(line) == (pgn, source, destination, data)
+    frame = FORMATS[name].frame(line)
+    assert frame is not None
+    assert frame[:4] == (pgn, source, destination, data)
 
 
 @pytest.mark.parametrize(("name", "parser", "line"), CASES)
@@ -156,4 +158,4 @@ def test_the_frames_of_the_recordings_are_those_of_the_library(recordings: Path)
             except FrameError:
                 continue
             if frame is not None:
-                assert _canboat.parse_line(theirs, line.decode())[1:] == frame
+                assert _canboat.parse_line(theirs, line.decode())[1:] == frame[:4]

@@ -172,6 +172,22 @@ def test_a_rollover_of_the_gps_week_is_corrected_with_a_warning() -> None:
     assert "1024 weeks early" in decoded.counts.warnings[0]
 
 
+def test_frames_of_a_second_bus_are_not_mixed_with_those_of_the_first() -> None:
+    line = candump(127250, bytes.fromhex("ff1027ff7fff7ffc"))
+    other = candump(127250, bytes.fromhex("ff204eff7fff7ffc")).replace(b"can0", b"can1")
+    decoded = decode_file(NMEA2000, [line, other, other, line])
+    assert decoded.values("/heading/27") == [pytest.approx(1.0)] * 2
+    assert decoded.counts.rejected == {"frame of another bus": 2}
+    assert len(decoded.counts.warnings) == 1
+    assert "record each bus apart" in decoded.counts.warnings[0]
+
+
+def test_another_device_at_an_address_is_warned_about() -> None:
+    names = [b"\x01" * 8, b"\x01" * 8, b"\x02" * 8, b"\x02" * 8]
+    decoded = decode_file(NMEA2000, [candump(60928, name) for name in names])
+    assert decoded.counts.warnings == ("address 27 is that of another device from here on",)
+
+
 def test_no_damaged_frame_raises_an_exception_and_every_line_is_counted() -> None:
     lines = fix_frames() + [
         candump(pgn, bytes(range(8))) for pgn in (127245, 127250, 128259, 129025, 129026, 130306)
