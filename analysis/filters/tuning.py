@@ -106,8 +106,9 @@ def _likeliest_ratio(
         candidate = replace(noise, process_ratio=ratios)
         estimates = _filter_head(stats, model, candidate, settings, kind)
         e, s = estimates.innovations[:, output], estimates.innovation_stds[:, output]
-        squares = np.minimum((e / s) ** 2, settings.gate**2)
-        total = float(np.nansum(squares + 2 * np.log(s)))
+        with np.errstate(over="ignore", invalid="ignore"):  # of a filter that diverges
+            squares = np.minimum((e / s) ** 2, settings.gate**2)
+            total = float(np.nansum(squares + 2 * np.log(s)))
         return total if np.isfinite(total) else 1e300
 
     from scipy.optimize import minimize_scalar  # noqa: PLC0415 - it takes long to import

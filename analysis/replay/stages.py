@@ -21,7 +21,7 @@ from .replay_results import Findings, ReplayChunk
 from .residuals import ResidualTest
 from .track import Tracker
 
-MIN_EXCESS_SHARE = 0.1  # of the trial, with a disturbance beyond the rudder: the model is wrong
+MIN_EXCESS_SHARE = 0.5  # of the trial, with a disturbance beyond the rudder: the model is wrong
 
 
 class Stages:
