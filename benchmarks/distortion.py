@@ -150,14 +150,15 @@ def delayed(name: str, secs: float) -> Callable[[TrialLog], TrialLog]:
 def all_times(function: Callable[[TimeArray], TimeArray]) -> Callable[[TrialLog], TrialLog]:
     """Return a distortion of all times, which are given in ns since the start."""
 
+    def changed(times: TimeArray) -> TimeArray:
+        return START_NS + function(times - START_NS)
+
     def apply(log: TrialLog) -> TrialLog:
-        for channel in log.channels:
-            measured, received = (
-                START_NS + function(times - START_NS)
-                for times in (channel.measured_ns, channel.received_ns)
-            )
-            log = with_channel(log, channel.name, measured_ns=measured, received_ns=received)
-        return log
+        channels = tuple(
+            replace(c, measured_ns=changed(c.measured_ns), received_ns=changed(c.received_ns))
+            for c in log.channels
+        )
+        return replace(log, channels=channels)
 
     return apply
 

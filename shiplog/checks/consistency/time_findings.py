@@ -21,7 +21,7 @@ MIN_CORRELATION = 0.9  # of the turns by yaw rate and heading
 # of their sizes where the yaw rate turns too little, as it may be reversed or fail for a while, too
 MIN_DEAD_CORRELATION = 0.5
 TRACK_LEGS = 40  # on which the distance is measured, so that the noise of the fixes is small in it
-FACTOR_TOLERANCE, DISTANCE_TOLERANCE = 0.25, 0.4  # of the logarithms of the factors
+FACTOR_TOLERANCE, DISTANCE_TOLERANCE = 0.35, 0.4  # of the logarithms, for a biased yaw rate
 
 
 def time_findings(
