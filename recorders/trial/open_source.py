@@ -117,8 +117,14 @@ def _request(entry: SourceEntry, folder: Path) -> StreamRequest:
     own = entry.format.open_transport(address, ReceptionClock()) is not None
     if not own and not is_live(address) and address != "-":
         address = os.fspath(folder / address)
+    options = argparse.Namespace(
+        **{
+            key: folder / value if isinstance(value, Path) else value
+            for key, value in vars(entry.options).items()
+        }
+    )
     return StreamRequest(
-        entry.name, entry.format, address, entry.options, entry.keep_raw, f"{entry.name}."
+        entry.name, entry.format, address, options, entry.keep_raw, f"{entry.name}."
     )
 
 

@@ -138,11 +138,16 @@ class _Parser:
             self._path,
             tuple(sources),
             self._path.parent / output_file if output_file else None,
-            vessel_file or None,
+            self._vessel(vessel_file),
             conditions,
             minutes,
             megabytes,
         )
+
+    def _vessel(self, name: str) -> str | None:
+        """Return the vessel file, relative to the trial file where it lies there, or a preset."""
+        beside = self._path.parent / name
+        return os.fspath(beside) if name and beside.is_file() else name or None
 
     def _section(self, name: str, keys: Iterable[str]) -> Mapping[str, Any]:
         section = self._table.get(name, {})
