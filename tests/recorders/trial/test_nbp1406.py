@@ -77,7 +77,7 @@ def test_the_log_has_all_sources_at_their_rates_and_no_disorder(log: TrialLog) -
 
 def test_the_two_headings_agree_within_three_tenths_of_a_degree(log: TrialLog) -> None:
     assert abs(np.median(_heading_differences_deg(log, 0.0))) < 0.05
-    # the filter of the gyro compass lags by 1.2 s, in which the ship yaws up to 0.6 deg in the swell
+    # the filter of the gyro lags by 1.2 s, in which the ship yaws up to 0.6 deg in the swell
     assert np.quantile(np.abs(_heading_differences_deg(log, 1.2)), 0.95) < 0.3
 
 
