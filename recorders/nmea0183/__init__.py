@@ -2,8 +2,9 @@
 
 `framing` cuts lines and datagrams into sentences and checks them, the modules `*_sentences` decode
 one group of sentences each, `sentence_decoder` joins them to a `recorders.streams.decoder.Decoder`,
-and `recorders.streams.gnss_clock` compares the receivers' own times with the times of reception. A
-file without time stamps gets its times in `sentence_times`.
+`recorders.streams.gnss_clock` compares the receivers' own times with the times of reception, and
+`twin_devices` finds talkers that are two devices. A file without time stamps gets its times in
+`sentence_times`.
 
 No parser library is used at run time. pynmea2 1.19 parses fast, but raises an exception for each
 kind that it does not know (THS, ROR, HTC, HTD, DBS), and leaves status and numbers to be checked;

@@ -14,6 +14,7 @@ from .framing import FramingError, Sentence, parse_sentence, split_packet
 from .navigation_sentences import NAVIGATION
 from .steering_sentences import STEERING, Values
 from .transducer_sentences import TRANSDUCERS, MotionUnit
+from .twin_devices import CHECKED, TwinDevices
 from .utc_fields import TIMED, utc_of
 
 _USUAL_TIME = "ZDA"  # other sentences' times of a talker have a source of their own
@@ -58,7 +59,7 @@ class SentenceDecoder:
     Examples
     --------
     >>> decoder, samples = SentenceDecoder(), SampleBuffer()
-    >>> decoder.decode([Packet(b"$TIROT,-6.0,A*35", 10**18)], samples)
+    >>> decoder.decode([Packet(b"$TIROT,-6.0,A*10", 10**18)], samples)
     >>> samples.take()[0]
     Channel(/yaw_rate/TI [rad/s], 1 samples)
     """
@@ -76,6 +77,7 @@ class SentenceDecoder:
             received_is_known=self._options.received_is_known,
             remedy="with --time gnss its samples have its own time",
         )
+        self._twins = TwinDevices()
         self._lines: dict[str, int] = {}  # the last line count by sender
 
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
@@ -87,6 +89,8 @@ class SentenceDecoder:
     def finish(self, samples: SampleBuffer) -> None:  # noqa: ARG002 - of the protocol
         """Report the latencies of the receivers."""
         self._clock.finish()
+        for text in self._twins.findings():
+            self.counts.warn(text)
         for key, text in self._clock.notes():
             self.counts.note(key, text)
 
@@ -118,7 +122,7 @@ class SentenceDecoder:
         measured_ns = received_ns
         if self._options.gnss_time:
             measured_ns = time_ns or self._clock.measured_ns(source, received_ns)
-        if not _add(samples, source, values, received_ns, measured_ns):
+        if not self._add(samples, source, values, received_ns, measured_ns):
             self.counts.flag(kind)
 
     def _gnss_time_ns(
@@ -143,18 +147,25 @@ class SentenceDecoder:
         if last is not None and line not in (last, 1) and (lost := (line - last - 1) % _LINES):
             self.counts.reject("lost before reception (TAG line counts)", lost)
 
-
-def _add(
-    samples: SampleBuffer, source: str, values: Values, received_ns: int, measured_ns: int
-) -> bool:
-    """Add the values of a sentence; return whether all of them are valid."""
-    valid = True
-    for channel, value, suffix in values:
-        topic = f"{source}.{suffix}" if suffix else source
-        if isinstance(value, tuple):
-            samples.add_position(topic, value, received_ns, measured_ns)
-            valid &= not isnan(value[0])
-        else:
-            samples.add(channel, topic, value, received_ns, measured_ns)
-            valid &= not isnan(value)
-    return valid
+    def _add(
+        self,
+        samples: SampleBuffer,
+        source: str,
+        values: Values,
+        received_ns: int,
+        measured_ns: int,
+    ) -> bool:
+        """Add the values of a sentence; return whether all of them are valid."""
+        valid = True
+        for channel, value, suffix in values:
+            topic = f"{source}.{suffix}" if suffix else source
+            if isinstance(value, tuple):
+                samples.add_position(topic, value, received_ns, measured_ns)
+                valid &= not isnan(value[0])
+            elif not samples.add(channel, topic, value, received_ns, measured_ns):
+                continue  # one topic too many
+            elif isnan(value):
+                valid = False
+            elif channel in CHECKED:
+                self._twins.add(channel, topic, value)
+        return valid

@@ -73,6 +73,9 @@ def test_rob_yields_rate_of_turn_rudder_and_two_logs_and_misses_only_the_revolut
     secs = (rudder.measured_ns[-1] - rudder.measured_ns[0]) * 1e-9
     assert len(rudder) / secs == pytest.approx(10, rel=0.05)
     assert secs == pytest.approx(6.5 * 60, rel=0.02)
+    assert counts.warnings[1].startswith(
+        "magnetic_heading of HC alternates by 1.6 deg: two devices"
+    )
     with pytest.raises(LogError, match=rf"no channel 'rpm'.*{NEEDS}"):
         analyse(recorded.log)
 
