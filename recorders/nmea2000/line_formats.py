@@ -142,7 +142,7 @@ def detect_format(lines: Sequence[bytes]) -> LineFormat | None:
 
 
 def is_assembled(lines: Sequence[bytes]) -> bool:
-    """Whether the lines of a canboat file are whole messages: its header, or a line says so."""
+    """Whether the lines of a canboat file are whole messages, by its header or a long line."""
     return any(
         b"format=FAST" in line
         or ((match := CANBOAT.pattern.fullmatch(line)) and int(match["length"]) > FRAME_BYTES)

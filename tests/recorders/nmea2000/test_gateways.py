@@ -32,7 +32,7 @@ def test_lines_of_a_gateway_over_tcp_are_stamped_at_reception() -> None:
         connection, _ = server.accept()
         with connection:
             before = clock.now_ns()
-            connection.sendall(b"cut off\r\n" + LINE + LINE[:20])
+            connection.sendall(b"half a line\r\n" + LINE + LINE[:20])
             first = _receive(transport, 2)
             connection.sendall(LINE[20:])
             packets = first + _receive(transport, 1)

@@ -92,7 +92,7 @@ def test_what_is_not_decoded_or_without_a_value_is_counted_as_unused() -> None:
 
 def test_a_datagram_of_a_gateway_may_hold_several_lines() -> None:
     line = b"17:33:21.107 R 09F1121B FF 10 27 FF 7F FF 7F FC\r\n"
-    decoded = decode_live(NMEA2000, [b"cut off", line + line, line])
+    decoded = decode_live(NMEA2000, [b"half a line", line + line, line])
     channel = decoded.channels["/heading/27"]
     assert channel.received_ns.tolist() == [10**8, 10**8, 2 * 10**8]
     assert decoded.counts.rejected == {"line of no known format": 1}
