@@ -22,8 +22,8 @@ from .printable import printable
 from .verb import ExitCode, Verb
 
 GROUP = "shiplog.verbs"
-# new objects before a collection of garbage: what an import creates is kept, and not worth a search
-RARE_COLLECTION = 20_000
+# new objects before a search for garbage; a replay leaves none of size, and imports are kept
+RARE_COLLECTION = 100_000
 ORDER = ("record", "info", "convert", "replay", "identify", "check")  # others follow by name
 
 
