@@ -35,6 +35,8 @@ class LoadResult:
     ----------
     sent, recorded, decoded
         The number of sentences sent, kept raw in the log, and decoded.
+    counted
+        The number of lost packets that the log's metadata state.
     rate_hz
         The rate at which they were sent, 1/s.
     cpu_share
@@ -44,6 +46,7 @@ class LoadResult:
     sent: int
     recorded: int
     decoded: int
+    counted: int
     rate_hz: float
     cpu_share: float
 
@@ -99,8 +102,11 @@ def measure_load(rate_hz: float, secs: float, folder: Path) -> LoadResult:
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     recorded = sum(len(packets) for packets in read_raw(log))
-    decoded = sum(len(channel) for channel in read(log).channels)
-    return LoadResult(len(sentences), recorded, decoded, len(sentences) / took, cpu / took)
+    written = read(log)
+    decoded = sum(map(len, written.channels))
+    counted = int(written.metadata.get("nmea0183.dropped", 0))
+    sent = len(sentences)
+    return LoadResult(sent, recorded, decoded, counted, sent / took, cpu / took)
 
 
 def _send(sentences: Sequence[bytes], rate_hz: float, port: int) -> float:
@@ -144,7 +150,8 @@ def main() -> None:
             result = measure_load(rate, arguments.secs, Path(name))
             print(
                 f"UDP: {result.sent} sentences at {result.rate_hz:.0f}/s: "
-                f"{result.sent - result.recorded} lost, {result.decoded} samples, "
+                f"{result.sent - result.recorded} lost, {result.counted} of them counted, "
+                f"{result.decoded} samples, "
                 f"{result.cpu_share:.2f} cores"
             )
 

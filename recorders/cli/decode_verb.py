@@ -18,7 +18,7 @@ def _decode(arguments: argparse.Namespace) -> ExitCode:
     require_outputs(arguments.output)
     require_suffix(".mcap", arguments.output)
     require_distinct([arguments.output], [arguments.log])
-    from recorders.decode import open_raw
+    from recorders.decoded_source import open_raw
     from recorders.record import record
     from recorders.trial.stream_tables import stream_tables
 

@@ -33,6 +33,8 @@ class CanBusTransport:
         python-can is not installed.
     """
 
+    lost = 0  # the system reports none
+
     def __init__(self, address: str, bus: CanAddress, clock: ReceptionClock) -> None:
         self.address = address
         self._can_address, self._clock = bus, clock

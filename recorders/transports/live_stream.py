@@ -48,8 +48,6 @@ class LiveStream:
         Whether the transport is open.
     fault
         Why the transport is not open, or was not before the end; empty where it is.
-    dropped
-        The number of packets dropped so far because too many waited.
     """
 
     def __init__(self, transport: Transport, clock: ReceptionClock, name: str) -> None:
@@ -61,7 +59,12 @@ class LiveStream:
         self._reported_drops = 0
         self.state = StreamState.CONNECTING
         self.fault = ""
-        self.dropped = 0
+        self._dropped = 0
+
+    @property
+    def dropped(self) -> int:
+        """The number of packets dropped so far, here or by the system, because too many waited."""
+        return self._dropped + self._transport.lost
 
     def start(self) -> None:
         """Start to read."""
@@ -80,8 +83,9 @@ class LiveStream:
 
     def take_events(self) -> list[Event]:
         """Return the gaps and drops of the stream since the last call."""
-        if self.dropped > self._reported_drops:
-            count, self._reported_drops = self.dropped - self._reported_drops, self.dropped
+        dropped = self.dropped
+        if dropped > self._reported_drops:
+            count, self._reported_drops = dropped - self._reported_drops, dropped
             self._report(f"{count} packets dropped: they came faster than they were recorded")
         return [self._events.popleft() for _ in range(len(self._events))]
 
@@ -122,7 +126,7 @@ class LiveStream:
             packets = self._transport.receive(RECEIVE_SECS)
             room = MAX_WAITING_PACKETS - len(self._waiting)
             self._waiting.extend(packets[:room] if room < len(packets) else packets)
-            self.dropped += max(0, len(packets) - room)
+            self._dropped += max(0, len(packets) - room)
 
     def _set_open(self, lost_ns: int | None) -> None:
         self.state, self.fault = StreamState.OPEN, ""

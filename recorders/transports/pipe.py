@@ -23,6 +23,7 @@ class PipeTransport:
     """
 
     address = "-"
+    lost = 0  # a pipe waits
 
     def __init__(self, clock: ReceptionClock, descriptor: int | None = None) -> None:
         self._clock = clock

@@ -27,6 +27,8 @@ class SerialTransport:
         The clock of reception.
     """
 
+    lost = 0  # the system reports none
+
     def __init__(self, address: str, device: str, baud: int, clock: ReceptionClock) -> None:
         self.address = address
         self._device, self._baud = device, baud

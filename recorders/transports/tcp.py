@@ -23,6 +23,8 @@ class TcpTransport:
         The clock of reception.
     """
 
+    lost = 0  # the system reports none
+
     def __init__(self, address: str, host: str, port: int, clock: ReceptionClock) -> None:
         self.address = address
         self._server = host, port

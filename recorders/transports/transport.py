@@ -12,6 +12,10 @@ class Transport(Protocol):
     def address(self) -> str:
         """The address as the user wrote it, for messages."""
 
+    @property
+    def lost(self) -> int:
+        """The number of packets that the system dropped so far, where it counts them."""
+
     def open(self) -> None:
         """Connect, or listen.
 

@@ -2,12 +2,14 @@
 
 import select
 import socket
+import sys
 from ipaddress import IPv4Address
 
 from recorders.streams.packets import Packet
 from recorders.streams.reception_clock import ReceptionClock
 
 RECEIVE_BUFFER_BYTES = 8 << 20  # asked of the system, which may grant less
+SO_RXQ_OVFL = getattr(socket, "SO_RXQ_OVFL", 40)  # Linux; 40 where Python lacks the name
 MAX_AT_ONCE = 2048  # datagrams of one call, so that a flood cannot hold the loop
 MAX_DATAGRAM_BYTES = 65_535
 
@@ -35,12 +37,20 @@ class UdpTransport:
         self._host, self._port, self._interface = host, port, interface
         self._clock = clock
         self._socket: socket.socket | None = None
+        self._lost_before = 0  # by sockets that were closed
+        self._lost_now = 0  # by the open socket
+
+    @property
+    def lost(self) -> int:
+        """The number of datagrams that found the receive buffer full."""
+        return self._lost_before + self._lost_now
 
     def open(self) -> None:
         """Listen; a group is joined on its interface only, and only its datagrams are received."""
         listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+            listener.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
             if IPv4Address(socket.gethostbyname(self._host)).is_multicast:
                 listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 listener.bind((self._host, self._port))
@@ -59,7 +69,7 @@ class UdpTransport:
             raise OSError("not open")
         if not select.select([self._socket], [], [], timeout_secs)[0]:
             return []
-        packets: list[Packet] = []
+        packets = [self._first(self._socket)]
         try:
             while len(packets) < MAX_AT_ONCE:
                 data, sender = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
@@ -68,8 +78,18 @@ class UdpTransport:
             pass
         return packets
 
+    def _first(self, listener: socket.socket) -> Packet:
+        """Receive a datagram with the number of those that the system has dropped before it."""
+        data, extra, _, sender = listener.recvmsg(MAX_DATAGRAM_BYTES, socket.CMSG_SPACE(4))
+        now_ns = self._clock.now_ns()
+        for level, kind, content in extra:
+            if (level, kind) == (socket.SOL_SOCKET, SO_RXQ_OVFL):
+                self._lost_now = int.from_bytes(content[:4], sys.byteorder)
+        return Packet(data, now_ns, sender[0])
+
     def close(self) -> None:
         """Close the socket, which also leaves the group."""
+        self._lost_before, self._lost_now = self.lost, 0
         if self._socket is not None:
             self._socket.close()
             self._socket = None

@@ -16,6 +16,7 @@ class _Scripted:
     """A transport whose calls of `receive` follow a script of packets and exceptions."""
 
     address = "scripted"
+    lost = 0
 
     def __init__(
         self, *steps: list[Packet] | Exception, opens: list[Exception] | None = None
@@ -88,6 +89,16 @@ def test_more_packets_than_may_wait_are_dropped_and_counted_and_the_reader_goes_
         "3 packets dropped: they came faster than they were recorded"
     ]
     assert stream.take_events() == []
+
+
+def test_packets_dropped_by_the_system_are_counted_and_an_event() -> None:
+    transport = _Scripted([Packet(b"1", 1)])
+    stream = LiveStream(transport, ReceptionClock(), "gyro")
+    transport.lost = 7
+    assert [event.text for event in stream.take_events()] == [
+        "7 packets dropped: they came faster than they were recorded"
+    ]
+    assert stream.dropped == 7
 
 
 def _wait_for(condition: Callable[[], bool]) -> None:

@@ -3,6 +3,7 @@
 import os
 import pty
 import socket
+import sys
 import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -68,6 +69,22 @@ def test_datagrams_are_received_with_their_sender_and_ascending_times() -> None:
     assert [p.data for p in packets] == [line + b"\r\n" for line in LINES]
     assert {p.origin for p in packets} == {"127.0.0.1"}
     assert packets[0].received_ns <= packets[1].received_ns
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux counts them")
+def test_datagrams_that_found_the_receive_buffer_full_are_counted() -> None:
+    port, sent = _free_port(), 60_000
+    with (
+        _opened(f"udp://127.0.0.1:{port}") as transport,
+        socket.socket(type=socket.SOCK_DGRAM) as s,
+    ):
+        for _ in range(sent):
+            s.sendto(b"x" * 200, ("127.0.0.1", port))
+        received = len(_received(transport, sent))
+        s.sendto(b"last", ("127.0.0.1", port))
+        received += len(_received(transport, 1))
+        assert transport.lost > 0
+        assert received + transport.lost == sent + 1
 
 
 def test_a_listener_on_one_address_does_not_hear_another() -> None:

@@ -8,7 +8,7 @@ import pytest
 from extensions import declare
 from number_format import NUMBERS, NumberDecoder
 
-from recorders.decode import open_raw
+from recorders.decoded_source import open_raw
 from recorders.record import record
 from recorders.streams.format import GROUP
 from recorders.streams.reception_clock import ReceptionClock
