@@ -1,6 +1,7 @@
 """Addresses of transports, such as ``udp://127.0.0.1:10110`` or ``serial:///dev/ttyUSB0?baud=4800``."""
 
 from collections.abc import Mapping
+from ipaddress import AddressValueError, IPv4Address
 from urllib.parse import parse_qsl, urlsplit
 
 from recorders.streams.reception_clock import ReceptionClock
@@ -65,11 +66,38 @@ def open_transport(address: str, clock: ReceptionClock) -> Transport:
     _check_options(address, parts.scheme, options)
     if parts.scheme == "serial":
         return _serial(address, parts.netloc + parts.path, options, clock)
-    if not host or port is None:
+    if not host or not port:
         raise UsageError(f"host or port is missing; an address is {FORMS}: {address}")
+    if parts.path.strip("/") or parts.fragment or "@" in parts.netloc:
+        raise UsageError(f"more than a host and a port; an address is {FORMS}: {address}")
     if parts.scheme == "udp":
-        return UdpTransport(address, host, port, options.get("interface", ""), clock)
+        interface = options.get("interface", "")
+        _check_interface(address, host, interface)
+        return UdpTransport(address, host, port, interface, clock)
     return TcpTransport(address, host, port, clock)
+
+
+def _check_interface(address: str, host: str, interface: str) -> None:
+    """Refuse what could never be listened at, and an interface that would not be used."""
+    if ":" in host:
+        raise UsageError(f"UDP is received over IPv4 only; give the local IPv4 address: {address}")
+    try:
+        is_group = IPv4Address(host).is_multicast
+    except AddressValueError:
+        is_group = False  # the name of a host
+    if not interface:
+        return
+    if not is_group:
+        raise UsageError(
+            f"?interface= is for multicast groups; to listen at one interface, give its address as "
+            f"the host: {address}"
+        )
+    try:
+        IPv4Address(interface)
+    except AddressValueError:
+        raise UsageError(
+            f"the interface is the local IPv4 address of one, not {interface!r}: {address}"
+        ) from None
 
 
 def _check_options(address: str, scheme: str, options: Mapping[str, str]) -> None:

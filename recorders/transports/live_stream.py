@@ -12,7 +12,8 @@ from shiplog.types import Event, EventLevel
 
 from .transport import Transport
 
-MAX_WAITING_PACKETS = 200_000  # some 20 s of the busiest ship, and 50 MB
+MAX_WAITING_PACKETS = 200_000  # some 20 s of the busiest ship
+MAX_WAITING_BYTES = 64 << 20  # of their data: datagrams can be long
 BATCH_SECS = 0.25  # between the batches of a live stream
 RECEIVE_SECS = 0.2  # how long a reader waits, so that it notices the end of the recording
 FIRST_RETRY_SECS, LONGEST_RETRY_SECS = 0.5, 10.0
@@ -30,7 +31,11 @@ class StreamState(Enum):
 class LiveStream:
     """Packets of one transport from a reader thread; it is opened again, with back-off, when lost.
 
-    Packets that wait to be decoded are bounded in number: what exceeds `MAX_WAITING_PACKETS` is
+    Whatever the transport raises is a lost connection, so that the reader never ends unnoticed. The
+    back-off begins anew only after a connection has lasted, so that one that is lost as soon as it
+    is made fills neither the network nor the log with attempts.
+
+    Packets that wait to be decoded are bounded in number and in bytes: what exceeds these limits is
     dropped and counted, and the transport is read on.
 
     Parameters
@@ -52,10 +57,13 @@ class LiveStream:
 
     def __init__(self, transport: Transport, clock: ReceptionClock, name: str) -> None:
         self._transport, self._clock, self._name = transport, clock, name
-        self._waiting: deque[Packet] = deque()
+        self._lock = threading.Lock()  # of what waits
+        self._waiting: list[Packet] = []
+        self._waiting_bytes = 0
         self._events: deque[Event] = deque()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"reader of {name}", daemon=True)
+        self._lost_ns: int | None = None
         self._reported_drops = 0
         self.state = StreamState.CONNECTING
         self.fault = ""
@@ -70,16 +78,24 @@ class LiveStream:
         """Start to read."""
         self._thread.start()
 
-    def stop(self) -> None:
-        """Stop to read, and close the transport; what waits can still be taken."""
+    def request_stop(self) -> None:
+        """Let the reader stop by itself, without waiting for it."""
         self._stop.set()
-        if self._thread.is_alive():
-            self._thread.join(2 * RECEIVE_SECS + 5)
+
+    def stop(self) -> None:
+        """Stop to read, and close the transport; what waits can still be taken.
+
+        A reader that is not connected has nothing to add, and is not waited for.
+        """
+        self.request_stop()
+        if self._thread.is_alive() and self.state is StreamState.OPEN:
+            self._thread.join(RECEIVE_SECS + 1)
 
     def take(self) -> list[Packet]:
         """Return the packets received since the last call."""
-        # popleft by the number that wait is safe beside the reader, which only appends
-        return [self._waiting.popleft() for _ in range(len(self._waiting))]
+        with self._lock:
+            taken, self._waiting, self._waiting_bytes = self._waiting, [], 0
+        return taken
 
     def take_events(self) -> list[Event]:
         """Return the gaps and drops of the stream since the last call."""
@@ -104,42 +120,67 @@ class LiveStream:
 
     def _run(self) -> None:
         """Read until the end of the recording or of the source; open again what is lost."""
-        retry_secs, lost_ns = FIRST_RETRY_SECS, None
+        retry_secs = FIRST_RETRY_SECS
         while not self._stop.is_set():
+            began = time.monotonic()
             try:
-                self._transport.open()
-                self._set_open(lost_ns)
-                lost_ns, retry_secs = None, FIRST_RETRY_SECS
-                self._read()
+                self._connect_and_read()
             except EOFError:
-                break
-            except OSError as error:
-                lost_ns = lost_ns or self._set_lost(error)
-            finally:
-                self._transport.close()
+                self._report("the source has ended", EventLevel.INFO)
+                self.state = StreamState.ENDED
+                return
+            except Exception as error:  # noqa: BLE001 - a reader that ends would go unnoticed
+                self._set_lost(error)
+            if time.monotonic() - began > LONGEST_RETRY_SECS:
+                retry_secs = FIRST_RETRY_SECS
             self._stop.wait(retry_secs)
             retry_secs = min(2 * retry_secs, LONGEST_RETRY_SECS)
-        self.state = StreamState.ENDED
 
-    def _read(self) -> None:
-        while not self._stop.is_set():
-            packets = self._transport.receive(RECEIVE_SECS)
+    def _connect_and_read(self) -> None:
+        """Read from the transport until it fails or ends, or the recording ends; then close it."""
+        try:
+            self._transport.open()
+            self._set_open()
+            while not self._stop.is_set():
+                self._keep(self._transport.receive(RECEIVE_SECS))
+        finally:
+            self._transport.close()
+
+    def _keep(self, packets: list[Packet]) -> None:
+        """Let packets wait, as many as there is room for, and count the others."""
+        kept = 0
+        with self._lock:
             room = MAX_WAITING_PACKETS - len(self._waiting)
-            self._waiting.extend(packets[:room] if room < len(packets) else packets)
-            self._dropped += max(0, len(packets) - room)
+            for packet in packets[:room]:
+                if self._waiting_bytes + len(packet.data) > MAX_WAITING_BYTES:
+                    break
+                self._waiting_bytes += len(packet.data)
+                kept += 1
+            self._waiting += packets[:kept]
+        self._dropped += len(packets) - kept
 
-    def _set_open(self, lost_ns: int | None) -> None:
+    def _set_open(self) -> None:
         self.state, self.fault = StreamState.OPEN, ""
-        if lost_ns is not None:
-            secs = (self._clock.now_ns() - lost_ns) * 1e-9
+        if self._lost_ns is not None:
+            secs = (self._clock.now_ns() - self._lost_ns) * 1e-9
+            self._lost_ns = None
             self._report(f"connected again after a gap of {secs:.1f} s", EventLevel.INFO)
 
-    def _set_lost(self, error: OSError) -> int:
-        """Report the loss, and return its time, ns."""
+    def _set_lost(self, error: Exception) -> None:
+        """Keep why there is no connection, and report a loss once."""
         self.state = StreamState.LOST
-        self.fault = error.strerror or str(error) or type(error).__name__
-        self._report(f"no connection to {self._transport.address}: {self.fault}")
-        return self._clock.now_ns()
+        self.fault = _in_words(error)
+        if self._lost_ns is None:
+            self._lost_ns = self._clock.now_ns()
+            self._report(f"no connection to {self._transport.address}: {self.fault}")
 
     def _report(self, text: str, level: EventLevel = EventLevel.WARNING) -> None:
         self._events.append(Event(self._clock.now_ns(), text, self._name, level))
+
+
+def _in_words(error: Exception) -> str:
+    """Return what went wrong; of an error that no transport should raise, its type too."""
+    text = " ".join(str(getattr(error, "strerror", None) or error).split())
+    if isinstance(error, OSError):
+        return text or type(error).__name__
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

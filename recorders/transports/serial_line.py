@@ -37,17 +37,18 @@ class SerialTransport:
         self._splitter = LineSplitter()
 
     def open(self) -> None:
-        """Open the port, for this process alone; the first line, which may be cut, is forgotten."""
+        """Open the port, for this process alone; the first line, which may be cut, is discarded."""
         import serial  # noqa: PLC0415 - only where a serial port is used
 
-        self._splitter = LineSplitter()
+        self._splitter = LineSplitter(begins_inside=True)
         self._port = serial.Serial(self._device, self._baud, exclusive=True)
 
     def receive(self, timeout_secs: float) -> list[Packet]:
         """Return the lines that have arrived, stamped when their ends arrived."""
         if self._port is None:
             raise OSError("not open")
-        self._port.timeout = timeout_secs
+        if self._port.timeout != timeout_secs:  # setting it configures the port anew
+            self._port.timeout = timeout_secs
         data = self._port.read(1)
         if not data:
             return []

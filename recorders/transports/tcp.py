@@ -7,6 +7,9 @@ from recorders.streams.packets import Packet
 from recorders.streams.reception_clock import ReceptionClock
 
 CONNECT_SECS = 5.0
+# a pulled cable is no event for a socket that only listens: the system asks the other end after
+# this long a silence, s, so often, s, and so many times
+_PROBES = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 _READ_BYTES = 1 << 16
 
 
@@ -37,6 +40,9 @@ class TcpTransport:
         self._splitter = LineSplitter()
         self._socket = socket.create_connection(self._server, CONNECT_SECS)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for name, value in _PROBES.items():
+            if (option := getattr(socket, name, None)) is not None:  # not on all systems
+                self._socket.setsockopt(socket.IPPROTO_TCP, option, value)
 
     def receive(self, timeout_secs: float) -> list[Packet]:
         """Return the lines that have arrived, stamped when their ends arrived."""

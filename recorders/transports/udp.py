@@ -28,6 +28,11 @@ class UdpTransport:
         system chooses it.
     clock
         The clock of reception.
+
+    Attributes
+    ----------
+    lost
+        The number of datagrams that found the receive buffer full; known on Linux only.
     """
 
     def __init__(
@@ -37,20 +42,16 @@ class UdpTransport:
         self._host, self._port, self._interface = host, port, interface
         self._clock = clock
         self._socket: socket.socket | None = None
-        self._lost_before = 0  # by sockets that were closed
-        self._lost_now = 0  # by the open socket
-
-    @property
-    def lost(self) -> int:
-        """The number of datagrams that found the receive buffer full."""
-        return self._lost_before + self._lost_now
+        self._reported_losses = 0  # of the open socket, as the system counts them
+        self.lost = 0
 
     def open(self) -> None:
         """Listen; a group is joined on its interface only, and only its datagrams are received."""
         listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
-            listener.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+            if sys.platform == "linux":
+                listener.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
             if IPv4Address(socket.gethostbyname(self._host)).is_multicast:
                 listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 listener.bind((self._host, self._port))
@@ -61,7 +62,7 @@ class UdpTransport:
         except BaseException:
             listener.close()
             raise
-        self._socket = listener
+        self._socket, self._reported_losses = listener, 0
 
     def receive(self, timeout_secs: float) -> list[Packet]:
         """Return the datagrams that have arrived."""
@@ -84,19 +85,21 @@ class UdpTransport:
         now_ns = self._clock.now_ns()
         for level, kind, content in extra:
             if (level, kind) == (socket.SOL_SOCKET, SO_RXQ_OVFL):
-                self._lost_now = int.from_bytes(content[:4], sys.byteorder)
+                losses = int.from_bytes(content[:4], sys.byteorder)
+                self.lost += (losses - self._reported_losses) % 2**32  # the count wraps around
+                self._reported_losses = losses
         return Packet(data, now_ns, sender[0])
 
     def close(self) -> None:
         """Close the socket, which also leaves the group."""
-        self._lost_before, self._lost_now = self.lost, 0
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
     def _join(self, listener: socket.socket) -> None:
-        any_group = getattr(socket, "IP_MULTICAST_ALL", 49)  # Linux; 49 where Python lacks the name
-        listener.setsockopt(socket.IPPROTO_IP, any_group, 0)
+        if sys.platform == "linux":  # elsewhere a socket receives the groups that it has joined
+            any_group = getattr(socket, "IP_MULTICAST_ALL", 49)  # where Python lacks the name
+            listener.setsockopt(socket.IPPROTO_IP, any_group, 0)
         interface = socket.inet_aton(self._interface) if self._interface else bytes(4)  # any one
         group = socket.inet_aton(self._host) + interface
         listener.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)

@@ -13,7 +13,7 @@ from shiplog.types import Event
 
 
 class _Scripted:
-    """A transport whose calls of `receive` follow a script of packets and exceptions."""
+    """A transport whose calls of `receive` and `open` follow scripts of packets and exceptions."""
 
     address = "scripted"
     lost = 0
@@ -60,6 +60,7 @@ def test_packets_before_and_after_a_lost_connection_are_kept_and_the_gap_is_an_e
     assert [event.text.split(" of ")[0] for event in events] == [
         "no connection to scripted: cable pulled",
         "connected again after a gap",
+        "the source has ended",
     ]
     assert {event.source for event in events} == {"gyro"}
     assert transport.opened == 2
@@ -86,9 +87,69 @@ def test_more_packets_than_may_wait_are_dropped_and_counted_and_the_reader_goes_
     assert len(stream.take()) == 5
     assert stream.dropped == 3
     assert [event.text for event in stream.take_events()] == [
-        "3 packets dropped: they came faster than they were recorded"
+        "the source has ended",
+        "3 packets dropped: they came faster than they were recorded",
     ]
     assert stream.take_events() == []
+
+
+def test_long_packets_that_wait_are_bounded_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_stream, "MAX_WAITING_BYTES", 100)
+    long = [Packet(b"x" * 40, n) for n in range(5)]
+    stream = LiveStream(_Scripted(long, [Packet(b"short", 9)]), ReceptionClock(), "gyro")
+    stream.start()
+    _wait_for(lambda: stream.state is StreamState.ENDED)
+    assert [len(packet.data) for packet in stream.take()] == [40, 40, 5]
+    assert stream.dropped == 3
+
+
+@pytest.mark.parametrize("error", [RuntimeError("driver"), TypeError(), ValueError("x")])
+def test_whatever_a_transport_raises_ends_no_reader_unnoticed(error: Exception) -> None:
+    transport = _Scripted([Packet(b"1", 1)], error, [Packet(b"2", 2)])
+    packets, events, stream = _run(transport)
+    assert stream.state is StreamState.ENDED
+    assert [packet.data for packet in packets] == [b"1", b"2"]
+    assert type(error).__name__ in events[0].text
+    assert events[1].text.startswith("connected again")
+
+
+def test_an_error_while_closing_is_a_lost_connection_and_no_end() -> None:
+    class BadClose(_Scripted):
+        def close(self) -> None:
+            super().close()
+            if self.closed == 1:
+                raise RuntimeError("already gone")
+
+    transport = BadClose([Packet(b"1", 1)], OSError("pulled"), [Packet(b"2", 2)])
+    packets, events, _ = _run(transport)
+    assert [packet.data for packet in packets] == [b"1", b"2"]
+    assert "no connection to scripted" in events[0].text
+
+
+def test_the_fault_shown_is_that_of_the_last_attempt() -> None:
+    faults = iter([OSError("cable pulled"), OSError("no permission")])
+    last = OSError("no device")
+    transport = _Scripted()
+    transport.open = lambda: (_ for _ in ()).throw(next(faults, last))  # type: ignore[method-assign]
+    stream = LiveStream(transport, ReceptionClock(), "gyro")
+    stream.start()
+    _wait_for(lambda: stream.fault == "no device")
+    assert stream.state is StreamState.LOST
+    assert [event.text for event in stream.take_events()] == [
+        "no connection to scripted: cable pulled"
+    ]
+    stream.stop()
+
+
+def test_a_connection_that_is_lost_at_once_is_tried_at_growing_intervals(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    waits: list[float] = []
+    stream = LiveStream(_Scripted(*[OSError("closed")] * 7), ReceptionClock(), "gyro")
+    monkeypatch.setattr(stream._stop, "wait", waits.append)
+    stream.start()
+    _wait_for(lambda: stream.state is StreamState.ENDED)
+    assert waits == [0.01 * 2**n for n in range(7)]
 
 
 def test_packets_dropped_by_the_system_are_counted_and_an_event() -> None:
@@ -99,6 +160,18 @@ def test_packets_dropped_by_the_system_are_counted_and_an_event() -> None:
         "7 packets dropped: they came faster than they were recorded"
     ]
     assert stream.dropped == 7
+
+
+def test_a_reader_that_is_not_connected_is_not_waited_for() -> None:
+    class Hanging(_Scripted):
+        def open(self) -> None:
+            time.sleep(2.0)
+
+    stream = LiveStream(Hanging(), ReceptionClock(), "gyro")
+    stream.start()
+    began = time.monotonic()
+    stream.stop()
+    assert time.monotonic() - began < 1.0
 
 
 def _wait_for(condition: Callable[[], bool]) -> None:

@@ -14,6 +14,7 @@ from recorders.streams.packets import MAX_PACKET_BYTES, Packet
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.transports.address import is_live, open_transport
 from recorders.transports.pipe import PipeTransport
+from recorders.transports.tcp import TcpTransport
 from recorders.transports.transport import Transport
 from shiplog.errors import UsageError
 
@@ -97,6 +98,19 @@ def test_a_listener_on_one_address_does_not_hear_another() -> None:
         assert transport.receive(0.2) == []
 
 
+def test_a_silent_server_is_probed_so_that_a_pulled_cable_is_noticed() -> None:
+    with _connected() as (transport, _):
+        assert isinstance(transport, TcpTransport)
+        own = transport._socket
+        assert own is not None
+        probes = [
+            own.getsockopt(socket.IPPROTO_TCP, option)
+            for option in (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
+        ]
+    idle, interval, count = probes
+    assert idle + interval * count < 60
+
+
 def test_a_multicast_group_is_joined_on_loopback_and_only_its_datagrams_are_received() -> None:
     port = _free_port()
     address = f"udp://239.192.0.4:{port}?interface=127.0.0.1"
@@ -128,12 +142,12 @@ def test_no_server_is_an_os_error() -> None:
         transport.open()
 
 
-def test_lines_over_a_serial_port() -> None:
+def test_lines_over_a_serial_port_begin_after_the_one_that_may_be_cut() -> None:
     controller, port = pty.openpty()
     tty.setraw(port)
     try:
         with _opened(f"serial://{os.ttyname(port)}?baud=38400") as transport:
-            os.write(controller, LINES[0] + b"\r\n" + LINES[1] + b"\r\n")
+            os.write(controller, b"8.53,T*12\r\n" + LINES[0] + b"\r\n" + LINES[1] + b"\r\n")
             assert [p.data for p in _received(transport, 2)] == LINES
             assert transport.receive(0.05) == []
     finally:
@@ -181,6 +195,12 @@ def test_a_line_without_end_is_cut_and_needs_no_memory() -> None:
         ("tcp://127.0.0.1:1?baud=1", "tcp has no option 'baud'"),
         ("serial://", "device or baud rate is missing"),
         ("serial:///dev/ttyS0?baud=fast", "device or baud rate is missing"),
+        ("udp://127.0.0.1:0", "host or port is missing"),
+        ("udp://127.0.0.1:1/other", "more than a host and a port"),
+        ("tcp://user@127.0.0.1:1", "more than a host and a port"),
+        ("udp://[::1]:10110", "over IPv4 only"),
+        ("udp://239.192.0.4:60004?interface=eth0", "local IPv4 address of one, not 'eth0'"),
+        ("udp://192.168.1.5:60004?interface=192.168.1.5", "interface= is for multicast"),
         ("udp://127.0.0.1:1?x", "an address is udp://HOST:PORT"),
     ],
 )
