@@ -1,8 +1,9 @@
 """The loop that writes a source of samples to a log, safe against crashes and Ctrl-C."""
 
 import os
+import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -32,12 +33,15 @@ class Recording:
         Whether Ctrl-C ended the recording.
     files
         The logs written, in the order of time.
+    dropped
+        The number of packets of live streams that came faster than they could be recorded.
     """
 
     samples: int
     channels: int
     interrupted: bool
     files: tuple[Path, ...]
+    dropped: int = 0
 
 
 @dataclass(frozen=True)
@@ -67,15 +71,16 @@ def record(
     path: str | os.PathLike[str],
     *,
     rotation: Rotation | None = None,
+    overwrites: bool = True,
     on_chunk: Callable[[int], None] = lambda _: None,
 ) -> Recording:
     """Write everything that a source yields to a log: samples, raw packets and events.
 
     While recording, the log grows beside its final name with ``.part`` appended, readable up to the
     last chunk even if the process is killed. Ctrl-C ends the recording and keeps the log. If the
-    source fails, what was received until then stays in the ``.part`` file, complete, and the error
-    names it; an older file at `path` is not changed. However the recording ends, the metadata of
-    the source that have changed since its beginning are written then.
+    source fails or the disk is full, what was received until then stays in the ``.part`` file, and
+    the error names it; an older file at `path` is not changed. However the recording ends, the
+    metadata of the source that have changed since its beginning are written then.
 
     Parameters
     ----------
@@ -86,18 +91,65 @@ def record(
         directly.
     rotation
         When to go on in a new file. The files are then named ``trial.001.mcap`` and so on.
+    overwrites
+        Whether the complete recording replaces an older log of its name.
     on_chunk
         Called after each chunk with the number of samples written so far.
 
     Raises
     ------
     ShiplogError
-        The file cannot be written, an unfinished recording lies beside it, or the source failed.
+        The file cannot be written, an unfinished recording or a log that is not to be replaced lies
+        there, or the source failed.
     """
-    chunks, topics, files, samples = source.chunks(), set[str](), list[Path](), 0
+    _require_free(Path(path), rotation, overwrites=overwrites)
+    chunks = source.chunks()
+    try:
+        return _record_files(source, chunks, Path(path), rotation, overwrites, on_chunk)
+    finally:
+        if isinstance(chunks, Generator):
+            chunks.close()  # stops the readers of live streams
+
+
+def _require_free(path: Path, rotation: Rotation | None, *, overwrites: bool) -> None:
+    """Refuse an output in whose way older files lie, now and not when the recording gets there."""
+    if is_device(path):
+        return
+    if path.is_dir() or not path.parent.is_dir():
+        raise write_error(path, FileNotFoundError())
+    number = "" if rotation is None else r"\.\d{3,}"
+    name = re.compile(rf"{re.escape(path.stem)}{number}{re.escape(path.suffix)}(\.part)?")
+    older = sorted(file for file in path.parent.iterdir() if name.fullmatch(file.name))
+    for file in older:
+        if file.name.endswith(".part"):
+            raise _unfinished(file)
+        if not overwrites:
+            raise ShiplogError(
+                f"a log of this name exists, and a live recording replaces none; name another with "
+                f"-o, or move it: {file}"
+            )
+
+
+def _unfinished(part: Path) -> ShiplogError:
+    return ShiplogError(
+        "an unfinished recording lies there, or another recorder is writing it; rescue it with "
+        f"`shiplog convert`, or delete it: {part}"
+    )
+
+
+def _record_files(
+    source: Source,
+    chunks: Iterator[tuple[Recordable, ...]],
+    path: Path,
+    rotation: Rotation | None,
+    overwrites: bool,
+    on_chunk: Callable[[int], None],
+) -> Recording:
+    """Write one file after the other until the source ends."""
+    topics, files, samples = set[str](), list[Path](), 0
     while True:
-        final = Path(path) if rotation is None else _numbered(Path(path), len(files) + 1)
-        part = _RecordedPart(source, final, rotation)
+        final = path if rotation is None else _numbered(path, len(files) + 1)
+        part = _RecordedPart(source, final, rotation, overwrites=overwrites)
         end = part.write(chunks, partial(_report, on_chunk, samples))
         topics |= part.topics
         samples += part.samples
@@ -128,9 +180,12 @@ def _numbered(path: Path, number: int) -> Path:
 class _RecordedPart:
     """One file of a recording."""
 
-    def __init__(self, source: Source, final: Path, rotation: Rotation | None) -> None:
+    def __init__(
+        self, source: Source, final: Path, rotation: Rotation | None, *, overwrites: bool
+    ) -> None:
         self._source, self._final = source, final
         self._rotation = rotation or Rotation()
+        self._overwrites = overwrites
         self._part = final if is_device(final) else final.with_name(final.name + ".part")
         self.topics = set[str]()
         self.samples = 0
@@ -139,32 +194,50 @@ class _RecordedPart:
         self, chunks: Iterator[tuple[Recordable, ...]], on_chunk: Callable[[int], None]
     ) -> _End:
         """Write chunks until something ends the file, and give it its final name."""
-        final, part = self._final, self._part
-        if final.is_dir():
-            raise write_error(final, IsADirectoryError())
-        if part != final and part.exists():
-            raise ShiplogError(
-                "an unfinished recording lies there; rescue it with `shiplog convert`, "
-                f"or delete it: {part}"
-            )
+        self._claim()
         writer = LogWriter(
-            part, metadata=self._source.metadata, vessel_toml=self._source.vessel_toml
+            self._part, metadata=self._source.metadata, vessel_toml=self._source.vessel_toml
         )
         try:
-            with writer, _metadata_at_end(self._source, writer):
-                end = self._write_chunks(writer, chunks, on_chunk)
-        except KeyboardInterrupt:
-            end = _End.INTERRUPTED
+            end = self._write_all(writer, chunks, on_chunk)
         except ShiplogError as error:
             if writer.messages:
-                message = f"{error}; the {writer.samples} samples until then are in {part}"
+                message = f"{error}; the {writer.samples} samples until then are in {self._part}"
                 raise ShiplogError(message) from error
-            part.unlink(missing_ok=True)
+            if self._part != self._final:
+                self._part.unlink(missing_ok=True)
             raise
-        if part != final:
-            part.replace(final)
+        if self._part != self._final:
+            self._rename()
         self.samples = writer.samples
         return end
+
+    def _claim(self) -> None:
+        """Create the file that grows, which no other recorder may be writing."""
+        if self._part == self._final:
+            return
+        try:
+            self._part.touch(exist_ok=False)
+        except FileExistsError:
+            raise _unfinished(self._part) from None
+        except OSError as error:
+            raise write_error(self._final, error) from error
+
+    def _write_all(
+        self,
+        writer: LogWriter,
+        chunks: Iterator[tuple[Recordable, ...]],
+        on_chunk: Callable[[int], None],
+    ) -> _End:
+        """Write chunks, and whatever ends them, the metadata of the end."""
+        try:
+            return self._write_chunks(writer, chunks, on_chunk)
+        except KeyboardInterrupt:
+            return _End.INTERRUPTED
+        finally:
+            with _write_errors(), writer:
+                # those that have changed, such as counts of rejected packets
+                writer.update_metadata(self._source.metadata)
 
     def _write_chunks(
         self,
@@ -174,19 +247,34 @@ class _RecordedPart:
     ) -> _End:
         opened = time.monotonic()
         for chunk in chunks:
-            writer.write(*chunk)
-            writer.flush()
+            with _write_errors():
+                writer.write(*chunk)
+                writer.flush()
+                size = self._part.stat().st_size  # fails, too, where the file was deleted
             self.topics.update(item.topic for item in chunk if isinstance(item, Channel))
             on_chunk(writer.samples)
-            if self._rotation.is_due(time.monotonic() - opened, self._part.stat().st_size):
+            if self._rotation.is_due(time.monotonic() - opened, size):
                 return _End.ROTATED
         return _End.SOURCE
 
+    def _rename(self) -> None:
+        """Give the complete file its final name."""
+        if self._final.exists() and not self._overwrites:
+            raise ShiplogError(
+                f"a file of the log's name has appeared; the recording is complete in {self._part}"
+            )
+        try:
+            self._part.replace(self._final)
+        except OSError as error:
+            raise write_error(self._final, error) from error
+
 
 @contextmanager
-def _metadata_at_end(source: Source, writer: LogWriter) -> Iterator[None]:
-    """Write the metadata that have changed, such as counts of rejected packets, at the end."""
+def _write_errors() -> Iterator[None]:
+    """Make an error of the system, such as that of a full disk, one for the user."""
     try:
         yield
-    finally:
-        writer.update_metadata(source.metadata)
+    except BrokenPipeError:  # the reader of a pipe has closed it
+        raise
+    except OSError as error:
+        raise ShiplogError(f"cannot write: {error.strerror or error}") from error

@@ -96,7 +96,13 @@ def _record(
         requests, clock, metadata=metadata, vessel_toml=vessel_toml, take_marks=marks.take
     )
     with _shown(source, log, marks) as on_chunk:
-        recording = record(source, log, rotation=rotation, on_chunk=on_chunk)
+        recording = record(
+            source,
+            log,
+            rotation=rotation,
+            overwrites=not isinstance(source, LiveSource),  # a trial is not repeated for a log
+            on_chunk=on_chunk,
+        )
     streams = _streams(source)
     print_tables(stream_tables(streams), to_stderr=is_device(log))
     print_warnings([text for stream in streams for text in stream.decoder.counts.warnings])

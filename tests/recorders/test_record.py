@@ -1,11 +1,14 @@
 """The loop that records: all samples kept, whatever ends it."""
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from extensions import run_python
 from mcap.reader import make_reader
+from places import PROJECT
 
 from recorders.record import Recording, Rotation, record
 from recorders.source import Recordable
@@ -125,3 +128,106 @@ def test_a_rotation_by_time_is_due_after_its_minutes() -> None:
     rotation = Rotation(minutes=2.0)
     assert not rotation.is_due(119.0, 10**9)
     assert rotation.is_due(120.0, 0)
+
+
+def test_a_log_that_is_not_to_be_replaced_is_refused_before_anything_is_recorded(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "a.mcap").write_bytes(b"older")
+    with pytest.raises(ShiplogError, match=r"a log of this name exists.*a\.mcap"):
+        record(Sensor(), tmp_path / "a.mcap", overwrites=False)
+    assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == {"a.mcap": b"older"}
+
+
+def test_a_log_that_appears_while_recording_is_not_replaced(tmp_path: Path) -> None:
+    final = tmp_path / "a.mcap"
+    with pytest.raises(ShiplogError, match=r"has appeared; the recording is complete in .*\.part"):
+        record(Sensor(), final, overwrites=False, on_chunk=lambda _: final.touch())
+    assert len(read(tmp_path / "a.mcap.part")["yaw_rate"]) == 30
+
+
+@pytest.mark.parametrize("rotation", [None, Rotation(minutes=1.0)])
+def test_an_unfinished_recording_is_refused_and_not_touched(
+    tmp_path: Path, rotation: Rotation | None
+) -> None:
+    part = tmp_path / ("a.mcap.part" if rotation is None else "a.007.mcap.part")
+    part.write_bytes(b"samples")
+    with pytest.raises(ShiplogError, match="unfinished recording lies there"):
+        record(Sensor(), tmp_path / "a.mcap", rotation=rotation)
+    assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == {part.name: b"samples"}
+
+
+def test_files_of_an_older_rotated_recording_are_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "a.002.mcap").write_bytes(b"older")
+    rotation = Rotation(megabytes=1e-6)
+    with pytest.raises(ShiplogError, match=r"a log of this name exists.*a\.002\.mcap"):
+        record(Sensor(), tmp_path / "a.mcap", rotation=rotation, overwrites=False)
+    assert [f.name for f in tmp_path.iterdir()] == ["a.002.mcap"]
+
+
+def test_a_file_that_is_deleted_while_it_grows_is_noticed_at_the_next_chunk(
+    tmp_path: Path,
+) -> None:
+    counts: list[int] = []
+
+    def delete(samples: int) -> None:
+        counts.append(samples)
+        (tmp_path / "a.mcap.part").unlink(missing_ok=True)
+
+    with pytest.raises(ShiplogError, match="cannot write: No such file"):
+        record(Sensor(), tmp_path / "a.mcap", on_chunk=delete)
+    assert counts == [10]
+
+
+FULL_DISK = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from recorders.record import record
+from shiplog import Channel, ShiplogError
+
+class Noise:
+    metadata, vessel_toml = {}, None
+
+    def chunks(self):
+        rng = np.random.default_rng(1)
+        for k in range(1000):
+            at = np.arange(k * 100, (k + 1) * 100) * 10**7
+            yield (Channel("yaw_rate", "gyro", "rad/s", at, at, rng.normal(size=100)),)
+
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+try:
+    record(Noise(), "a.mcap")
+except ShiplogError as error:
+    print(error)
+"""
+
+
+def test_a_full_disk_is_one_line_and_what_was_written_can_be_read(tmp_path: Path) -> None:
+    done = run_python(os.environ | {"PYTHONPATH": os.fspath(PROJECT)}, tmp_path, "-c", FULL_DISK)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("cannot write: File too large; the ")
+    assert done.stdout.endswith("samples until then are in a.mcap.part\n")
+    assert done.stdout.count("\n") == 1
+    assert not (tmp_path / "a.mcap").exists()
+    log = read(tmp_path / "a.mcap.part")
+    assert len(log["yaw_rate"]) > 2000
+
+
+def test_the_source_is_closed_when_the_writing_fails(tmp_path: Path) -> None:
+    closed: list[bool] = []
+
+    class Closing(Sensor):
+        def chunks(self) -> Iterator[tuple[Channel, ...]]:
+            try:
+                yield from super().chunks()
+            finally:
+                closed.append(True)
+
+    def fail(_: int) -> None:
+        assert not closed
+        raise RuntimeError("in the display")
+
+    with pytest.raises(RuntimeError):
+        record(Closing(), tmp_path / "a.mcap", on_chunk=fail)
+    assert closed == [True]
