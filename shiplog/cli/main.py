@@ -53,6 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _prepare_process(verb)
         code = verb.run(parsed)
         sys.stdout.flush()
+        if is_process:
+            gc.freeze()  # the end of the process, too, would search all modules for garbage
     except UsageError as error:
         code = _fail(error, ExitCode.USAGE)
     except ShiplogError as error:
