@@ -99,7 +99,9 @@ class _ChannelStatsCollector:
         self._limits = cleaning.limits
         self._sentinels = dict.fromkeys(cleaning.sentinels, 0)  # with the number of samples of each
         kind = CATALOGUE.get(channel.name)
-        self._stuck = None if kind is not None and kind.commanded else StuckCheck()
+        circular = kind is not None and kind.circular
+        commanded = kind is not None and kind.commanded
+        self._stuck = None if commanded else StuckCheck(circular=circular)
         self._fixes = (
             FixScreen() if channel.name == "position" and len(channel.fields) > 1 else None
         )

@@ -13,6 +13,7 @@ from analysis.replay.reading_options import ReadingOptions
 from analysis.replay.replay import analyse
 from shiplog import Channel, LogError, TrialLog, Vessel, read
 from shiplog.checks.consistency.consistency_check import consistency_findings
+from shiplog.checks.log_stats import compute_log_stats
 from shiplog.tables.foreign import read_table
 from shiplog.tables.layout import load_layout
 
@@ -41,6 +42,13 @@ def test_the_channels_of_real_runs_and_sample_data_do_not_contradict_each_other(
 ) -> None:
     kinds = [finding.kind for finding in consistency_findings(log_of(path))]
     assert kinds == (["bias"] if path.stem.startswith(BIASED) else [])
+
+
+@pytest.mark.parametrize("path", [*LOGS, *SAMPLE_DATA.glob("*.ref.mcap")], ids=lambda p: p.stem)
+def test_no_channel_of_real_runs_and_sample_data_is_stuck(path: Path) -> None:
+    assert not [
+        channel.topic for channel in compute_log_stats(log_of(path)).channels if channel.stuck
+    ]
 
 
 @pytest.mark.parametrize("path", LOGS, ids=lambda path: path.stem)
