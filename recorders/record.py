@@ -18,6 +18,8 @@ from shiplog.types import Channel
 
 from .source import Recordable, Source
 
+_PART = ".part"  # appended to the name of a file that grows
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -111,23 +113,37 @@ def record(
             chunks.close()  # stops the readers of live streams
 
 
+def growing_file(path: Path, rotation: Rotation | None) -> Path:
+    """Return the file to which a running recording of a log is written at the moment."""
+    if is_device(path):
+        return path
+    parts = [file for file in _files_of(path, rotation) if file.name.endswith(_PART)]
+    return parts[-1] if parts else path
+
+
 def _require_free(path: Path, rotation: Rotation | None, *, overwrites: bool) -> None:
     """Refuse an output in whose way older files lie, now and not when the recording gets there."""
     if is_device(path):
         return
     if path.is_dir() or not path.parent.is_dir():
         raise write_error(path, FileNotFoundError())
-    number = "" if rotation is None else r"\.\d{3,}"
-    name = re.compile(rf"{re.escape(path.stem)}{number}{re.escape(path.suffix)}(\.part)?")
-    older = sorted(file for file in path.parent.iterdir() if name.fullmatch(file.name))
-    for file in older:
-        if file.name.endswith(".part"):
+    for file in _files_of(path, rotation):
+        if file.name.endswith(_PART):
             raise _unfinished(file)
         if not overwrites:
             raise ShiplogError(
                 f"a log of this name exists, and a live recording replaces none; name another with "
                 f"-o, or move it: {file}"
             )
+
+
+def _files_of(path: Path, rotation: Rotation | None) -> list[Path]:
+    """Return the files that a recording of a log has, or an older one has, by name."""
+    number = "" if rotation is None else r"\.\d{3,}"
+    name = re.compile(
+        rf"{re.escape(path.stem)}{number}{re.escape(path.suffix)}({re.escape(_PART)})?"
+    )
+    return sorted(file for file in path.parent.iterdir() if name.fullmatch(file.name))
 
 
 def _unfinished(part: Path) -> ShiplogError:
@@ -186,7 +202,7 @@ class _RecordedPart:
         self._source, self._final = source, final
         self._rotation = rotation or Rotation()
         self._overwrites = overwrites
-        self._part = final if is_device(final) else final.with_name(final.name + ".part")
+        self._part = final if is_device(final) else final.with_name(final.name + _PART)
         self.topics = set[str]()
         self.samples = 0
 

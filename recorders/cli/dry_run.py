@@ -42,6 +42,7 @@ def _listen(requests: Sequence[StreamRequest], secs: float) -> ExitCode:
         raise UsageError("--dry-run listens to live sources; of a file, record it and see its info")
     print(f"listening for {secs:.0f} s", file=sys.stderr, flush=True)
     timer = threading.Timer(secs, source.stop)
+    timer.daemon = True  # a second Ctrl-C ends the process at once
     timer.start()
     with stopped_by_signals(source.stop):
         for _ in source.chunks():
@@ -66,7 +67,7 @@ def _state_table(source: LiveSource) -> TextTable:
             (
                 each.stream.name,
                 each.stream.origin,
-                each.live.fault or "open",
+                each.live.fault or each.live.state.value,
                 str(decoded),
                 str(sum(counts.unused.values())),
                 str(rejected),

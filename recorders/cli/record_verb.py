@@ -137,6 +137,9 @@ def _record(arguments: argparse.Namespace) -> ExitCode:
     )
     if recording.interrupted:
         print("interrupted: the log ends there", file=sys.stderr)
+    if recording.dropped:
+        print(f"{recording.dropped} packets came too fast and were dropped", file=sys.stderr)
+        return ExitCode.DATA_LOST
     return ExitCode.OK
 
 

@@ -4,10 +4,12 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from math import inf
 from pathlib import Path
 
-from recorders.record import Recording, Rotation, record
+from recorders.record import Recording, Rotation, growing_file, record
 from recorders.streams.format import StreamFormat
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.streams.stream_source import StreamSource
@@ -28,7 +30,7 @@ from shiplog.errors import UsageError
 from shiplog.files import is_device
 from shiplog.types import Event
 
-from .live_display import MarkKey, live_display
+from .live_display import MarkKey, Shown, live_display
 
 
 def configure_stream(parser: argparse.ArgumentParser, stream_format: StreamFormat) -> None:
@@ -95,7 +97,7 @@ def _record(
     source = open_streams(
         requests, clock, metadata=metadata, vessel_toml=vessel_toml, take_marks=marks.take
     )
-    with _shown(source, log, marks) as on_chunk:
+    with _shown(source, log, rotation, marks) as on_chunk:
         recording = record(
             source,
             log,
@@ -106,7 +108,7 @@ def _record(
     streams = _streams(source)
     print_tables(stream_tables(streams), to_stderr=is_device(log))
     print_warnings([text for stream in streams for text in stream.decoder.counts.warnings])
-    return recording
+    return replace(recording, dropped=source.dropped if isinstance(source, LiveSource) else 0)
 
 
 class _Marks:
@@ -123,26 +125,34 @@ class _Marks:
 
     @contextmanager
     def listening(self, log: Path) -> Iterator[None]:
-        """Take marks within the block."""
-        self._listener = MarkListener(log, self._clock)
+        """Take marks within the block.
+
+        Where there is no place for marks from other terminals, the recording goes on without.
+        """
+        try:
+            self._listener = MarkListener(log, self._clock)
+        except OSError as error:
+            reason = error.strerror or error
+            print_warnings([f"`shiplog mark` cannot reach this recording ({reason}); use the key"])
         try:
             with self.key.listening():
                 yield
         finally:
-            self._listener.close()
+            if self._listener is not None:
+                self._listener.close()
 
 
 @contextmanager
 def _shown(
-    source: LiveSource | RecordedSource, log: Path, marks: _Marks
+    source: LiveSource | RecordedSource, log: Path, rotation: Rotation | None, marks: _Marks
 ) -> Iterator[Callable[[int], None]]:
     """Show the status of a live source, which signals end, or the progress of a recorded one."""
     if isinstance(source, LiveSource):
-        part = log if is_device(log) else log.with_name(f"{log.name}.part")
+        shown = Shown(source, log, partial(growing_file, log, rotation))
         with (
             marks.listening(log),
             stopped_by_signals(source.stop),
-            live_display(source, part) as on_chunk,
+            live_display(shown) as on_chunk,
         ):
             print(f"recording to {log}; Ctrl-C ends it", file=sys.stderr, flush=True)
             yield on_chunk

@@ -2,6 +2,7 @@
 
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -63,10 +64,16 @@ class LiveSource:
     vessel_toml: str | None = None
     take_marks: Callable[[], Sequence[Event]] = tuple
     status: TrialStatus = field(init=False)
-    _stop: threading.Event = field(default_factory=threading.Event, init=False, repr=False)
+    # no threading.Event: a signal handler that sets one can wait for itself for ever
+    _stopped: bool = field(default=False, init=False, repr=False)
 
     def __post_init__(self) -> None:
         self.status = TrialStatus(self.clock.now_ns())
+
+    @property
+    def dropped(self) -> int:
+        """The number of packets dropped so far, of all streams."""
+        return sum(each.live.dropped for each in self.inputs)
 
     @property
     def metadata(self) -> Mapping[str, str]:
@@ -85,7 +92,7 @@ class LiveSource:
 
     def stop(self) -> None:
         """End the recording at the next batch; what was received until then is yielded."""
-        self._stop.set()
+        self._stopped = True
 
     def chunks(self) -> Iterator[tuple[Recordable, ...]]:
         """Yield what was received about every `BATCH_SECS`, until `stop` or the end of all."""
@@ -93,11 +100,13 @@ class LiveSource:
         for each in self.inputs:
             each.live.start()
         try:
-            while not self._stop.is_set() and not self._all_ended():
-                self._stop.wait(BATCH_SECS)
+            while not self._stopped and not self._all_ended():
+                time.sleep(BATCH_SECS)
                 if items := self._step(steps):
                     yield items
         finally:
+            for each in self.inputs:  # all at once: a reader may take a while to end
+                each.live.request_stop()
             for each in self.inputs:
                 each.live.stop()
         if items := self._step(steps, last=True):
@@ -137,14 +146,17 @@ class LiveSource:
 def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
     """Call `stop` at the first SIGINT, SIGTERM or SIGHUP, so that a recording ends between chunks.
 
-    The second signal has its usual effect. Outside of the main thread, where Python handles no
-    signals, this does nothing.
+    The second signal has its usual effect. A SIGHUP that is ignored, as by ``nohup``, stays so.
+    Outside of the main thread, where Python handles no signals, this does nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     names = ("SIGINT", "SIGTERM", "SIGHUP")  # the last one is not on all systems
     previous = {s: signal.getsignal(s) for s in (getattr(signal, n, None) for n in names) if s}
+    hangup = getattr(signal, "SIGHUP", None)
+    if hangup and previous[hangup] == signal.SIG_IGN:
+        del previous[hangup]
 
     def on_signal(_number: int, _frame: FrameType | None) -> None:
         stop()

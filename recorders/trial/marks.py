@@ -9,6 +9,7 @@ import hashlib
 import os
 import socket
 import tempfile
+from collections import deque
 from contextlib import suppress
 from pathlib import Path
 
@@ -46,44 +47,92 @@ def clean_text(text: str) -> str:
 class MarkListener:
     """Receives the marks of one recording, without a thread: `take` accepts what waits.
 
+    Nobody who connects can hold up the recording: what was not sent yet is read at a later call.
+
     Parameters
     ----------
     log
         The log that is recorded.
     clock
         The clock of reception.
+
+    Raises
+    ------
+    ShiplogError
+        Another recorder listens for that log.
+    OSError
+        There is no place for the socket.
     """
 
     def __init__(self, log: Path, clock: ReceptionClock) -> None:
         self._clock = clock
         self._path = _socket_path(log)
+        if _is_answered(self._path):
+            raise ShiplogError(f"another recorder is writing it; name another log with -o: {log}")
         self._path.unlink(missing_ok=True)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._socket.bind(os.fspath(self._path))
         self._socket.listen(_MAX_AT_ONCE)
         self._socket.setblocking(False)
+        self._connections: deque[tuple[socket.socket, int]] = (
+            deque()
+        )  # and when each was accepted, ns
 
     def take(self) -> list[Event]:
         """Return the marks that were sent since the last call, at the times they were sent."""
+        self._accept()
         events = []
-        for _ in range(_MAX_AT_ONCE):
+        for _ in range(len(self._connections)):
+            connection, since_ns = self._connections.popleft()
             try:
-                connection, _ = self._socket.accept()
-            except BlockingIOError:
-                break
-            with connection, suppress(OSError, ValueError, UsageError):
-                connection.settimeout(_ANSWER_SECS / 10)
-                sent, _, text = connection.recv(_MAX_BYTES).decode().partition(" ")
-                age_ns = min(max(steady_ns() - int(sent), 0), 10**10)
-                event = Event(self._clock.now_ns() - age_ns, clean_text(text))
-                events.append(event)
-                connection.sendall(b"ok")
+                if event := self._event(connection):
+                    events.append(event)
+                    connection.sendall(b"ok")
+                connection.close()
+            except BlockingIOError:  # nothing was sent yet
+                if steady_ns() - since_ns < _ANSWER_SECS * 1e9:
+                    self._connections.append((connection, since_ns))
+                else:
+                    connection.close()
+            except OSError:
+                connection.close()
         return events
 
     def close(self) -> None:
         """Stop to listen."""
+        for connection, _ in self._connections:
+            connection.close()
         self._socket.close()
         self._path.unlink(missing_ok=True)
+
+    def _accept(self) -> None:
+        while len(self._connections) < _MAX_AT_ONCE:
+            try:
+                connection, _ = self._socket.accept()
+            except OSError:  # none waits
+                return
+            connection.setblocking(False)
+            self._connections.append((connection, steady_ns()))
+
+    def _event(self, connection: socket.socket) -> Event | None:
+        """Read a mark; None where it is none. Raises BlockingIOError where nothing was sent."""
+        data = connection.recv(_MAX_BYTES)
+        with suppress(ValueError, UsageError):
+            sent, _, text = data.decode().partition(" ")
+            age_ns = min(max(steady_ns() - int(sent), 0), 10**10)
+            return Event(self._clock.now_ns() - age_ns, clean_text(text))
+        return None
+
+
+def _is_answered(path: Path) -> bool:
+    """Whether a recorder listens at a socket."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+        connection.settimeout(_ANSWER_SECS)
+        try:
+            connection.connect(os.fspath(path))
+        except OSError:
+            return False
+        return True
 
 
 def send_mark(log: str, text: str) -> None:
@@ -104,7 +153,7 @@ def send_mark(log: str, text: str) -> None:
         No recording of that log runs on this computer, or it does not answer.
     """
     line = clean_text(text)
-    path = Path(log if log.endswith(".mcap") else f"{log}.mcap")
+    path = Path(log if log.lower().endswith(".mcap") else f"{log}.mcap")
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         connection.settimeout(_ANSWER_SECS)
         try:
@@ -123,11 +172,14 @@ def send_mark(log: str, text: str) -> None:
 
 
 def _socket_path(log: Path) -> Path:
-    """Return the socket of a log, in a folder of the user's own, which is made where needed."""
+    """Return the socket of a log, in a folder of the user's own, which is made where needed.
+
+    Raises PermissionError where another user has a folder of its name, or can enter it.
+    """
     folder = Path(tempfile.gettempdir()) / f"shiplog-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)
     status = folder.lstat()
     if status.st_uid != os.getuid() or status.st_mode & 0o077 or folder.is_symlink():
-        raise ShiplogError(f"not a private folder of this user; remove it: {folder}")
+        raise PermissionError(f"not a private folder of this user: {folder}")
     name = hashlib.sha256(os.fsencode(log.resolve())).hexdigest()[:24]
     return folder / f"{name}.mark"

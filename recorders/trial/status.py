@@ -7,13 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from recorders.source import Recordable
+from shiplog.checks.event_table import OPERATOR
 from shiplog.types import Channel, Event, EventLevel
 
 NEEDED = ("yaw_rate", "speed", "rudder", "rpm")  # by a replay
 RATE_SAMPLES = 50  # of which a rate is the mean
-MIN_SAMPLES_TO_MISS = 5  # before that, a channel has no rate at which it could be missed
+MIN_SAMPLES_TO_MISS = 5  # before that, the rate of a channel is not known
 STALE_INTERVALS = 10  # that a channel may be silent
 STALE_NS = 3_000_000_000  # ... and at least this long
+STALE_UNKNOWN_NS = 60_000_000_000  # that a channel of unknown rate may be silent
 FIRST_ALARM_NS = 10_000_000_000  # after the start, for a needed channel that was never heard
 
 
@@ -31,6 +33,8 @@ class ChannelStatus:
         The time of reception of the last one, ns.
     last_value
         The last value; of a position its latitude or north, and its longitude or east.
+    has_value
+        Whether any sample was a number: a sensor that marks all its values as invalid has none.
     stale
         Whether it has been silent for longer than its rate explains.
     """
@@ -41,6 +45,7 @@ class ChannelStatus:
     samples: int = 0
     last_ns: int = 0
     last_value: tuple[float, ...] = ()
+    has_value: bool = False
     stale: bool = False
     _recent_ns: deque[int] = field(default_factory=lambda: deque(maxlen=RATE_SAMPLES), repr=False)
 
@@ -61,12 +66,13 @@ class ChannelStatus:
         self.samples += len(channel)
         self._recent_ns.extend(channel.received_ns[-RATE_SAMPLES:].tolist())
         self.last_ns = int(channel.received_ns[-1])
+        self.has_value = self.has_value or bool(np.isfinite(channel.values).any())
         self.last_value = tuple(np.atleast_1d(channel.values[-1]).tolist())
 
     def is_silent(self, now_ns: int) -> bool:
         """Whether the last sample is older than the rate explains."""
         if self.samples < MIN_SAMPLES_TO_MISS:
-            return False
+            return now_ns - self.last_ns > STALE_UNKNOWN_NS
         interval_ns = 1e9 / self.rate_hz if self.rate_hz > 0 else 0.0
         return now_ns - self.last_ns > max(STALE_NS, STALE_INTERVALS * interval_ns)
 
@@ -78,6 +84,13 @@ class TrialStatus:
     ----------
     start_ns
         When the recording began, ns.
+
+    Attributes
+    ----------
+    events
+        The number of events of the streams and of people.
+    last_mark
+        The last event that a person has marked, or None.
     """
 
     def __init__(self, start_ns: int) -> None:
@@ -85,6 +98,7 @@ class TrialStatus:
         self._channels: dict[str, ChannelStatus] = {}
         self._missing_reported = False
         self.events = 0
+        self.last_mark: Event | None = None
 
     @property
     def channels(self) -> list[ChannelStatus]:
@@ -96,8 +110,8 @@ class TrialStatus:
 
     @property
     def missing(self) -> list[str]:
-        """The needed channels of which nothing was heard."""
-        heard = {channel.name for channel in self._channels.values()}
+        """The needed channels of which no value was heard."""
+        heard = {channel.name for channel in self._channels.values() if channel.has_value}
         return [name for name in NEEDED if name not in heard]
 
     def add(self, items: Iterable[Recordable]) -> None:
@@ -105,6 +119,8 @@ class TrialStatus:
         for item in items:
             if isinstance(item, Event):
                 self.events += 1
+                if item.source == OPERATOR:
+                    self.last_mark = item
             elif isinstance(item, Channel) and len(item):
                 status = self._channels.get(item.topic)
                 if status is None:

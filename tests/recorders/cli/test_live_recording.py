@@ -113,6 +113,29 @@ def test_a_live_trial_is_recorded_marked_and_ended_by_a_signal(
     assert [path.name for path in tmp_path.glob("*.part")] == []
 
 
+def test_a_second_recorder_of_one_log_is_refused_and_the_first_goes_on(
+    environment: Mapping[str, str], tmp_path: Path
+) -> None:
+    command = ("record", "numbers", f"udp://127.0.0.1:{_free_port()}", "-o", "trial.mcap")
+    with _running(environment, tmp_path, *command) as first:
+        _wait_for_line(first, "recording to trial.mcap")
+        with _running(environment, tmp_path, *command) as second:
+            output, error = second.communicate(timeout=60)
+        assert (second.returncode, output) == (1, "")
+        assert "another recorder is writing it" in error
+        assert error.count("\n") == 1
+        with _running(environment, tmp_path, "mark", "trial", "execute") as mark:
+            assert mark.wait(timeout=60) == 0
+        first.send_signal(signal.SIGHUP)
+        first.communicate(timeout=60)
+    assert first.returncode == 0
+    assert [event.text for event in read(tmp_path / "trial.mcap").events] == ["execute"]
+    with _running(environment, tmp_path, *command) as third:
+        output, error = third.communicate(timeout=60)
+    assert third.returncode == 1
+    assert "a live recording replaces none" in error
+
+
 def test_a_dry_run_reports_what_is_missing_and_writes_nothing(
     environment: Mapping[str, str], tmp_path: Path
 ) -> None:

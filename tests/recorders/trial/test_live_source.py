@@ -1,17 +1,19 @@
 """Tests of recorders.trial.live_source, over loopback and with clocks that are set by hand."""
 
+import signal
 import socket
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import pytest
 from number_format import NUMBERS
 
+from recorders.streams.packets import Packet
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.streams.stream_options import parse_options
 from recorders.trial import live_source
-from recorders.trial.live_source import LiveSource
+from recorders.trial.live_source import LiveSource, stopped_by_signals
 from recorders.trial.open_source import StreamRequest, open_streams
 from recorders.trial.recorded_source import RecordedSource
 from shiplog.types import Channel, Event, RawPackets
@@ -103,3 +105,61 @@ def test_a_jump_of_the_wall_clock_is_an_event_and_no_jump_of_the_times() -> None
         == 1
     )
     assert [i.received_ns.tolist() for i in items if isinstance(i, Channel)] == [[10**18]]
+
+
+def test_the_end_does_not_wait_for_sources_that_cannot_be_reached(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    source = _opened(ReceptionClock(), *["tcp://127.0.0.1:1"] * 8)
+    assert isinstance(source, LiveSource)
+    for each in source.inputs:
+        monkeypatch.setattr(each.live._transport, "open", lambda: time.sleep(3.0))
+    threading.Timer(0.2, source.stop).start()
+    began = time.monotonic()
+    list(source.chunks())
+    assert time.monotonic() - began < 2.0
+
+
+def test_the_end_of_all_sources_ends_the_recording_and_loses_no_packet(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    source = _opened(ReceptionClock(), "tcp://127.0.0.1:1", "tcp://127.0.0.1:1")
+    assert isinstance(source, LiveSource)
+    for n, each in enumerate(source.inputs):
+        steps = iter([[Packet(b"rpm %d" % k, k)] for k in range(10 * n + 10)])
+
+        def receive(_secs: float, steps: Iterator[list[Packet]] = steps) -> list[Packet]:
+            packets = next(steps, None)
+            if packets is None:
+                raise EOFError
+            return packets
+
+        monkeypatch.setattr(each.live._transport, "open", lambda: None)
+        monkeypatch.setattr(each.live._transport, "receive", receive)
+    items = [item for chunk in source.chunks() for item in chunk]
+    counts = {i.source: 0 for i in items if isinstance(i, Channel)}
+    for item in items:
+        if isinstance(item, Channel):
+            counts[item.source] += len(item)
+    assert counts == {"s0.N": 10, "s1.N": 20}
+    assert [i.text for i in items if isinstance(i, Event)].count("the source has ended") == 2
+
+
+def test_a_hangup_that_is_ignored_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stopped_by_signals(lambda: None):
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+            assert signal.getsignal(signal.SIGTERM) != signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_the_second_signal_has_its_usual_effect() -> None:
+    stops: list[bool] = []
+    with stopped_by_signals(lambda: stops.append(True)):
+        signal.raise_signal(signal.SIGINT)
+        assert stops == [True]
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert stops == [True]

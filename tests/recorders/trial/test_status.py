@@ -63,3 +63,27 @@ def test_events_are_counted() -> None:
     status = TrialStatus(0)
     status.add([Event(0, "execute")])
     assert status.events == 1
+
+
+def test_a_channel_of_few_samples_that_goes_silent_is_reported_after_a_minute() -> None:
+    status = TrialStatus(0)
+    status.add([_samples("rudder", 0.0, 1)])
+    assert [e.text for e in status.alarms(59 * SECOND) if "silent" in e.text] == []
+    assert [e.text for e in status.alarms(61 * SECOND) if "silent" in e.text] == [
+        "/rudder/TI has been silent for 61.0 s"
+    ]
+
+
+def test_a_needed_channel_that_has_only_invalid_values_is_missing() -> None:
+    status = TrialStatus(0)
+    times = np.arange(3) * SECOND
+    status.add([Channel("rudder", "TI", "rad", times, times, np.full(3, np.nan))])
+    assert "rudder" in status.missing
+    status.add([Channel("rudder", "TI", "rad", times, times, np.zeros(3))])
+    assert "rudder" not in status.missing
+
+
+def test_the_last_mark_is_that_of_a_person() -> None:
+    status = TrialStatus(0)
+    status.add([Event(0, "execute"), Event(1, "gap", "gyro")])
+    assert status.last_mark == Event(0, "execute")
