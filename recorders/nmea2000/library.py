@@ -1,4 +1,4 @@
-"""The library nmea2000: assembly of fast packets, and the fields of messages in SI units.
+"""The library nmea2000: PGNs, and the fields of messages in SI units.
 
 Its decoder for lines stamps some formats with the time of decoding and drops what it cannot read
 without a count, so that only its parts below the lines are used. They are in private modules: the
@@ -22,30 +22,6 @@ Field = int | float | None
 
 class FrameError(ValueError):
     """A line, frame or message that is rejected; the text is the reason, from a fixed set."""
-
-
-class FastPacketAssembly:
-    """Assembly of the messages of several senders from their frames.
-
-    What waits is bounded by the number of senders, PGNs and the 8 sequence numbers of each.
-    """
-
-    def __init__(self) -> None:
-        self._assembly = _canboat.Reassembler()
-
-    def push(self, pgn: int, data: bytes, source: int, destination: int) -> bytes | None:
-        """Return the data of the message that a frame completes, or None.
-
-        Raises
-        ------
-        FrameError
-            The frame is none of a fast packet.
-        """
-        try:
-            message: bytes | None = self._assembly.push(pgn, data, source, destination)
-        except _canboat.ReassemblyError as error:
-            raise FrameError("frame that is none of a fast packet") from error
-        return message
 
 
 def is_fast(pgn: int) -> bool:

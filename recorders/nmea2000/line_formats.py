@@ -129,16 +129,21 @@ def detect_format(lines: Sequence[bytes]) -> LineFormat | None:
     >>> detect_format([b"17:33:21.107 R 19F51323 01 2F 30 70 00 2F 30 70"]).name
     'yacht-devices'
     """
+    best = matching_format(lines)
+    return _candump_of(lines) if best is CANDUMP else best
+
+
+def matching_format(lines: Sequence[bytes]) -> LineFormat | None:
+    """Return the format of which most lines are, whatever their stamps mean; None for no format.
+
+    A live stream needs no more: its lines have the times of their reception.
+    """
     counts = {
         format_.name: sum(bool(format_.pattern.fullmatch(line)) for line in lines)
         for format_ in FORMATS.values()
     }
     best = max(counts, key=lambda name: counts[name])
-    if counts[best] == 0:
-        return None
-    if best == CANDUMP.name:
-        return _candump_of(lines)
-    return FORMATS[best]
+    return FORMATS[best] if counts[best] else None
 
 
 def is_assembled(lines: Sequence[bytes]) -> bool:

@@ -7,8 +7,9 @@ from recorders.streams.gnss_clock import GnssClock, Utc
 from recorders.streams.packets import Packet
 from recorders.streams.sample_buffer import SampleBuffer
 
-from .library import FastPacketAssembly, FrameError, fields, is_fast
-from .line_formats import FRAME_BYTES, Frame, LineFormat, detect_format, is_assembled
+from .fast_packets import FastPackets
+from .library import FrameError, fields, is_fast
+from .line_formats import FRAME_BYTES, Frame, LineFormat, is_assembled, matching_format
 from .pgns import DAY_SECS, READINGS
 
 FAST_PGNS = frozenset(pgn for pgn in READINGS if is_fast(pgn))
@@ -20,7 +21,8 @@ class PgnDecoder:
     """Samples of the messages that hold a channel; the source is the address of their sender.
 
     Only fast packets of these messages are assembled, so that what a hostile bus can make wait is
-    bounded: 8 sequences of 223 bytes for each address and message.
+    bounded: 8 messages of 223 bytes for each address and PGN. Each line is counted once: of the
+    frames of a fast packet the last one as the message, the others as parts of it.
 
     Parameters
     ----------
@@ -37,7 +39,7 @@ class PgnDecoder:
         self._counts = StreamCounts()
         self.line_format = line_format
         self._assembled = line_format is not None and bool(line_format.assembled)
-        self._assembly = FastPacketAssembly()
+        self._fast_packets = FastPackets(self._counts)
         self._clock = GnssClock(self._warn)
         self._kinds: dict[tuple[int, int], str] = {}
         self._names: dict[int, bytes] = {}  # the NAMEs of devices by address (ISO 11783-5)
@@ -64,8 +66,9 @@ class PgnDecoder:
                 self._decode_line(line, packet.received_ns, samples)
 
     def finish(self, samples: SampleBuffer) -> None:
-        """Report the latencies of the receivers; parts of messages are of no value."""
+        """Report the latencies of the receivers; reject the messages that are not complete."""
         del samples
+        self._fast_packets.finish()
         self._clock.finish()
         for key, text in self._clock.notes():
             self._counts.note(key, text)
@@ -73,7 +76,7 @@ class PgnDecoder:
     def _decode_line(self, line: bytes, received_ns: int, samples: SampleBuffer) -> None:
         line_format = self.line_format
         if line_format is None:
-            line_format = detect_format([line])
+            line_format = matching_format([line])
             if line_format is None:
                 self._count_unknown(line)
                 return
@@ -132,7 +135,7 @@ class PgnDecoder:
             self._assembled = True
         if self._assembled:
             return frame.data
-        return self._assembly.push(frame.pgn, frame.data, frame.source, frame.destination)
+        return self._fast_packets.push(frame.pgn, frame.source, frame.data)
 
     def _add(self, frame: Frame, data: bytes, received_ns: int, samples: SampleBuffer) -> None:
         """Add the samples of a message."""

@@ -67,9 +67,9 @@ class StreamCounts:
         """Count packets that are not what they should be."""
         self._rejected[reason] += packets
 
-    def skip(self, kind: str) -> None:
-        """Count a valid packet that is not decoded."""
-        _count(self._unused, kind)
+    def skip(self, kind: str, packets: int = 1) -> None:
+        """Count valid packets that are not decoded."""
+        _count(self._unused, kind, packets)
 
     def flag(self, kind: str) -> None:
         """Count an accepted packet with values that its sender marks as invalid."""
@@ -91,5 +91,6 @@ class StreamCounts:
         return new
 
 
-def _count(counter: Counter[str], kind: str) -> None:
-    counter[kind if kind in counter or len(counter) < MAX_KINDS else _OTHER] += 1
+def _count(counter: Counter[str], kind: str, packets: int = 1) -> None:
+    if packets:
+        counter[kind if kind in counter or len(counter) < MAX_KINDS else _OTHER] += packets
