@@ -15,7 +15,7 @@ from .signalk_paths import find_target
 
 MAX_SOURCE_LENGTH = 64
 MAX_PATH_LENGTH = 80
-MAX_CONTEXTS = 64  # of other ships, to be counted
+MAX_CONTEXTS = 64  # of ships, own and others; names come from the wire
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _NO_NAME = re.compile(r"[^A-Za-z0-9._-]+")  # what no part of a topic should hold
 
@@ -51,7 +51,7 @@ class DeltaDecoder:
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
         """Decode lines with one delta each."""
         for packet in batch:
-            for line in packet.data.splitlines():
+            for line in packet.data.splitlines() or [b""]:  # an empty datagram is counted
                 try:
                     self._add_delta(parse_delta(line), packet.received_ns, samples)
                 except DeltaError as error:
@@ -68,29 +68,44 @@ class DeltaDecoder:
 
     def _add_delta(self, delta: Mapping[str, Any], received_ns: int, samples: SampleBuffer) -> None:
         if "updates" not in delta:
-            if isinstance(own_ship := delta.get("self"), str):  # the greeting of a server
-                self._own_ships.add(own_ship)
-                self._own_ships.add(f"vessels.{own_ship}")
+            own_ship = delta.get("self")  # in the greeting of a server
+            if isinstance(own_ship, str) and len(self._own_ships) < MAX_CONTEXTS:
+                self._own_ships |= {own_ship, f"vessels.{own_ship}"}
             self._counts.skip("no delta")
             return
         context = delta.get("context", "vessels.self")
+        if not isinstance(context, str):
+            raise DeltaError("context is no text")
         if context not in self._own_ships:
-            if len(self._other_ships) < MAX_CONTEXTS and isinstance(context, str):
+            if len(self._other_ships) < MAX_CONTEXTS:
                 self._other_ships.add(context[:MAX_PATH_LENGTH])
             self._counts.skip("delta of another ship")
             return
-        for update in _list(delta["updates"]):
-            if not isinstance(update, dict):
-                raise DeltaError("update is no object")
-            source = source_name(update)
-            measured_ns = received_ns
-            if self._own_times and "timestamp" in update:
-                measured_ns = instant_ns(update["timestamp"])
-            for value in _list(update.get("values", [])):
-                try:
-                    self._add_value(value, source, (received_ns, measured_ns), samples)
-                except DeltaError as error:
-                    self._counts.reject(str(error))
+        updates = _list(delta["updates"])
+        if not updates:
+            self._counts.skip("delta without a value")
+        for update in updates:
+            try:
+                self._add_update(update, received_ns, samples)
+            except DeltaError as error:
+                self._counts.reject(str(error))
+
+    def _add_update(self, update: object, received_ns: int, samples: SampleBuffer) -> None:
+        """Add the values of one source; each is counted, and an update without any."""
+        if not isinstance(update, dict):
+            raise DeltaError("update is no object")
+        source = source_name(update)
+        measured_ns = received_ns
+        if self._own_times and "timestamp" in update:
+            measured_ns = instant_ns(update["timestamp"])
+        values = _list(update.get("values", []))
+        if not values:
+            self._counts.skip("update without a value")
+        for value in values:
+            try:
+                self._add_value(value, source, (received_ns, measured_ns), samples)
+            except DeltaError as error:
+                self._counts.reject(str(error))
 
     def _add_value(
         self, pair: object, source: str, times: tuple[int, int], samples: SampleBuffer
@@ -109,10 +124,9 @@ class DeltaDecoder:
                 "gnss_time", source, time_ns * 1e-9, *times
             )
         else:
-            for target, number in _numbers(path, value):
+            for target, number in list(_numbers(path, value)):  # all of them, or none
                 name = f"{source}.{target.part}" if target.part else source
-                si = number * target.factor + target.offset
-                added += samples.add(target.channel, name, si, *times)
+                added += samples.add(target.channel, name, number, *times)
         kind = _printable(path)
         if added:
             self._counts.accept(kind)
@@ -176,12 +190,15 @@ def source_name(update: Mapping[str, Any]) -> str:
 
 
 def _numbers(path: str, value: object) -> Iterator[tuple[Any, float]]:
-    """Yield the channels of a path with their values, which may be those of an object."""
+    """Yield the channels of a path with their values in the catalogue's units.
+
+    These may be the values of an object.
+    """
     items = value.items() if isinstance(value, dict) else [("", value)]
     for key, item in items:
         target = find_target(f"{path}.{key}" if key else path)
         if target is not None and item is not None:
-            yield target, _number(item)
+            yield target, _finite(_number(item) * target.factor + target.offset)
 
 
 def _number(value: object) -> float:
@@ -191,6 +208,10 @@ def _number(value: object) -> float:
         number = float(value)
     except OverflowError:
         number = nan
+    return _finite(number)
+
+
+def _finite(number: float) -> float:
     if not isfinite(number):
         raise DeltaError("value is no finite number")
     return number

@@ -155,6 +155,43 @@ def test_what_is_wrong_is_rejected_under_its_reason(line: bytes, reason: str) ->
     assert decode_live(SIGNALK, [line]).counts.rejected == {reason: 1}
 
 
+@pytest.mark.parametrize("context", [[], {}, 5, None, True])
+def test_a_context_that_is_no_text_is_rejected(context: object) -> None:
+    counts = decode_live(SIGNALK, [delta(("navigation.rateOfTurn", 0.01), context=context)]).counts
+    assert counts.rejected == {"context is no text": 1}
+
+
+def test_a_wrong_update_does_not_reject_the_others_and_each_is_counted() -> None:
+    value = {"path": "navigation.rateOfTurn", "value": 0.01}
+    updates = [5, {"values": [value]}, {"values": 7}, {"values": []}, {"values": [value, value]}]
+    lines = [json.dumps({"updates": each}).encode() for each in (updates, [])]
+    counts = decode_live(SIGNALK, lines).counts
+    assert counts.accepted == {"navigation.rateOfTurn": 3}
+    assert counts.unused == {"update without a value": 1, "delta without a value": 1}
+    assert counts.rejected == {"update is no object": 1, "updates or values are no list": 1}
+
+
+def test_a_value_that_is_infinite_in_our_unit_is_rejected() -> None:
+    decoded = decode_live(SIGNALK, [delta(("propulsion.port.revolutions", 1e308))])
+    assert decoded.channels == {}
+    assert decoded.counts.rejected == {"value is no finite number": 1}
+
+
+def test_of_an_object_all_values_are_read_or_none() -> None:
+    decoded = decode_live(SIGNALK, [delta(("navigation.attitude", {"roll": 0.1, "pitch": "x"}))])
+    assert decoded.channels == {}
+    assert decoded.counts.rejected == {"value is no number": 1}
+
+
+def test_a_flood_of_greetings_names_few_own_ships() -> None:
+    greetings = [json.dumps({"self": f"urn:{n}"}).encode() for n in range(1000)]
+    turn = ("navigation.rateOfTurn", 0.01)
+    deltas = [delta(turn, context=f"vessels.urn:{n}") for n in (0, 999)]
+    counts = decode_live(SIGNALK, [*greetings, *deltas]).counts
+    assert counts.accepted == {"navigation.rateOfTurn": 1}
+    assert counts.unused == {"no delta": 1000, "delta of another ship": 1}
+
+
 def test_a_file_without_times_is_refused() -> None:
     line = b'{"updates": [{"values": [{"path": "navigation.headingTrue", "value": 1}]}]}'
     with pytest.raises(LogError, match="no delta has a time"):
