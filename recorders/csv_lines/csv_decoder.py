@@ -51,7 +51,7 @@ class CsvDecoder:
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
         """Decode lines; a datagram may hold several."""
         for packet in batch:
-            for line in packet.data.splitlines():
+            for line in packet.data.splitlines() or [b""]:  # an empty datagram is counted
                 try:
                     self._add_line(line.decode("ascii"), packet.received_ns, samples)
                 except UnicodeDecodeError:
@@ -73,7 +73,7 @@ class CsvDecoder:
             return
         _check(kind, fields, line, self._device.delimiter)
         values = {
-            role: _number(fields, column)
+            role: _number(fields, column, self._factors.get((kind.begins, role), 1.0))
             for role, column in kind.columns.items()
             if role.partition(".")[0] not in HEMISPHERES
         }
@@ -82,8 +82,7 @@ class CsvDecoder:
         for role, value in values.items():
             channel, _, part = role.partition(".")
             if value is not None and channel in CATALOGUE:
-                si = value * self._factors[kind.begins, role]
-                added += samples.add(channel, _source(kind, part), si, received_ns)
+                added += samples.add(channel, _source(kind, part), value, received_ns)
         for part, fix in fixes:
             if fix is not None:
                 added += samples.add_position(_source(kind, part), fix, received_ns)
@@ -111,8 +110,8 @@ def _has_checksum(line: str, delimiter: str) -> bool:
     return re.fullmatch("[0-9A-Fa-f]{2}", digits) is not None and int(digits, 16) == checksum
 
 
-def _number(fields: Sequence[str], column: Column) -> float | None:
-    """Return the number in a column, or None where it is empty or NaN."""
+def _number(fields: Sequence[str], column: Column, factor: float) -> float | None:
+    """Return the number in a column times a factor, or None where it is empty or NaN."""
     place = int(column.place)
     if place > len(fields):
         raise FieldError("too few fields")
@@ -120,7 +119,7 @@ def _number(fields: Sequence[str], column: Column) -> float | None:
     if not text or text.lower() == "nan":
         return None
     try:
-        number = nan if "_" in text else float(text)
+        number = nan if "_" in text else float(text) * factor
     except ValueError:
         number = nan
     if not isfinite(number):

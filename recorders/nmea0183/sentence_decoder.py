@@ -83,7 +83,7 @@ class SentenceDecoder:
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
         """Decode a batch of lines or datagrams."""
         for packet in batch:
-            for line in split_packet(packet.data):
+            for line in split_packet(packet.data) or [b""]:  # an empty datagram is counted
                 self._decode_line(line, packet.received_ns, samples)
 
     def finish(self, samples: SampleBuffer) -> None:  # noqa: ARG002 - of the protocol

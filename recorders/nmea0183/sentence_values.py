@@ -79,10 +79,18 @@ def measured(
         Whether the sender marks it as valid; if not, the value is NaN.
     suffix
         The suffix of the source.
+
+    Raises
+    ------
+    ValueError
+        The value is too large for a number.
     """
     if number is None:
         return ()
-    return (Value(channel, number * factor if valid else nan, suffix),)
+    value = number * factor
+    if not isfinite(value):
+        raise ValueError(number)
+    return (Value(channel, value if valid else nan, suffix),)
 
 
 def signed(number: float | None, letter: str, positive: str, negative: str) -> float | None:
