@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 MAX_WARNINGS = 100
 MAX_KINDS = 256  # names come from the wire; more than these are counted together
+MAX_KIND_CHARS = 100
 _OTHER = "other kinds"
 
 
@@ -65,7 +66,7 @@ class StreamCounts:
 
     def reject(self, reason: str, packets: int = 1) -> None:
         """Count packets that are not what they should be."""
-        self._rejected[reason] += packets
+        _count(self._rejected, reason, packets)
 
     def skip(self, kind: str, packets: int = 1) -> None:
         """Count valid packets that are not decoded."""
@@ -92,5 +93,7 @@ class StreamCounts:
 
 
 def _count(counter: Counter[str], kind: str, packets: int = 1) -> None:
+    if kind not in counter:
+        kind = kind[:MAX_KIND_CHARS]
     if packets:
         counter[kind if kind in counter or len(counter) < MAX_KINDS else _OTHER] += packets

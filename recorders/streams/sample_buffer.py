@@ -25,18 +25,18 @@ class _Column:
     values: list[float | tuple[float, float, float]] = field(default_factory=list)
 
     def take(self) -> Channel:
-        channel = Channel(
+        measured_ns, received_ns, values = self.measured_ns, self.received_ns, self.values
+        self.measured_ns, self.received_ns, self.values = [], [], []
+        return Channel(
             self.name,
             self.source,
             self.unit,
-            np.array(self.measured_ns, np.int64),
-            np.array(self.received_ns, np.int64),
-            np.array(self.values, np.float64),
+            np.array(measured_ns, np.int64),
+            np.array(received_ns, np.int64),
+            np.array(values, np.float64),
             self.fields,
             self.metadata,
         )
-        self.measured_ns, self.received_ns, self.values = [], [], []
-        return channel
 
 
 class SampleBuffer:

@@ -1,7 +1,9 @@
 """Source of samples made of one stream: batches of packets, decoded, and kept raw beside it."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,10 +14,16 @@ from .decoder import Decoder
 from .packets import Batches, Packet
 from .sample_buffer import SampleBuffer
 
+T = TypeVar("T")
+DECODER_FAILURE = "failure of the decoder"  # the reason of a rejection
+
 
 @dataclass
 class StreamSource:
     """A stream of packets as a `recorders.source.Source`.
+
+    A decoder that fails, against its contract, ends neither the stream nor the other streams of a
+    trial: the packets of the batch are counted as rejected, and the first failure is a warning.
 
     Attributes
     ----------
@@ -74,24 +82,44 @@ class StreamSource:
     def steps(self) -> Iterator[tuple[Recordable, ...]]:
         """Yield the samples, events and raw packets of each batch, or nothing, and of the end."""
         for batch in self.batches:
-            self.decoder.decode(batch, self._samples)
+            self._guard(partial(self.decoder.decode, batch, self._samples), len(batch))
             if batch:
                 self._first_ns = batch[0].received_ns if self._first_ns is None else self._first_ns
                 self._last_ns = batch[-1].received_ns
-            self._add_warnings()
+            samples = self._take_samples(len(batch))
             raw = [self._raw(batch)] if self.keep_raw and batch else []
-            yield (*self._samples.take(), *raw)
+            yield (*samples, *raw)
         yield self.finish()
 
     def finish(self) -> tuple[Recordable, ...]:
         """Return what the decoder still held after the last batch."""
-        self.decoder.finish(self._samples)
-        self._add_warnings()
-        return self._samples.take()
+        self._guard(partial(self.decoder.finish, self._samples), 1)
+        return self._take_samples(1)
 
     def chunks(self) -> Iterator[tuple[Recordable, ...]]:
         """Yield what the steps yield, without those that yield nothing."""
         return filter(None, self.steps())
+
+    def _take_samples(self, packets: int) -> tuple[Recordable, ...]:
+        """Return what was decoded from some packets, and the new warnings as events."""
+        samples = self._guard(self._samples.take, packets) or ()
+        self._add_warnings()
+        return (*samples, *self._samples.take())
+
+    def _guard(self, step: Callable[[], T], packets: int) -> T | None:
+        """Return the result of a step with some packets; count a failure, and return None."""
+        try:
+            return step()
+        except Exception as error:  # noqa: BLE001 - a trial is not repeated for one packet
+            counts = self.decoder.counts
+            if DECODER_FAILURE not in counts.rejected:
+                cause = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+                counts.warn(
+                    f"the decoder of {self.format} failed ({cause}); what it misses can be decoded "
+                    "from the raw packets when it is corrected"
+                )
+            counts.reject(DECODER_FAILURE, packets)
+            return None
 
     def _add_warnings(self) -> None:
         """Add the new warnings of the stages and the decoder as events."""

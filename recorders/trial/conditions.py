@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+MAX_TRIM_ERROR = 0.1  # m: draughts are read to a few centimetres
+
 
 @dataclass(frozen=True)
 class Condition:
@@ -28,6 +30,7 @@ class Condition:
 
 CONDITIONS: Mapping[str, Condition] = {
     "ship_type": Condition(),
+    "test_speed": Condition("m/s", 0.0, 50.0),  # V of L/V: of the approach
     "loading": Condition(),  # such as "full load" or "ballast"
     "place": Condition(),
     "remarks": Condition(),
@@ -56,6 +59,27 @@ CONDITIONS: Mapping[str, Condition] = {
 }
 
 
+def trim_contradiction(values: Mapping[str, float | str]) -> str:
+    """Return that the trim contradicts the draughts; an empty text where it does not.
+
+    Examples
+    --------
+    >>> trim_contradiction({"draught_forward": 8.0, "draught_aft": 8.5, "trim": -0.5})
+    'trim -0.5 m contradicts the draughts, whose difference aft minus forward is 0.5 m'
+    """
+    known = [values.get(name) for name in ("trim", "draught_aft", "draught_forward")]
+    numbers = [float(value) for value in known if isinstance(value, int | float)]
+    if len(numbers) < len(known):
+        return ""
+    trim, aft, forward = numbers
+    if abs(trim - (aft - forward)) <= MAX_TRIM_ERROR:
+        return ""
+    return (
+        f"trim {trim:g} m contradicts the draughts, whose difference aft minus forward is "
+        f"{aft - forward:.4g} m"
+    )
+
+
 def condition_metadata(values: Mapping[str, float | str]) -> dict[str, str]:
     """Return the conditions as metadata of a log, each with its unit.
 
@@ -65,7 +89,7 @@ def condition_metadata(values: Mapping[str, float | str]) -> dict[str, str]:
     {'condition.draught_aft': '8.5 m', 'condition.loading': 'ballast'}
     """
     return {
-        f"condition.{name}": f"{value:g} {CONDITIONS[name].unit}".strip()
+        f"condition.{name}": f"{value:.10g} {CONDITIONS[name].unit}".strip()
         if isinstance(value, int | float)
         else value
         for name, value in values.items()

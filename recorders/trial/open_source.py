@@ -17,7 +17,7 @@ from recorders.streams.stream_source import StreamSource
 from recorders.transports.address import is_live, open_transport
 from recorders.transports.live_stream import LiveStream
 from recorders.transports.transport import Transport
-from shiplog.errors import LogError, UsageError
+from shiplog.errors import LogError, ShiplogError, UsageError
 from shiplog.types import Event
 
 from .conditions import condition_metadata
@@ -84,11 +84,12 @@ def open_streams(
     Raises
     ------
     UsageError
-        An address is wrong, or live and recorded streams are mixed.
+        An address is wrong, live and recorded streams are mixed, or two streams read the standard
+        input.
     LogError
         A file is missing.
     """
-    transports = [_transport(request, clock) for request in requests]
+    transports = _transports(requests, clock)
     live = [transport for transport in transports if transport is not None]
     if live and len(live) < len(requests):
         files = [r.address for r, t in zip(requests, transports, strict=True) if t is None]
@@ -126,6 +127,23 @@ def _request(entry: SourceEntry, folder: Path) -> StreamRequest:
     return StreamRequest(
         entry.name, entry.format, address, options, entry.keep_raw, f"{entry.name}."
     )
+
+
+def _transports(requests: Sequence[StreamRequest], clock: ReceptionClock) -> list[Transport | None]:
+    """Return the transports of all streams, or raise what is wrong with any of them."""
+    if sum(request.address == "-" for request in requests) > 1:
+        raise UsageError("two sources read the standard input, which one can; give one an address")
+    transports, errors = [], list[ShiplogError]()
+    for request in requests:
+        try:
+            transports.append(_transport(request, clock))
+        except ShiplogError as error:
+            errors.append(error)
+    if len(errors) > 1:
+        raise UsageError("; ".join(map(str, errors)))
+    if errors:
+        raise errors[0]
+    return transports
 
 
 def _transport(request: StreamRequest, clock: ReceptionClock) -> Transport | None:

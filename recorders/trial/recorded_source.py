@@ -97,6 +97,11 @@ class RecordedSource:
         items = tuple(item for stream in self.streams for item in stream.finish())
         if items:
             yield items
-        if not any(stream.decoder.counts.accepted for stream in self.streams):
-            names = ", ".join(stream.origin for stream in self.streams)
+        silent = [stream for stream in self.streams if not stream.decoder.counts.accepted]
+        if len(silent) == len(self.streams):
+            names = ", ".join(stream.origin for stream in silent)
             raise LogError(f"no sample could be decoded; check the format of: {names}")
+        for stream in silent:
+            stream.decoder.counts.warn(
+                f"no sample could be decoded from {stream.origin}; check its format"
+            )

@@ -10,13 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from recorders.streams.format import GROUP, StreamFormat
+from recorders.streams.reception_clock import ReceptionClock
 from recorders.streams.stream_options import parse_options
+from recorders.transports.address import is_live, open_transport
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import load_extension
 from shiplog.types import ReadOnlyMapping
 from shiplog.units import did_you_mean
 
-from .conditions import CONDITIONS
+from .conditions import CONDITIONS, trim_contradiction
 
 MAX_TRIAL_FILE_BYTES = 100_000
 MAX_SOURCES = 64
@@ -185,11 +187,14 @@ class _Parser:
 
     def _conditions(self) -> dict[str, float | str]:
         section = self._section("conditions", CONDITIONS)
-        return {
+        conditions = {
             key: value
             for key, value in section.items()
             if key in CONDITIONS and self._is_condition(key, value)
         }
+        if text := trim_contradiction(conditions):
+            self._errors.append(f"conditions: {text}")
+        return conditions
 
     def _is_condition(self, key: str, value: object) -> bool:
         condition = CONDITIONS[key]
@@ -236,10 +241,20 @@ class _Parser:
         stream_format = self._format(where, table)
         if stream_format is None:
             return None
+        self._check_address(where, stream_format, address)
         options = self._options(where, stream_format, table)
         if options is None or len(self._errors) > before:
             return None
         return SourceEntry(name, stream_format, address, keep_raw, options)
+
+    def _check_address(self, where: str, stream_format: StreamFormat, address: str) -> None:
+        """Check the address of a live source; whether a file exists is known when it is opened."""
+        clock = ReceptionClock()
+        try:
+            if stream_format.open_transport(address, clock) is None and is_live(address):
+                open_transport(address, clock)
+        except UsageError as error:
+            self._errors.append(f"{where}: {error}")
 
     def _format(self, where: str, table: Mapping[str, Any]) -> StreamFormat | None:
         name = self._text(table, f"{where}.format", required=True)

@@ -87,3 +87,56 @@ def test_the_duration_is_that_from_the_first_to_the_last_packet() -> None:
     assert source.duration_secs == 0
     list(source.chunks())
     assert source.duration_secs == 2e-9
+
+
+class _Failing(_Numbers):
+    """Fails on one packet, against its contract, after it has decoded those before."""
+
+    def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
+        for packet in batch:
+            if packet.data == b"x":
+                raise IndexError("list index out of range")
+            super().decode([packet], samples)
+
+    def finish(self, _samples: SampleBuffer) -> None:
+        raise KeyError("at the end")
+
+
+def test_a_decoder_that_fails_loses_one_batch_and_is_counted_and_reported_once() -> None:
+    source = _source(keep_raw=True)
+    source.decoder = _Failing()
+    items = [item for chunk in source.chunks() for item in chunk]
+    values = [v for c in items if isinstance(c, Channel) for v in c.values.tolist()]
+    assert values == [1.5, 2.5]
+    assert sum(len(p) for p in items if isinstance(p, RawPackets)) == 3
+    assert source.metadata["rejected.failure of the decoder"] == "3"
+    (event,) = [item for item in items if isinstance(item, Event)]
+    assert "the decoder of numbers failed (IndexError: list index out of range)" in event.text
+
+
+def test_a_time_beyond_all_clocks_loses_no_other_batch() -> None:
+    class Impossible(_Numbers):
+        def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
+            for packet in batch:
+                late = 2**70 if packet.data == b"x" else None
+                samples.add("heading", "HE", 1.0, packet.received_ns, late)
+
+        def finish(self, samples: SampleBuffer) -> None:
+            """Add nothing."""
+
+    source = _source()
+    source.decoder = Impossible()
+    times = [t for c in source.chunks() for i in c if isinstance(i, Channel) for t in i.received_ns]
+    assert times == [3]
+    assert source.decoder.counts.rejected == {"failure of the decoder": 2}
+
+
+def test_counts_are_bounded_in_number_and_length_whatever_the_wire_names() -> None:
+    counts = StreamCounts()
+    for n in range(1000):
+        counts.accept(f"{n}" + "x" * 4000)
+        counts.reject(f"reason {n}")
+    assert len(counts.accepted) <= 257
+    assert len(counts.rejected) <= 257
+    assert max(map(len, counts.accepted)) <= 100
+    assert sum(counts.accepted.values()) == sum(counts.rejected.values()) == 1000

@@ -54,6 +54,44 @@ def test_a_file_without_any_sample_is_an_error_that_names_it(tmp_path: Path) -> 
         list(source.chunks())
 
 
+def test_a_file_without_any_sample_beside_another_is_a_warning(tmp_path: Path) -> None:
+    good = _written(tmp_path / "good.txt", "rpm 60")
+    bad = _written(tmp_path / "bad.txt", "x", "y")
+    source = open_streams([_request(good), _request(bad)], ReceptionClock())
+    assert isinstance(source, RecordedSource)
+    list(source.chunks())
+    warnings = [stream.decoder.counts.warnings for stream in source.streams]
+    assert warnings == [(), ("no sample could be decoded from bad.txt; check its format",)]
+
+
+def test_all_missing_files_are_named_at_once(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"no such file: .*a\.txt; no such file: .*b\.txt"):
+        open_streams([_request(tmp_path / "a.txt"), _request(tmp_path / "b.txt")], ReceptionClock())
+
+
+def test_the_standard_input_is_that_of_one_stream() -> None:
+    with pytest.raises(UsageError, match="two sources read the standard input"):
+        open_streams([_request(Path("-")), _request(Path("-"))], ReceptionClock())
+
+
+def test_files_that_overlap_in_part_or_not_at_all_lose_no_sample(tmp_path: Path) -> None:
+    spans = {"first": 0.0, "overlaps": 0.55, "later": 100.0}
+    requests = [
+        _request(_written(tmp_path / f"{name}.txt", *(f"rpm {n}" for n in range(10))), start=start)
+        for name, start in spans.items()
+    ]
+    chunks = list(open_streams(requests, ReceptionClock()).chunks())
+    samples = [
+        sample
+        for chunk in chunks
+        for sample in sorted(
+            (t, c.source) for c in chunk if isinstance(c, Channel) for t in c.received_ns.tolist()
+        )
+    ]
+    assert len(samples) == 30
+    assert samples == sorted(samples)
+
+
 def test_a_missing_file_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="no such file"):
         open_streams([_request(tmp_path / "none.txt")], ReceptionClock())

@@ -92,6 +92,10 @@ def test_all_faults_are_reported_at_once_with_the_nearest_names() -> None:
     name = "c"
     format = "numbers"
     address = "d.txt"
+    [[source]]
+    name = "e"
+    format = "numbers"
+    address = "udp://127.0.0.1"
     """
     with pytest.raises(UsageError) as caught:
         _load(text)
@@ -108,6 +112,7 @@ def test_all_faults_are_reported_at_once_with_the_nearest_names() -> None:
         "source 2.address must be a text",
         "source 2.raw must be true or false",
         "source 2: unknown key 'strat'; did you mean 'start'",
+        "source 'e': host or port is missing",
         "source 'c': argument --start: invalid float value: 'noon'",
         "trial.toml",
     ):
@@ -127,6 +132,10 @@ def test_all_faults_are_reported_at_once_with_the_nearest_names() -> None:
         ("[output]\nrotate_megabytes = inf", "rotate_megabytes must be a positive number"),
         ("[conditions]\nwater_depth = nan", "water_depth must be a number from 0 to 12000 m"),
         ('[conditions]\nplace = "a\\u001bb"', "place must be a text in one line"),
+        (
+            "[conditions]\ntrim = 0.5\ndraught_aft = 8\ndraught_forward = 8.5",
+            "trim 0.5 m contradicts the draughts, whose difference aft minus forward is -0.5 m",
+        ),
         ("[vessel]\nfile = 1", "vessel.file must be a text"),
         ("a" * 200_000, "too long for a trial file"),
     ],
