@@ -12,7 +12,7 @@ import rerun.blueprint as rrb
 
 from analysis.replay.plan import Plan
 from analysis.replay.replay_results import Analysis, Findings, ReplayChunk
-from shiplog.types import Log
+from shiplog.types import Event, EventLevel, Log
 
 from .further_channels import FurtherChannels
 from .panels import Panel
@@ -94,8 +94,8 @@ class ReplayReview:
         drawn = self._builder.result()
         yaw, surge = equation_panels(findings, drawn)
         coefficients, chart = history_panels(findings, drawn), draw_track(findings, drawn)
-        further = self._further.panels()
-        page = _replay_page(yaw, surge, coefficients, chart, has_events=bool(findings.events))
+        further, events = self._further.panels(), _events_with_changes(findings, start_ns)
+        page = _replay_page(yaw, surge, coefficients, chart, has_events=bool(events))
         rr.send_blueprint(_blueprint(page, further), recording=recording)
         _send_properties(recording, findings)
         send_text(recording, "summary", text + LEGEND + (FURTHER_LEGEND if further else ""))
@@ -107,8 +107,8 @@ class ReplayReview:
                     send_points(recording, entity, series, start_ns)
         if chart is not None:
             send_chart(recording, "track", chart, start_ns)
-        if findings.events:
-            send_events(recording, "events", findings.events, start_ns)
+        if events:
+            send_events(recording, "events", events, start_ns)
         recording.flush()
 
 
@@ -199,6 +199,15 @@ def _blueprint(page: rrb.Container, further: list[Panel]) -> rrb.Blueprint:
     return make_blueprint(rrb.Tabs(page, grid, active_tab=0))
 
 
+def _events_with_changes(findings: Findings, start_ns: int) -> tuple[Event, ...]:
+    """Return the events of the log, and the changes of coefficients as warnings among them."""
+    changes = (
+        Event(start_ns + round(change.at_secs * 1e9), str(change), "replay", EventLevel.WARNING)
+        for change in findings.changes
+    )
+    return tuple(sorted((*findings.events, *changes), key=lambda event: event.time_ns))
+
+
 def _replay_page(
     yaw: list[Panel],
     surge: list[Panel],
@@ -209,7 +218,7 @@ def _replay_page(
 ) -> rrb.Container:
     """Lay out one page: yaw and surge on the left; track, summary and coefficients on the right.
 
-    The events of the log are a list of texts below these.
+    The events of the log and the changes of coefficients are a list of texts below these.
     """
     plots = rrb.Horizontal(
         *(rrb.Vertical(*map(plot_view, column), row_shares=ROW_SHARES) for column in (yaw, surge))

@@ -28,6 +28,7 @@ from analysis.view.series import Line, MeasuredSamples, Series
 from analysis.view.series_builder import SeriesBuilder
 from analysis.view.track_chart import draw_track
 from analysis.view.viewer import view_review
+from benchmarks.changed_ship import changed_trial
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog.errors import ShiplogError
@@ -448,6 +449,29 @@ def test_the_command_writes_a_review_without_a_warning_of_rerun(tmp_path: Path) 
     assert done.returncode == 0, done.stderr
     assert foreign_lines(done.stderr) == []
     assert all(layout(review, "TimeAxis:view_range"))
+
+
+def test_a_change_of_a_coefficient_is_a_warning_at_its_instant(tmp_path: Path) -> None:
+    vessel, toml = load_vessel("table1")
+    log = changed_trial(
+        vessel, "zigzag-20-20", {"d": 0.8}, at_secs=600.0, duration_secs=1200.0, seed=0,
+        sensors=suite("white"), vessel_toml=toml,
+    )  # fmt: skip
+    execute = Event(log["yaw_rate"].measured_ns[0] + 10**9, "execute")
+    found = analyse(replace(log, events=(execute,)))
+    path = tmp_path / "changed.rrd"
+    write_replay_review(found, path, text="")
+    (batch,) = (
+        chunk.to_record_batch()
+        for chunk in RrdReader(path).stream()
+        if chunk.entity_path == "/events"
+    )
+    assert [row[0] for row in batch["TextLog:level"].to_pylist()] == ["INFO", "WARN"]
+    text = batch["TextLog:text"].to_pylist()[1][0]
+    assert text.startswith("replay: d changed by -19.9 %")
+    at = batch["time"].to_numpy(zero_copy_only=False).astype(np.int64)[1] * 1e-9
+    assert abs(at - 600) < 100
+    assert "events" in layout(path, "ViewBlueprint:display_name")
 
 
 def test_events_are_texts_with_their_levels_on_both_timelines(
