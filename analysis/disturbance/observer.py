@@ -75,6 +75,11 @@ class Disturbance:
     yaw_wave: FloatArray | None = None
     surge_wave: FloatArray | None = None
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether the observer has not diverged."""
+        return bool(np.isfinite(self.yaw).all() and np.isfinite(self.surge).all())
+
 
 @dataclass(frozen=True)
 class DisturbanceSummary:

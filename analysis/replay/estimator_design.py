@@ -1,14 +1,16 @@
 """Design of a replay's filter and disturbance observer, and the cause where it fails."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from analysis.disturbance.observer import ForceObserver, force_models
-from analysis.filters.base import Filter
+from analysis.filters.base import Estimates, Filter
 from analysis.signals.hold import last_inputs
-from shiplog import LogError
+from shiplog import LogError, Signals
 from shiplog.errors import ShiplogError, UsageError
+from shiplog.ships.paper import PAPER_OUTPUTS
 
 from .plan import Plan, changed_settings, with_default_settings
 
@@ -129,3 +131,50 @@ def diverged(plan: Plan, reason: str = "") -> ShiplogError:
         f"({plan.model_origin}) or the settings do not fit this log; give another model with "
         f"--vessel{settings}: {plan.name}"
     )
+
+
+def require_settings_of_observer(plan: Plan) -> None:
+    """Require that no setting makes the disturbance observer diverge on this log.
+
+    Where it diverges due to the model, the disturbance alone is unknown, and remains NaN.
+
+    Parameters
+    ----------
+    plan
+        The plan of a replay whose observer has diverged.
+
+    Raises
+    ------
+    UsageError
+        Names the settings of the observer without which it does not diverge.
+    """
+    settings = changed_settings(plan.vessel).items()
+    changed = {name: value for name, value in settings if name.startswith("disturbance.")}
+    if not changed or _observer_stays_finite(plan):  # later than in the part that is tried
+        return
+    names = _unsuitable_settings(plan, _observer_stays_finite, changed)
+    if names:
+        raise UsageError(
+            f"{names} makes the disturbance observer diverge; remove it or choose another value: "
+            f"{plan.name}"
+        )
+
+
+def _observer_stays_finite(plan: Plan) -> bool:
+    """Whether the disturbances are finite on the first part of the trial."""
+    filter_, observer = _design(plan)
+    head = plan.stats.head
+    following = last_inputs(head)
+    estimates = filter_.step(head, following)
+    return observer.step(without_rejected(head, estimates), following).is_finite
+
+
+def without_rejected(held: Signals, estimates: Estimates) -> Signals:
+    """Return the signals with the samples that the filter rejected set to NaN."""
+    if not estimates.rejected.any():
+        return held
+    accepted = {
+        name: np.where(estimates.rejected[:, i], np.nan, held[name])
+        for i, name in enumerate(PAPER_OUTPUTS)
+    }
+    return replace(held, values=dict(held.values) | accepted)

@@ -1,7 +1,7 @@
 """Tests of the innovations: whether they are as large as the filter expects, and white."""
 
 from dataclasses import dataclass
-from math import isnan, sqrt
+from math import isnan, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,11 +38,11 @@ class ResidualSummary:
         Root mean square, in `unit`.
     mean_nis
         Mean of the normalised innovation squared, (innovation / expected std)²; 1 if the filter's
-        noise is right.
+        noise is right. NaN where the output is constant: it has no noise to compare with.
     nis_band
         The 99 % band of that mean for white innovations.
     whiteness_p
-        The p-value of the whiteness test; NaN with too few samples.
+        The p-value of the whiteness test; NaN with too few samples, or for a constant output.
     rejected
         The number of measurements rejected by the gate.
     """
@@ -58,8 +58,13 @@ class ResidualSummary:
 
     @property
     def white(self) -> bool | None:
-        """Whether the test at 1 % does not reject whiteness; None with too few samples."""
+        """Whether the test at 1 % does not reject whiteness; None where it was not tested."""
         return None if isnan(self.whiteness_p) else self.whiteness_p >= SIGNIFICANCE
+
+    @property
+    def judged(self) -> bool:
+        """Whether the innovations can be compared with what the filter expects."""
+        return not isnan(self.mean_nis)
 
     @property
     def consistent(self) -> bool:
@@ -92,10 +97,21 @@ class ResidualTest:
     noise_measured
         Whether the noise that the filter expects was estimated from the same log, by its third
         differences (`signal_stats.NoiseLevel`), so that it is itself uncertain.
+    constant
+        Whether the measured output never changes, as that of a dead sensor: nothing is judged.
     """
 
-    def __init__(self, name: str, unit: str, median_step: float, *, noise_measured: bool) -> None:
+    def __init__(
+        self,
+        name: str,
+        unit: str,
+        median_step: float,
+        *,
+        noise_measured: bool,
+        constant: bool = False,
+    ) -> None:
         self._name, self._unit, self._noise_measured = name, unit, noise_measured
+        self._constant = constant
         self._innovations, self._normalised = Moments(), Moments()
         self._products, self._rejected = _Products(median_step), 0
 
@@ -124,14 +140,15 @@ class ResidualTest:
         count = self._innovations.count
         variance = MEASURED_NOISE_VARIANCE if self._noise_measured else STATED_NOISE_VARIANCE
         half_width = BAND_99 * sqrt(variance / count) if count else float("nan")
+        whiteness_p = self._products.whiteness(self._innovations.mean, count)
         return ResidualSummary(
             name=self._name,
             unit=self._unit,
             count=count,
             rms=sqrt(self._innovations.mean_square),
-            mean_nis=self._normalised.mean_square,
+            mean_nis=nan if self._constant else self._normalised.mean_square,
             nis_band=(1 - half_width, 1 + half_width),
-            whiteness_p=self._products.whiteness(self._innovations.mean, count),
+            whiteness_p=nan if self._constant else whiteness_p,
             rejected=self._rejected,
         )
 

@@ -1,7 +1,6 @@
 """Stages of a replay, chunk by chunk: filter, disturbance observer, regression, tests, track."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +13,12 @@ from shiplog import Signals
 from shiplog.screening import ScreenedLog
 from shiplog.ships.paper import PAPER_OUTPUTS
 
-from .estimator_design import diverged, make_estimators
+from .estimator_design import (
+    diverged,
+    make_estimators,
+    require_settings_of_observer,
+    without_rejected,
+)
 from .passes import weak_form_on_clock
 from .plan import Plan
 from .replay_results import Findings, ReplayChunk
@@ -34,7 +38,7 @@ class Stages:
     """
 
     def __init__(self, plan: Plan) -> None:
-        self._plan = plan
+        self._plan, self._unchecked = plan, True
         self._filter, self._observer = make_estimators(plan)
         self._residual_tests = [_residual_test(plan, i) for i in range(len(PAPER_OUTPUTS))]
         weak_form = weak_form_on_clock(
@@ -78,7 +82,10 @@ class Stages:
                 estimates.innovation_stds[:, i],
                 estimates.rejected[:, i],
             )
-        disturbance = self._observer.step(_without_rejected(held, estimates), following)
+        disturbance = self._observer.step(without_rejected(held, estimates), following)
+        if self._unchecked and not disturbance.is_finite:
+            self._unchecked = False
+            require_settings_of_observer(self._plan)
         yaw_rows, surge_rows = self._weak_form.step(signals, self._plan.stats.max_speed)
         self._change_test.add(yaw_rows, surge_rows)
         return ReplayChunk(
@@ -143,16 +150,8 @@ def _excess_warnings(plan: Plan, share: float) -> list[str]:
 def _residual_test(plan: Plan, output: int) -> ResidualTest:
     """Set up the test of the innovations of yaw rate, 0, or speed, 1."""
     name, interval = PAPER_OUTPUTS[output], float(plan.stats.intervals[output])
-    unit, noise_measured = plan.log_stats[name].unit, plan.noise.measured[output]
-    return ResidualTest(name, unit, interval, noise_measured=noise_measured)
-
-
-def _without_rejected(held: Signals, estimates: Estimates) -> Signals:
-    """Return the signals with the samples that the filter rejected set to NaN."""
-    if not estimates.rejected.any():
-        return held
-    accepted = {
-        name: np.where(estimates.rejected[:, i], np.nan, held[name])
-        for i, name in enumerate(PAPER_OUTPUTS)
-    }
-    return replace(held, values=dict(held.values) | accepted)
+    channel, noise_measured = plan.log_stats[name], plan.noise.measured[output]
+    low, high = channel.value_range
+    return ResidualTest(
+        name, channel.unit, interval, noise_measured=noise_measured, constant=low == high
+    )

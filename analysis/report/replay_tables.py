@@ -69,9 +69,9 @@ def _residual_table(findings: Findings) -> TextTable:
         cells = (
             f"{_words(residuals.name)} [{unit}]",
             f"{rms:.3g}",
-            f"{residuals.mean_nis:.3f}",
-            f"{low:.2f}–{high:.2f}",
-            f"{residuals.whiteness_p:.2g}",
+            f"{residuals.mean_nis:.3f}" if residuals.judged else "not judged",
+            f"{low:.2f}–{high:.2f}" if residuals.judged else "",
+            f"{residuals.whiteness_p:.2g}" if residuals.judged else "",
             f"{residuals.rejected}",
         )
         rows.append(cells)
@@ -104,11 +104,13 @@ def _filter_remarks(findings: Findings) -> Iterator[str]:
 
 def _residual_remark(residuals: ResidualSummary) -> str:
     """Describe the size and the whiteness of an output's innovations in a sentence."""
+    name = _words(residuals.name)
+    if not residuals.judged:
+        return f"{name}: innovations not judged, since the measurement is constant or missing."
     size = "as large as expected"
     if not residuals.consistent:
         larger = residuals.mean_nis > residuals.nis_band[1]
         size = f"{'larger' if larger else 'smaller'} than expected"
-    name = _words(residuals.name)
     if residuals.white is None:
         return f"{name}: innovations {size}; too few samples to test whether they are white."
     if residuals.white:

@@ -9,6 +9,7 @@ import pytest
 from filter_runs import FILTERS
 from trial_logs import as_log
 
+from analysis.disturbance import observer
 from analysis.filters.base import WAVE_SETTINGS
 from analysis.filters.factory import filter_kind
 from analysis.replay.replay import analyse
@@ -124,6 +125,22 @@ def test_a_setting_that_no_filter_complies_with_is_named(
 ) -> None:
     log = short_log(rate_hz, 600.0 if rate_hz < 1 else 60.0)
     require_named_or_finite(log, {"filter.kind": kind, key: value}, key)
+
+
+@pytest.mark.parametrize("models", [["constant"], ["ramp"]])
+def test_a_setting_at_which_the_observer_diverges_is_named(models: list[str]) -> None:
+    settings = {"disturbance.models": models, "disturbance.yaw_frequency": 0.001}
+    with pytest.raises(UsageError, match=r"^disturbance\.yaw_frequency = 0\.001 makes the dist"):
+        analyse(short_log(0.1, 600.0), settings=settings)
+
+
+def test_an_observer_that_diverges_with_any_setting_leaves_the_other_results(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(observer, "MAX_DISTURBANCE", 0.0)
+    found = analyse(short_log(), settings={"disturbance.yaw_frequency": 0.02})
+    assert np.isnan(found.disturbance.yaw).all()
+    assert np.isfinite(found.estimates.states).all()
 
 
 def test_a_wave_in_samples_too_slow_for_it_is_named() -> None:

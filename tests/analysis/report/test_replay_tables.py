@@ -4,6 +4,7 @@ import numpy as np
 
 from analysis.replay.replay import analyse
 from analysis.replay.replay_results import Analysis
+from analysis.report.replay_json import replay_json
 from analysis.report.replay_tables import replay_markdown, replay_tables
 from shiplog import TrialLog
 from shiplog.types import Event
@@ -44,6 +45,19 @@ def test_the_filter_is_named_on_the_page(zigzag_log: TrialLog) -> None:
     settings = {"filter.kind": "extended", "filter.smooth": True}
     page = replay_markdown(analyse(zigzag_log, settings=settings).findings)
     assert "Filter: extended, smoothed" in page
+
+
+def test_the_innovations_of_a_stuck_gyro_are_not_judged(zigzag_log: TrialLog) -> None:
+    channels = [
+        replace(c, values=np.full(len(c), 1e-3)) if c.name == "yaw_rate" else c for c in zigzag_log
+    ]
+    findings = analyse(replace(zigzag_log, channels=tuple(channels))).findings
+    rows = {row[0]: row for table in replay_tables(findings) for row in table.rows}
+    assert rows["yaw rate [deg/s]"][2:5] == ("not judged", "", "")
+    assert float(rows["speed [kn]"][2]) > 0
+    page = replay_markdown(findings)
+    assert "yaw rate: innovations not judged, since the measurement is constant" in page
+    assert replay_json(findings)["residuals"]["yaw_rate"]["mean_nis"] is None
 
 
 def test_warnings_are_on_the_page(zigzag_analysis: Analysis) -> None:
