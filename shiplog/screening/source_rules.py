@@ -18,6 +18,7 @@ from .compared_source import (
 
 MIN_COVERAGE_SHARE = 0.5  # of the most complete source; one that has less is not used
 DECISIVE_RATIO = 1.5  # between two sources' errors, or their rates, for one to be better
+EFFECT_RATIO = 1.2  # the same between rudders, whose residuals are mostly those of a coarse model
 MAX_CURRENT = 2.5  # m/s, by which speeds through the water and over the ground may differ
 GROUND_SOURCES = re.compile("sog|gps|gnss|ground|vtg|rmc|bottom")  # names of such sources
 MIN_ZERO_DIFFERENCE = 0.5  # deg of rudder on a straight course
@@ -54,8 +55,8 @@ def best_source(comparison: SourceComparison) -> tuple[ComparedSource, str]:
     """Return the source of a quantity to use, and why, in words."""
     sources, reason = comparison.sources, ""
     for rule in (
-        _alive, _complete, _by_range, _by_other_quantity, _through_water, _by_median, _by_zero,
-        _by_rate,
+        _alive, _complete, _by_range, _by_other_quantity, _through_water, _by_effect, _by_median,
+        _by_zero, _by_rate,
     ):  # fmt: skip
         kept = rule(replace(comparison, sources=sources))
         if kept is not None and 0 < len(kept[0]) < len(sources):
@@ -110,6 +111,16 @@ def _through_water(comparison: SourceComparison) -> _Kept:
     return kept, "through the water; the others are over the ground by their names"
 
 
+def _by_effect(comparison: SourceComparison) -> _Kept:
+    """Keep the rudders that explain the yaw rate; one that is stuck for a time does not."""
+    residuals = [effect.residual for effect in _rudder_effects(comparison)]
+    if not residuals or not np.isfinite(residuals).all():
+        return None
+    limit = EFFECT_RATIO * min(residuals)
+    kept = [s for s, r in zip(comparison.sources, residuals, strict=True) if r <= limit]
+    return kept, "the others do not explain the yaw rate"
+
+
 def _by_median(comparison: SourceComparison) -> _Kept:
     """Keep the sources close to the median of three or more."""
     sources = comparison.sources
@@ -126,10 +137,9 @@ def _by_median(comparison: SourceComparison) -> _Kept:
 
 def _by_zero(comparison: SourceComparison) -> _Kept:
     """Keep the rudder that is nearest to zero where it does not turn the ship."""
-    rate = comparison.references.get("yaw_rate")
-    if comparison.name != "rudder" or rate is None:
+    zeros = [effect.zero for effect in _rudder_effects(comparison)]
+    if not zeros:
         return None
-    zeros = [_rudder_zero(s.values, rate.values, comparison.clock) for s in comparison.sources]
     zeros_deg = np.degrees(zeros)
     if not np.isfinite(zeros_deg).all() or np.ptp(np.abs(zeros_deg)) < MIN_ZERO_DIFFERENCE:
         return None
@@ -138,25 +148,51 @@ def _by_zero(comparison: SourceComparison) -> _Kept:
     return [comparison.sources[best]], words
 
 
-def _rudder_zero(rudder: FloatArray, rate: FloatArray, clock: FloatArray) -> float:
-    """Return the angle at which a rudder does not turn the ship, rad; NaN if undetermined.
+@dataclass(frozen=True)
+class _RudderEffect:
+    """Effect of a rudder on the yaw rate; NaN where undetermined.
 
-    r(t + W) - r(t) = a ∫r + b ∫δ + c W is solved for a, b and c; the angle is -c / b.
+    Attributes
+    ----------
+    zero
+        The angle at which it does not turn the ship, rad.
+    residual
+        Rms of the change of the yaw rate over `SMOOTHING_SECS` that it does not explain, rad/s.
+    """
+
+    zero: float = np.nan
+    residual: float = np.nan
+
+
+def _rudder_effects(comparison: SourceComparison) -> list[_RudderEffect]:
+    """Return the effect of each source of the rudder; none of another quantity."""
+    rate = comparison.references.get("yaw_rate")
+    if comparison.name != "rudder" or rate is None:
+        return []
+    return [_rudder_effect(s.values, rate.values, comparison.clock) for s in comparison.sources]
+
+
+def _rudder_effect(rudder: FloatArray, rate: FloatArray, clock: FloatArray) -> _RudderEffect:
+    """Return the effect of one rudder.
+
+    r(t + W) - r(t) = a ∫r + b ∫δ + c W is solved for a, b and c; the zero is -c / b.
     """
     known = np.isfinite(rudder) & np.isfinite(rate)
     dt = float(clock[1] - clock[0])
     width = max(round(SMOOTHING_SECS / dt), 1)
     if np.count_nonzero(known) < MIN_INSTANTS + width:
-        return np.nan
+        return _RudderEffect()
     columns = np.column_stack((rate, rudder, np.ones_like(rate)))
     sums = np.cumsum(np.where(known[:, None], columns, 0.0), axis=0) * dt
     gaps = np.cumsum(~known)
     whole = (gaps[width:] == gaps[:-width]) & known[:-width]
     X, y = (sums[width:] - sums[:-width])[whole], (rate[width:] - rate[:-width])[whole]
     if len(y) < MIN_INSTANTS:
-        return np.nan
-    (_, effect, constant), _, rank, _ = np.linalg.lstsq(X, y, rcond=1e-9)
-    return float(-constant / effect) if rank == 3 and effect != 0 else np.nan
+        return _RudderEffect()
+    theta, _, rank, _ = np.linalg.lstsq(X, y, rcond=1e-9)
+    if rank < 3 or theta[1] == 0:
+        return _RudderEffect()
+    return _RudderEffect(float(-theta[2] / theta[1]), root_mean_square(y - X @ theta))
 
 
 def _by_rate(comparison: SourceComparison) -> _Kept:

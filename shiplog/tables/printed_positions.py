@@ -8,7 +8,7 @@ from shiplog.types import FloatArray
 
 LIMITS = {"latitude": 91.0, "longitude": 361.0}  # deg; 91 and 181 are printed without a fix
 _COORDINATE = re.compile(
-    r"(?P<before>[NSEW])?\s*(?P<sign>[+-])?\s*(?P<degrees>\d+(?:\.\d+)?)"
+    r"(?P<before>[NSEW])?\s*(?P<sign>[+-])?\s*(?P<degrees>\d+(?:\.\d+)?(?:e[+-]\d+)?)"
     r"(?:\s*[°º:\s-]\s*(?P<minutes>\d+(?:\.\d+)?)"
     r"(?:\s*['′’:\s]\s*(?:(?P<seconds>\d+(?:\.\d+)?)\s*(?:\"|″|''|”)?)?)?"
     r"|\s*[°º])?\s*(?P<after>[NSEW])?",

@@ -197,7 +197,16 @@ def _impossible_findings(stats: LogStats) -> list[Finding]:
 
 
 def _mostly_impossible(channel: ChannelStats) -> bool:
-    return _impossible(channel)[0] > MIN_IMPOSSIBLE_SHARE * max(channel.samples, 1)
+    """Whether so many different values are impossible that the unit must be wrong.
+
+    One impossible value among possible ones, such as a heading of 3600 deg, is a sentinel; a
+    constant channel in a wrong unit has no other values.
+    """
+    count = _impossible(channel)[0]
+    one_value = 1 < channel.impossible_value[1] == count
+    if one_value and channel.fixes is None and channel.valid > 1:
+        return False
+    return count > MIN_IMPOSSIBLE_SHARE * max(channel.samples, 1)
 
 
 def _impossible(channel: ChannelStats) -> tuple[int, str]:

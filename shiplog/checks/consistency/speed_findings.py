@@ -199,8 +199,8 @@ def _rudder_range_findings(signals: CoarseSignals) -> Iterator[Finding]:
             "unit",
             "rudder",
             f"{topic}: up to {degrees:.0f} deg, beyond what a rudder reaches; likely per cent of "
-            "its maximum or tenths of a degree read as deg, or deg read as rad; change in the "
-            'layout: [rudder] unit = "deg"',
+            "its maximum or tenths of a degree read as deg, to be converted in the table; or deg "
+            'read as rad; then change in the layout: [rudder] unit = "deg"',
         )
     elif 0 < largest < RADIANS_READ_AS_DEGREES and signals.swing > np.radians(15.0):
         yield Finding(

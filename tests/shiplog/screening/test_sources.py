@@ -84,6 +84,18 @@ def test_the_odd_one_of_three_is_not_used(trial: TrialLog) -> None:
     assert "centre differs by" in warning
 
 
+def test_the_right_one_of_three_rudders_that_all_differ_is_used(trial: TrialLog) -> None:
+    def stuck(values: np.ndarray) -> np.ndarray:
+        values[len(values) // 6 :] = values[len(values) // 6]
+        return values
+
+    log = with_source(trial, "rudder", lambda x: 0.5 * x + np.radians(3.0), source="slipping")
+    source, warning = used(with_source(log, "rudder", stuck, source="stuck"), "rudder")
+    assert source == "simulated"
+    assert "slipping = 0.50 x simulated +3 deg" in warning
+    assert "the others do not explain the yaw rate" in warning
+
+
 def test_a_source_with_long_gaps_is_not_used(trial: TrialLog) -> None:
     def mostly_missing(values: np.ndarray) -> np.ndarray:
         values[: 3 * len(values) // 4] = np.nan

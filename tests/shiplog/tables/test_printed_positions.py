@@ -20,6 +20,12 @@ def test_south_and_west_are_negative() -> None:
     assert parse_degrees(["-33.5", ""], "latitude", None, packed=False)[0] == -33.5
 
 
+def test_small_numbers_with_an_exponent_are_degrees() -> None:
+    texts = ["-8.128766703e-05", "2e-5", "1.5E+01"]
+    values = parse_degrees(texts, "latitude", None, packed=False)
+    assert values.tolist() == [-8.128766703e-05, 2e-5, 15.0]
+
+
 def test_an_empty_cell_is_not_measured() -> None:
     values = parse_degrees(["", "1"], "latitude", None, packed=False)
     assert np.isnan(values).tolist() == [True, False]

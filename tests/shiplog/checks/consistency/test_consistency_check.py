@@ -129,6 +129,13 @@ def test_fixes_without_a_position_are_no_wrong_unit(trial: TrialLog) -> None:
     assert "latitude 91.5, longitude 181" in finding.text
 
 
+def test_a_repeated_sentinel_is_no_wrong_unit(trial: TrialLog) -> None:
+    def with_sentinel(values: Values) -> Values:
+        return np.where(np.arange(len(values)) % 4, values, np.radians(3600.0))
+
+    assert not contradictions(changed(trial, heading=with_sentinel))
+
+
 def test_a_mathematical_heading_is_found(trial: TrialLog) -> None:
     findings = contradictions(changed(trial, heading=lambda values: np.pi / 2 - values))
     assert any(f.kind == "sign" and f.text.startswith("/heading") for f in findings), findings
