@@ -41,7 +41,8 @@ class Source(Protocol):
         ------
         tuple
             Samples of one or more channels in SI units, received later than those of the chunk
-            before; and, where the source has them, raw packets and events.
+            before; and, where the source has them, raw packets and events. Nothing where a live
+            source received nothing for a while.
         """
         ...
 

@@ -95,15 +95,17 @@ class LiveSource:
         self._stopped = True
 
     def chunks(self) -> Iterator[tuple[Recordable, ...]]:
-        """Yield what was received about every `BATCH_SECS`, until `stop` or the end of all."""
+        """Yield what was received about every `BATCH_SECS`, until `stop` or the end of all.
+
+        A chunk is empty where nothing was received, so that a display and a rotation go on.
+        """
         steps = [each.stream.steps() for each in self.inputs]
         for each in self.inputs:
             each.live.start()
         try:
             while not self._stopped and not self._all_ended():
                 time.sleep(BATCH_SECS)
-                if items := self._step(steps):
-                    yield items
+                yield self._step(steps)
         finally:
             for each in self.inputs:  # all at once: a reader may take a while to end
                 each.live.request_stop()

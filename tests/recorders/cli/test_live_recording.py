@@ -113,6 +113,56 @@ def test_a_live_trial_is_recorded_marked_and_ended_by_a_signal(
     assert [path.name for path in tmp_path.glob("*.part")] == []
 
 
+def test_what_a_killed_recorder_received_a_second_before_can_be_read(
+    environment: Mapping[str, str], tmp_path: Path
+) -> None:
+    port = _free_port()
+    command = ("record", "numbers", f"udp://127.0.0.1:{port}", "-o", "trial.mcap")
+    with _running(environment, tmp_path, *command) as process:
+        _wait_for_line(process, "recording to trial.mcap")
+        time.sleep(0.3)
+        _send(port, *NEEDED)
+        time.sleep(1.0)
+        process.kill()
+        process.wait(timeout=60)
+    log = read(tmp_path / "trial.mcap.part")
+    assert {channel.name: channel.values.tolist() for channel in log.channels} == {
+        "yaw_rate": [0.01],
+        "speed": [7.5],
+        "rudder": [-0.1],
+        "rpm": [80.0],
+    }
+
+
+def test_a_recording_goes_on_without_stdin_and_when_nobody_reads_its_status(
+    environment: Mapping[str, str], tmp_path: Path
+) -> None:
+    port = _free_port()
+    command = (sys.executable, "-c", CLOSED, f"udp://127.0.0.1:{port}")
+    with subprocess.Popen(
+        command, env=environment, cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    ) as process:
+        _wait_for_line(process, "recording to trial.mcap")
+        assert process.stderr is not None
+        process.stderr.close()
+        time.sleep(0.3)
+        _send(port, *NEEDED)
+        time.sleep(1.0)
+        process.send_signal(signal.SIGTERM)
+        process.wait(timeout=60)
+    assert len(read(tmp_path / "trial.mcap").channels) == 4
+
+
+CLOSED = """
+import os, sys
+sys.stdin = None
+from recorders.cli import live_display
+live_display.LINE_SECS = 0.1
+from shiplog.cli.main import main
+main(["record", "numbers", sys.argv[1], "-o", "trial.mcap"])
+"""
+
+
 def test_a_second_recorder_of_one_log_is_refused_and_the_first_goes_on(
     environment: Mapping[str, str], tmp_path: Path
 ) -> None:

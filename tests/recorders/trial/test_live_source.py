@@ -163,3 +163,11 @@ def test_the_second_signal_has_its_usual_effect() -> None:
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
     assert stops == [True]
+
+
+def test_a_silent_source_yields_empty_chunks_so_that_displays_and_rotations_go_on() -> None:
+    source = _opened(ReceptionClock(), f"udp://127.0.0.1:{_free_port()}")
+    assert isinstance(source, LiveSource)
+    chunks = source.chunks()
+    assert [next(chunks) for _ in range(3)] == [(), (), ()]
+    chunks.close()  # type: ignore[attr-defined]
