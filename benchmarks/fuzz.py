@@ -102,9 +102,14 @@ def fuzz(stream: FuzzedStream, packets: int, seed: int) -> FuzzResult:
 def make_decoder(stream: FuzzedStream) -> Decoder:
     """Make the decoder of a stream, as a recording does."""
     stream_format = load_extension(GROUP, stream.format, StreamFormat, "format")
+    return stream_format.make_decoder(options_of(stream))
+
+
+def options_of(stream: FuzzedStream) -> argparse.Namespace:
+    """Return the options of a stream as the command line parses them."""
     parser = argparse.ArgumentParser()
-    stream_format.configure(parser)
-    return stream_format.make_decoder(parser.parse_args(stream.options))
+    load_extension(GROUP, stream.format, StreamFormat, "format").configure(parser)
+    return parser.parse_args(stream.options)
 
 
 def _batches(stream: FuzzedStream, packets: int, seed: int) -> Iterator[list[Packet]]:

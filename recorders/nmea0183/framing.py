@@ -10,7 +10,7 @@ from itertools import product
 from string import hexdigits
 from typing import NamedTuple
 
-from recorders.streams.packets import MAX_PACKET_BYTES
+from recorders.streams.packets import END_NS, MAX_PACKET_BYTES
 
 DATAGRAM_HEADER = b"UdPbC\0"
 _PIECE = re.compile(rb"(?:\\[^\\]*\\)?[$!][^$!\\]*|[^$!]+")  # a sentence with its TAG block
@@ -193,4 +193,7 @@ def _tag_number(text: str | None) -> int | None:
 
 def _epoch_ns(number: int) -> int:
     """Return a UNIX time in s or, where it is too large for that, in ms, as ns."""
-    return number * 10**9 if number < 10**11 else number * 10**6
+    time_ns = number * 10**9 if number < 10**11 else number * 10**6
+    if time_ns >= END_NS:
+        raise FramingError("malformed TAG block")
+    return time_ns

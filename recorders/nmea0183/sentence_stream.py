@@ -164,9 +164,12 @@ def _is_sentence(line: bytes) -> bool:
 
 def _date(text: str) -> date:
     try:
-        return date.fromisoformat(text)
+        day = date.fromisoformat(text)
     except ValueError:
-        raise UsageError(f"--date takes YYYY-MM-DD, such as 2026-05-01, not {text!r}") from None
+        day = date.min
+    if not 1970 <= day.year < 2262:
+        raise UsageError(f"--date takes YYYY-MM-DD, such as 2026-05-01, not {text!r}")
+    return day
 
 
 def _interval(text: str) -> float:

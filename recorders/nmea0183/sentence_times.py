@@ -238,7 +238,8 @@ class SentenceTimes:
             return []
         lines, first = len(self._held) - self._first, self._first
         step_ns = time_ns - self._time_ns
-        is_gap = self._usual_ns and step_ns > max(_GAP_RATIO * self._usual_ns, _MIN_GAP_NS)
+        usual_ns = max(_GAP_RATIO * self._usual_ns, _MIN_GAP_NS) if self._usual_ns else DAY_NS
+        is_gap = step_ns > usual_ns
         if is_gap:
             self._warn(f"no times for {step_ns * 1e-9:.0f} s: lines may be missing", self._time_ns)
         if not is_gap and step_ns > 0:

@@ -9,6 +9,7 @@ from .navigation_sentences import FIX_MODES, has_fix, has_mode, has_valid_rmc
 from .sentence_values import is_valid, text_at
 
 _EPOCH = date(1970, 1, 1).toordinal()
+_FIRST_YEAR, _LAST_YEAR = 1970, 2261  # times are 64-bit numbers of ns
 _CENTURY_BREAK = 80  # years of two digits from here on are of the 20th century: GPS began in 1980
 
 
@@ -45,6 +46,8 @@ def _clock(text: str) -> int | None:
 
 
 def _days(year: int, month: int, day: int) -> int:
+    if not _FIRST_YEAR <= year <= _LAST_YEAR:
+        raise ValueError(year)
     return date(year, month, day).toordinal() - _EPOCH
 
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 
 from recorders.streams.counts import StreamCounts
-from recorders.streams.packets import NO_TIME, Batches, Packet
+from recorders.streams.packets import END_NS, NO_TIME, Batches, Packet
 from shiplog.errors import LogError, UsageError
 
 from .line_formats import LineFormat, StampKind
@@ -92,8 +92,12 @@ class LineTimes:
             match = self._format.pattern.fullmatch(packet.data)
             text = match["stamp"] if match else None
             try:
-                lines.append((packet, parse(text) if text else None))
+                stamp = parse(text) if text else None
             except ValueError:
+                stamp = END_NS
+            if stamp is None or 0 <= stamp < END_NS - self._start_ns:
+                lines.append((packet, stamp))
+            else:
                 self._counts.reject("impossible time")
         return lines
 
@@ -119,6 +123,8 @@ class LineTimes:
         if before is None:
             self._begin(stamp)
         elif self._format.stamp is StampKind.INTERVAL:
+            if self._time_ns + stamp >= END_NS:
+                return False
             self._time_ns += stamp
         else:
             alone = following is not None and abs(following - before) <= MAX_BACK_NS

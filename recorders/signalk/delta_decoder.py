@@ -8,7 +8,7 @@ from math import isfinite, nan
 from typing import Any
 
 from recorders.streams.counts import StreamCounts
-from recorders.streams.packets import MAX_PACKET_BYTES, Packet
+from recorders.streams.packets import END_NS, MAX_PACKET_BYTES, Packet
 from recorders.streams.sample_buffer import SampleBuffer
 
 from .signalk_paths import find_target
@@ -159,7 +159,7 @@ def instant_ns(text: object) -> int:
     Raises
     ------
     DeltaError
-        It is no date and time with a zone.
+        It is no date and time with a zone, or not of the years 1970 to 2261.
     """
     try:
         instant = datetime.fromisoformat(text) if isinstance(text, str) else None
@@ -167,7 +167,10 @@ def instant_ns(text: object) -> int:
         instant = None
     if instant is None or instant.tzinfo is None:
         raise DeltaError("time stamp is no date and time with a zone")
-    return (instant - _EPOCH) // timedelta(microseconds=1) * 1000
+    time_ns = (instant - _EPOCH) // timedelta(microseconds=1) * 1000
+    if not 0 <= time_ns < END_NS:
+        raise DeltaError("time stamp outside of the years 1970 to 2261")
+    return time_ns
 
 
 def source_name(update: Mapping[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import NamedTuple
 
+END_NS = 2**63  # in the year 2262: times are 64-bit numbers
 NO_TIME = -1  # `received_ns` of a packet whose time is not known (a file without stamps)
 MAX_PACKET_BYTES = 4096  # a longer line is cut there, and rejected by its decoder
 

@@ -11,10 +11,9 @@ from shiplog.errors import LogError
 from shiplog.tables.printed_times import DAY_NS, HALF_DAY_NS
 
 from .counts import StreamCounts
-from .packets import Batches, Packet
+from .packets import END_NS, Batches, Packet
 
 _SECOND_NS = 10**9
-_MAX_NS = 2**63  # in the year 2262: times are 64-bit numbers
 _ZONE = rb"(Z|[+-]\d\d:?\d\d)?"
 _CLOCK = rb"\d\d:\d\d:\d\d"
 _FRACTION = rb"(?:[.,](\d{1,12}))?"
@@ -171,7 +170,7 @@ class StampReader:
         if fraction:
             unit_ns = self._form.unit_ns or _SECOND_NS
             time_ns += int(fraction[:9].ljust(9, b"0")) * unit_ns // _SECOND_NS
-        return (time_ns, line[match.end() :]) if 0 <= time_ns < _MAX_NS else None
+        return (time_ns, line[match.end() :]) if 0 <= time_ns < END_NS else None
 
     def _whole_ns(self, whole: str, zone: bytes | None) -> int:
         if self._form.unit_ns:

@@ -110,6 +110,14 @@ def test_missing_lines_are_no_slow_lines() -> None:
     assert "no times for 601 s: lines may be missing" in warnings
 
 
+def test_a_first_step_of_years_is_a_gap_and_no_rate_of_lines() -> None:
+    first, second = datetime(1980, 1, 6, tzinfo=UTC), datetime(2026, 5, 1, 12, tzinfo=UTC)
+    times, warnings = _stamped(_lines(*[HDT] * 50, _at(0, first), _at(0, second), *[HDT] * 400))
+    assert times[:51] == [first.timestamp()] * 51
+    assert times[51:] == [second.timestamp()] * 401
+    assert any(text.startswith("no times for") for text in warnings)
+
+
 def test_a_clock_set_back_is_followed_with_a_warning() -> None:
     lines = [_at(n) for n in range(100, 120)] + [_at(n) for n in range(30)]
     times, warnings = _stamped(_lines(*lines))

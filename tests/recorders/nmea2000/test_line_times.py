@@ -127,7 +127,22 @@ def test_stamps_that_go_back_a_little_stay_as_they_are() -> None:
     assert times_of("canboat", lines)[0] == [3 * SECOND_NS, SECOND_NS, 4 * SECOND_NS]
 
 
-@pytest.mark.parametrize("stamp", ["2016-13-09T16:41:09Z", "2015-02-29T00:00:00Z"])
+def test_intervals_beyond_the_times_of_a_log_are_rejected() -> None:
+    lines = [candump(secs) for secs in (0.0, 1.0, 5e9, 5e9, 1.0)]
+    times, counts = times_of("candump-intervals", lines)
+    assert times == [0, SECOND_NS, 5 * 10**18 + SECOND_NS, 5 * 10**18 + 2 * SECOND_NS]
+    assert counts.rejected == {"stamp out of order": 1}
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        "2016-13-09T16:41:09Z",
+        "2015-02-29T00:00:00Z",
+        "9999-01-01T00:00:00Z",
+        "1950-01-01T00:00:00Z",
+    ],
+)
 def test_an_impossible_date_is_rejected_once(stamp: str) -> None:
     lines = [canboat("2016-01-01T00:00:00Z"), canboat(stamp), canboat("2016-01-01T00:00:01Z")]
     times, counts = times_of("canboat", lines, size=1)

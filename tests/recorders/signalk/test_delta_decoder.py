@@ -192,6 +192,14 @@ def test_a_flood_of_greetings_names_few_own_ships() -> None:
     assert counts.unused == {"no delta": 1000, "delta of another ship": 1}
 
 
+@pytest.mark.parametrize("time", ["9999-12-31T00:00:00Z", "1950-01-01T00:00:00Z"])
+def test_times_that_no_log_can_hold_are_rejected(time: str) -> None:
+    turn = ("navigation.rateOfTurn", 0.01)
+    decoded = decode_file(SIGNALK, [delta(turn), delta(turn, time=time), delta(turn)])
+    assert decoded.channels["/yaw_rate/n2k.204"].received_ns.tolist() == [TIME_NS, TIME_NS]
+    assert decoded.counts.rejected == {"time stamp outside of the years 1970 to 2261": 1}
+
+
 def test_a_file_without_times_is_refused() -> None:
     line = b'{"updates": [{"values": [{"path": "navigation.headingTrue", "value": 1}]}]}'
     with pytest.raises(LogError, match="no delta has a time"):
