@@ -223,9 +223,12 @@ def fit_problem(
             break
     minimum = min(minima, key=lambda each: each.cost)
     if not np.isfinite(minimum.cost):
+        fixed = (i for i in range(len(problem.values)) if i not in problem.free)
+        given = ", ".join(f"{problem.model.names[i]} = {problem.values[i]:g}" for i in fixed)
         raise LogError(
             f"the simulation of model {problem.model.name} diverges from every start; check the "
-            f"signs and units of the channels, or fit another model: {_names(problem.segments)}"
+            f"signs and units of the channels{f' and the fixed {given}' if given else ''}, or fit "
+            f"another model: {_names(problem.segments)}"
         )
     fit = reweighted_fit(problem, minimum)
     return _with_fine_weights(_with_waves(fit) if waves else fit)
