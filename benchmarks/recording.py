@@ -85,8 +85,6 @@ def measure_load(rate_hz: float, secs: float, folder: Path) -> LoadResult:
     folder
         Where the log is written.
     """
-    from recorders.record import Recording  # noqa: F401, PLC0415 - fail early without the package
-
     sentences = [sentence(n) for n in range(int(rate_hz * secs))]
     log, port = folder / "load.mcap", _free_port()
     command = ("record", "nmea0183", f"udp://127.0.0.1:{port}", "-o", os.fspath(log))

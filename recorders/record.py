@@ -2,6 +2,8 @@
 
 import os
 import re
+import signal
+import threading
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
@@ -216,6 +218,8 @@ class _RecordedPart:
         )
         try:
             end = self._write_all(writer, chunks, on_chunk)
+        except KeyboardInterrupt:  # the file is complete
+            end = _End.INTERRUPTED
         except ShiplogError as error:
             if writer.messages:
                 message = f"{error}; the {writer.samples} samples until then are in {self._part}"
@@ -248,10 +252,8 @@ class _RecordedPart:
         """Write chunks, and whatever ends them, the metadata of the end."""
         try:
             return self._write_chunks(writer, chunks, on_chunk)
-        except KeyboardInterrupt:
-            return _End.INTERRUPTED
         finally:
-            with _write_errors(), writer:
+            with _write_errors(), _uninterrupted(), writer:
                 # those that have changed, such as counts of rejected packets
                 writer.update_metadata(self._source.metadata)
 
@@ -263,7 +265,7 @@ class _RecordedPart:
     ) -> _End:
         opened = time.monotonic()
         for chunk in chunks:
-            with _write_errors():
+            with _write_errors(), _uninterrupted():
                 writer.write(*chunk)
                 writer.flush()
                 size = self._part.stat().st_size  # fails, too, where the file was deleted
@@ -294,3 +296,19 @@ def _write_errors() -> Iterator[None]:
         raise
     except OSError as error:
         raise ShiplogError(f"cannot write: {error.strerror or error}") from error
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Delay Ctrl-C to the end of the block: a write that it interrupts would damage the file."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    pressed: list[int] = []
+    previous = signal.signal(signal.SIGINT, lambda number, _frame: pressed.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+        if pressed:
+            signal.raise_signal(signal.SIGINT)

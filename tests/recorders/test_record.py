@@ -1,6 +1,7 @@
 """The loop that records: all samples kept, whatever ends it."""
 
 import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from places import PROJECT
 from recorders.record import Recording, Rotation, record
 from recorders.source import Recordable
 from shiplog import Channel, ShiplogError, read
+from shiplog.mcap.record_writer import McapRecordWriter
+from shiplog.mcap.records import MAGIC
 from shiplog.types import Event, RawPackets
 
 
@@ -231,3 +234,30 @@ def test_the_source_is_closed_when_the_writing_fails(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError):
         record(Closing(), tmp_path / "a.mcap", on_chunk=fail)
     assert closed == [True]
+
+
+@pytest.mark.parametrize("instant", ["first chunk", "end"])
+def test_ctrl_c_in_the_middle_of_a_write_damages_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, instant: str
+) -> None:
+    counts = list[int]()
+
+    def interrupted(self: McapRecordWriter, data: bytes) -> None:
+        counts.append(len(data))
+        self._stream.write(data)
+        if (len(counts) == 6) if instant == "first chunk" else (self._size > 0 and data == MAGIC):
+            signal.raise_signal(signal.SIGINT)
+        self._size += len(data)
+
+    monkeypatch.setattr(McapRecordWriter, "_write", interrupted)
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        recording = record(Sensor(), tmp_path / "a.mcap")
+    finally:
+        signal.signal(signal.SIGINT, previous)
+    assert recording.interrupted
+    log = read(tmp_path / "a.mcap")
+    assert not log.warnings
+    assert len(log["yaw_rate"]) == recording.samples >= 10
+    with (tmp_path / "a.mcap").open("rb") as stream:
+        assert len(list(make_reader(stream, validate_crcs=True).iter_messages())) >= 10
