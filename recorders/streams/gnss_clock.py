@@ -21,6 +21,7 @@ _BLOCK = 30  # latencies between comparisons of medians
 _BUFFER = 4096
 _SILENCE_NS = 10 * 10**9  # a receiver's time is continued so long
 _MAX_SOURCES = 64
+_MAX_LATENCIES = 1 << 16  # kept of each kind of sentence: the sources are those of the wire
 
 Warn = Callable[[str, int | None], None]
 """Takes a warning and its time, ns since 1970-01-01 UTC; None is the end of the stream."""
@@ -70,7 +71,7 @@ class Latency:
     """
 
     def __init__(self) -> None:
-        self._values = Quantiles()
+        self._values = Quantiles(_MAX_LATENCIES)
         self._buffer: list[float] = []
         self._block: list[float] = []
         self._block_median: float | None = None

@@ -10,11 +10,16 @@ RUN_LENGTH = 256  # neighbouring values are kept or dropped together, so that th
 
 
 class Quantiles:
-    """A stream of values, whole up to `MAX_VALUES`, beyond that a pseudo-random part of it.
+    """A stream of values, whole up to a number of them, beyond that a pseudo-random part of it.
 
-    The part has between about half of `MAX_VALUES` and all of it. Which values are kept depends
+    The part has between about half of this number and all of it. Which values are kept depends
     only on their position in the stream, by a hash: not on the values, nor on where the chunks
     are cut.
+
+    Parameters
+    ----------
+    most
+        The number of values that are kept at the most.
 
     Examples
     --------
@@ -26,7 +31,8 @@ class Quantiles:
     2.0
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MAX_VALUES) -> None:
+        self._most = most
         self._parts: list[FloatArray] = []
         self._kept = self._added = self._level = 0
 
@@ -40,7 +46,7 @@ class Quantiles:
             values = values[keep[offset : offset + len(values)]]
         self._parts.append(np.array(values))
         self._kept += len(values)
-        while self._kept > MAX_VALUES:
+        while self._kept > self._most:
             self._drop_half()
 
     @property

@@ -1,5 +1,7 @@
 """Tests of recorders.streams.gnss_clock."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -133,3 +135,15 @@ def test_the_number_of_receivers_is_bounded() -> None:
     run = _Run()
     times = [run.clock.set_time(f"T{n}", "ZDA", Utc(0, None), 0) for n in range(100)]
     assert times.count(None) == 36
+
+
+def test_the_memory_of_latencies_is_bounded() -> None:
+    latency = Latency()
+    tracemalloc.start()
+    for n in range(300_000):
+        latency.add(n % 100 * 0.01)
+    kept, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert kept < 1_000_000
+    assert latency.count == 300_000
+    assert latency.quantiles() == pytest.approx((0.495, 0.05, 0.94), abs=0.02)
