@@ -17,6 +17,7 @@ MAX_WAITING_BYTES = 64 << 20  # of their data: datagrams can be long
 BATCH_SECS = 0.25  # between the batches of a live stream
 RECEIVE_SECS = 0.2  # how long a reader waits, so that it notices the end of the recording
 FIRST_RETRY_SECS, LONGEST_RETRY_SECS = 0.5, 10.0
+DROP_REPORT_SECS = 10.0  # between the events of drops, so that a flood does not flood the log, too
 
 
 class StreamState(Enum):
@@ -65,6 +66,7 @@ class LiveStream:
         self._thread = threading.Thread(target=self._run, name=f"reader of {name}", daemon=True)
         self._lost_ns: int | None = None
         self._reported_drops = 0
+        self._next_drop_report = 0.0  # by the monotonic clock, s
         self.state = StreamState.CONNECTING
         self.fault = ""
         self._dropped = 0
@@ -97,11 +99,15 @@ class LiveStream:
             taken, self._waiting, self._waiting_bytes = self._waiting, [], 0
         return taken
 
-    def take_events(self) -> list[Event]:
-        """Return the gaps and drops of the stream since the last call."""
-        dropped = self.dropped
-        if dropped > self._reported_drops:
+    def take_events(self, *, last: bool = False) -> list[Event]:
+        """Return the gaps and drops of the stream since the last call.
+
+        Drops are reported about every `DROP_REPORT_SECS`, and the rest of them at the last call.
+        """
+        dropped, now_secs = self.dropped, time.monotonic()
+        if dropped > self._reported_drops and (last or now_secs >= self._next_drop_report):
             count, self._reported_drops = dropped - self._reported_drops, dropped
+            self._next_drop_report = now_secs + DROP_REPORT_SECS
             self._report(f"{count} packets dropped: they came faster than they were recorded")
         return [self._events.popleft() for _ in range(len(self._events))]
 

@@ -124,7 +124,7 @@ class LiveSource:
         items: list[Recordable] = []
         for each, stream_steps in zip(self.inputs, steps, strict=True):
             items += next(stream_steps, ())
-            items += each.live.take_events()
+            items += each.live.take_events(last=last)
             items += each.stream.finish() if last else ()
         items += self.take_marks()
         self.status.add(items)

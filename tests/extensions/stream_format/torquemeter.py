@@ -10,7 +10,8 @@ from recorders.streams.packets import Batches, Packet
 from recorders.streams.sample_buffer import SampleBuffer
 from shiplog import UsageError
 
-LINE = re.compile(rb"T(\d+\.?\d*) N(-?\d+\.?\d*) Q(-?\d+\.?\d*)")  # s, rpm, kNm
+NUMBER = r"\d{1,9}\.?\d{0,6}"  # bounded: a long row of digits is infinite
+LINE = re.compile(f"T({NUMBER}) N(-?{NUMBER}) Q(-?{NUMBER})".encode())  # s, rpm, kNm
 
 
 class TorquemeterDecoder:

@@ -162,6 +162,18 @@ def test_packets_dropped_by_the_system_are_counted_and_an_event() -> None:
     assert stream.dropped == 7
 
 
+def test_drops_of_a_long_flood_are_few_events_that_count_all_of_them() -> None:
+    transport = _Scripted()
+    stream = LiveStream(transport, ReceptionClock(), "gyro")
+    texts: list[str] = []
+    for _ in range(100):
+        transport.lost += 5
+        texts += [event.text for event in stream.take_events()]
+    texts += [event.text for event in stream.take_events(last=True)]
+    assert [int(text.split()[0]) for text in texts] == [5, 495]
+    assert stream.take_events(last=True) == []
+
+
 def test_a_reader_that_is_not_connected_is_not_waited_for() -> None:
     class Hanging(_Scripted):
         def open(self) -> None:
