@@ -9,6 +9,7 @@ from .channel_stats import ChannelStats, LogStats, is_rudder_order
 from .on_change import INTERPOLATION_KEY, INTERPOLATIONS
 
 MAX_IRREGULAR_SHARE = 0.1  # of the intervals
+MAX_RUDDER_INTERVAL_SECS = 5.0  # a steering gear moves a rudder by 12 deg in it
 MIN_SAMPLES_PER_STAMP = 1.5  # from which the time stamps are taken to be coarse
 MIN_TAIL_SECS = 10.0  # held at the end of a log, below which nothing is reported
 MIN_ROWS_PER_VALUE = 1.5  # from which a table is taken to have empty cells on purpose
@@ -85,6 +86,12 @@ def hold_warnings(channel: ChannelStats, end_ns: int) -> Iterator[str]:
                 f"held at its last value for the last {after:.1f} s of the log, longer than "
                 f"between any of its {samples}; if the sensor was lost, cut the log there"
             )
+    if channel.name == "rudder" and not hold and channel.interval_secs > MAX_RUDDER_INTERVAL_SECS:
+        yield (
+            f"sampled every {channel.interval_secs:.3g} s, in which a rudder moves from side to "
+            "side: what it did between the samples is not known, and coefficients may be wrong by "
+            "more than their intervals; record it every second"
+        )
     if is_rudder_order(channel):
         jump = f" (changes of up to {_displayed(channel, hold.largest_step)})" if hold else ""
         effect = (

@@ -107,6 +107,17 @@ def test_a_commanded_channel_may_be_constant() -> None:
     assert warnings_of(channel(values, name="rudder"), channel(values, name="rpm")) == []
 
 
+@pytest.mark.parametrize(("secs", "reported"), [(1, False), (4, False), (10, True)])
+def test_a_rudder_with_unknown_movements_between_its_samples_is_reported(
+    secs: int, reported: bool
+) -> None:
+    stamps = START + 10**9 * secs * np.arange(100)
+    angles = np.radians(20.0) * np.sin(np.arange(100.0))
+    rudder = Channel("rudder", "a", "rad", stamps, stamps, angles)
+    expected = [f"/rudder/a: sampled every {secs} s"] if reported else []
+    assert [text.split(",")[0] for text in warnings_of(rudder)] == expected
+
+
 def test_a_short_run_and_a_constant_channel_are_not_stuck() -> None:
     values = noise()
     values[100:140] = 0.0
