@@ -374,7 +374,7 @@ def test_a_model_without_an_observer_is_refused_as_divergent(
 ) -> None:
     away = replace(vessel, coefficients=vessel.coefficients._replace(**changes))
     with pytest.raises(LogError, match="diverges"):
-        analyse(zigzag_log, away)
+        analyse(zigzag_log, ReadingOptions(away))
 
 
 def test_the_chunks_of_a_replay_can_be_read_once(zigzag_log: TrialLog) -> None:
