@@ -18,44 +18,22 @@ from shiplog.extensions import extension_names, load_extension
 from shiplog.files import is_device
 
 GROUP = "shiplog.recorders"
-TRIAL = "TRIAL"  # the file itself, whose name ends with .toml
+TRIAL = "trial"  # the source that `record FILE.toml` is short for
 DRY_RUN_SECS = 10.0
 
 
-class _Parsers(dict[str, argparse.ArgumentParser]):
-    """The parsers of the sources by name; any name of a TOML file is that of a trial file."""
+def _expand(arguments: Sequence[str]) -> list[str]:
+    """Return the arguments with the source `TRIAL` before the name of a trial file.
 
-    def __contains__(self, name: object) -> bool:
-        return super().__contains__(name) or _is_trial(name)
-
-    def __missing__(self, name: str) -> argparse.ArgumentParser:
-        if not _is_trial(name):
-            raise KeyError(name)
-        return self[TRIAL]
-
-
-def _is_trial(name: object) -> bool:
-    return isinstance(name, str) and name.lower().endswith(".toml")
-
-
-class _SourceAction(argparse._SubParsersAction):  # type: ignore[type-arg]  # noqa: SLF001 - argparse has no public class for it
-    """Subcommands of which one, the trial file, is chosen by the ending of its name."""
-
-    def __init__(self, *arguments: Any, **settings: Any) -> None:  # noqa: ANN401 - argparse's own
-        super().__init__(*arguments, **settings)
-        self._name_parser_map = self.choices = _Parsers()
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: str | Sequence[Any] | None,
-        option_string: str | None = None,
-    ) -> None:
-        """Keep the name of a trial file for its parser."""
-        given = list(values or ())
-        namespace.trial = given[0] if _is_trial(given[0]) else None
-        super().__call__(parser, namespace, given, option_string)
+    Examples
+    --------
+    >>> _expand(["--dry-run", "sea.toml"]), _expand(["nmea0183", "gyro.log"])
+    (['--dry-run', 'trial', 'sea.toml'], ['nmea0183', 'gyro.log'])
+    """
+    names = [number for number, text in enumerate(arguments) if not text.startswith("-")]
+    if not names or not arguments[names[0]].lower().endswith(".toml"):
+        return list(arguments)
+    return [*arguments[: names[0]], TRIAL, *arguments[names[0] :]]
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
@@ -65,9 +43,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help=f"listen for {DRY_RUN_SECS:.0f} s, report what is heard, and write nothing",
     )
-    sources = parser.add_subparsers(
-        action=_SourceAction, metavar="SOURCE", dest="source_name", required=True
-    )
+    sources = parser.add_subparsers(metavar="SOURCE", dest="source_name", required=True)
     for name, command in _loaded(GROUP, RecorderCommand, "recorder", sources):
         own = _add_source(sources, name, command.help)
         command.configure(own)
@@ -80,7 +56,10 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         configure_stream(own, stream_format)
         _add_output(own, required=False)
         own.set_defaults(recorder=stream_format)
-    own = _add_source(sources, TRIAL, "all sources of a trial file, into one log")
+    own = _add_source(
+        sources, TRIAL, "all sources of a trial file, into one log; `record FILE.toml` for short"
+    )
+    own.add_argument("trial", metavar="FILE", help="the trial file")
     _add_output(own, required=False)
     own.set_defaults(recorder=None)
 
@@ -148,7 +127,7 @@ def _recorded(arguments: argparse.Namespace) -> Recording:
     if arguments.recorder is None:
         from .stream_commands import record_trial
 
-        return record_trial(_trial_name(arguments), arguments.output)
+        return record_trial(arguments.trial, arguments.output)
     if isinstance(arguments.recorder, RecorderCommand):
         if arguments.output is not None:
             require_outputs(arguments.output)
@@ -178,12 +157,6 @@ def _record_command(command: RecorderCommand[Any], arguments: argparse.Namespace
     return recording
 
 
-def _trial_name(arguments: argparse.Namespace) -> str:
-    if arguments.trial is None:
-        raise UsageError("name a trial file, such as trial.toml")
-    return str(arguments.trial)
-
-
 def _listen(arguments: argparse.Namespace) -> ExitCode:
     """Report what is heard, without writing anything."""
     if isinstance(arguments.recorder, RecorderCommand):
@@ -191,7 +164,7 @@ def _listen(arguments: argparse.Namespace) -> ExitCode:
     from .dry_run import listen_to_stream, listen_to_trial
 
     if arguments.recorder is None:
-        return listen_to_trial(_trial_name(arguments), DRY_RUN_SECS)
+        return listen_to_trial(arguments.trial, DRY_RUN_SECS)
     return listen_to_stream(arguments, arguments.recorder, DRY_RUN_SECS)
 
 
@@ -205,4 +178,5 @@ RECORD = Verb(
         "shiplog record nmea0183 gyro.log -o gyro.mcap",
         "shiplog record --dry-run trial.toml",
     ),
+    expand=_expand,
 )

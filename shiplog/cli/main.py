@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
         parser = _parser(arguments)
-        parsed = parser.parse_args(arguments)
+        parsed = parser.parse_args(_expanded(arguments))
         if "verb" not in parsed:
             parser.print_help(sys.stderr)
             return ExitCode.USAGE
@@ -113,7 +113,7 @@ def _fail(error: object, code: ExitCode) -> ExitCode:
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser: of the verb that is asked for, or, to list them, of all."""
     names = _verb_names()
-    first = next((text for text in arguments if not text.startswith("-")), None)
+    first = _first(arguments)
     asked = first if first in names else None
     parser = argparse.ArgumentParser(
         prog="shiplog",
@@ -135,6 +135,20 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
         verb.configure(own)
         own.set_defaults(verb=verb)
     return parser
+
+
+def _first(arguments: Sequence[str]) -> str | None:
+    """Return the first argument that is no option; it names the verb."""
+    return next((text for text in arguments if not text.startswith("-")), None)
+
+
+def _expanded(arguments: Sequence[str]) -> list[str]:
+    """Return the arguments with the short form of a verb replaced by its full one."""
+    name = _first(arguments)
+    if name is None or name not in _verb_names():
+        return list(arguments)
+    rest = arguments.index(name) + 1
+    return [*arguments[:rest], *_load(name).expand(arguments[rest:])]
 
 
 def _verb_names() -> list[str]:

@@ -1,7 +1,7 @@
 """A verb of the command line, and the exit codes."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -38,6 +38,8 @@ class Verb:
         Modules that libraries import although this verb does not need them, and whose import takes
         long. In the process of the command, a package is not found, as where it is not installed;
         a part of a package, with a dot in its name, is empty.
+    expand
+        Returns the arguments after the verb with a short form replaced by the full one.
     """
 
     help: str
@@ -45,3 +47,4 @@ class Verb:
     run: Callable[[argparse.Namespace], ExitCode]
     examples: tuple[str, ...]
     unneeded: tuple[str, ...] = ()
+    expand: Callable[[Sequence[str]], list[str]] = list

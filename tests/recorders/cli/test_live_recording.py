@@ -212,7 +212,7 @@ def test_a_dry_run_reports_what_is_missing_and_writes_nothing(
         ("record numbers udp://127.0.0.1 -o a.mcap", "host or port is missing"),
         ("record numbers none.txt", "no output; add -o FILE"),
         ("record none.toml", "cannot read the trial file"),
-        ("record TRIAL", "name a trial file"),
+        ("record trial none.toml", "cannot read the trial file"),
         ("record --dry-run simulate spiral -o a.mcap", "--dry-run is for trial files"),
         ("mark none execute", "no recording of it runs here"),
     ],

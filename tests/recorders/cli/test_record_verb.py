@@ -43,3 +43,11 @@ def test_an_unknown_source_is_refused(capsys: pytest.CaptureFixture[str]) -> Non
     with pytest.raises(SystemExit):
         main(["record", "simulated", "spiral", "-o", "a.mcap"])
     assert "invalid choice: 'simulated'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("source", ["none.toml", "--dry-run NONE.TOML", "trial none.toml"])
+def test_the_name_of_a_trial_file_is_short_for_the_source_trial(
+    capsys: pytest.CaptureFixture[str], source: str
+) -> None:
+    assert main(["record", *source.split()]) == 2
+    assert "cannot read the trial file" in capsys.readouterr().err
