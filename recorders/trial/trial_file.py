@@ -25,6 +25,7 @@ MAX_SOURCES = 64
 _SECTIONS = ("output", "vessel", "conditions", "source")
 _OUTPUT_KEYS = ("file", "rotate_minutes", "rotate_megabytes")
 _SOURCE_KEYS = ("name", "format", "address", "raw")
+_RESERVED = ("operator", "recorder")  # sources of events that are of no stream
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
 
@@ -233,6 +234,8 @@ class _Parser:
         name = self._text(table, f"{where}.name", required=True)
         if name and not _NAME.fullmatch(name):
             self._errors.append(f"{where}.name may have letters, digits, _ and - only, at most 32")
+        if name in _RESERVED:
+            self._errors.append(f"{where}.name {name!r} is that of events of the log; give another")
         where = f"source {name!r}" if name else where
         address = self._text(table, f"{where}.address", required=True)
         keep_raw = table.get("raw")

@@ -136,6 +136,10 @@ def test_all_faults_are_reported_at_once_with_the_nearest_names() -> None:
             "[conditions]\ntrim = 0.5\ndraught_aft = 8\ndraught_forward = 8.5",
             "trim 0.5 m contradicts the draughts, whose difference aft minus forward is -0.5 m",
         ),
+        (
+            '[[source]]\nname = "operator"\nformat = "numbers"\naddress = "a.txt"',
+            "source 1.name 'operator' is that of events",
+        ),
         ("[vessel]\nfile = 1", "vessel.file must be a text"),
         ("a" * 200_000, "too long for a trial file"),
     ],
