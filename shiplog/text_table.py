@@ -17,9 +17,12 @@ class TextTable:
         The cells of each row, as many as there are columns.
     remarks
         Sentences below the table.
+    has_prose
+        Whether the cells of the last column are sentences, which may be wrapped.
     """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     remarks: tuple[str, ...] = ()
+    has_prose: bool = False

@@ -70,7 +70,7 @@ def _residual_table(findings: Findings) -> TextTable:
             f"{_words(residuals.name)} [{unit}]",
             f"{rms:.3g}",
             f"{residuals.mean_nis:.3f}" if residuals.judged else "not judged",
-            f"{low:.2f}–{high:.2f}" if residuals.judged else "",
+            f"{max(low, 0.0):.2f}–{high:.2f}" if residuals.judged else "",
             f"{residuals.whiteness_p:.2g}" if residuals.judged else "",
             f"{residuals.rejected}",
         )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from recorders.streams.format import StreamFormat
 from recorders.streams.reception_clock import ReceptionClock
-from recorders.trial.live_source import LiveSource, stopped_by_signals
+from recorders.trial.live_source import LiveInput, LiveSource, stopped_by_signals
 from recorders.trial.open_source import (
     StreamRequest,
     open_streams,
@@ -48,33 +48,40 @@ def _listen(requests: Sequence[StreamRequest], secs: float) -> ExitCode:
         for _ in source.chunks():
             pass
     timer.cancel()
-    print_tables([_state_table(source), _channel_table(source)])
+    channels = _channel_table(source)
+    print_tables([_state_table(source), *([channels] if channels.rows else [])])
     print_tables(stream_tables(each.stream for each in source.inputs))
+    silent = [each.stream.name for each in source.inputs if not _heard(each)]
     missing = source.status.missing
-    if not missing:
+    if silent:
+        print(f"nothing decoded from: {', '.join(silent)}")
+    if missing:
+        print(f"missing for a replay: {', '.join(missing)}")
+    else:
         print("all channels that a replay needs are heard")
-        return ExitCode.OK
-    print(f"missing for a replay: {', '.join(missing)}")
-    return ExitCode.FAILURE
+    return ExitCode.FAILURE if silent or missing else ExitCode.OK
+
+
+def _heard(each: LiveInput) -> int:
+    """Return the number of packets that were decoded."""
+    return sum(each.stream.decoder.counts.accepted.values())
 
 
 def _state_table(source: LiveSource) -> TextTable:
     rows = []
     for each in source.inputs:
         counts = each.stream.decoder.counts
-        decoded, rejected = sum(counts.accepted.values()), sum(counts.rejected.values())
         rows.append(
             (
                 each.stream.name,
-                each.stream.origin,
-                each.live.fault or each.live.state.value,
-                str(decoded),
+                str(_heard(each)),
                 str(sum(counts.unused.values())),
-                str(rejected),
+                str(sum(counts.rejected.values())),
+                f"{each.stream.origin}: {each.live.fault or 'open'}",
             )
         )
-    columns = ("stream", "address", "state", "decoded", "not used", "rejected")
-    return TextTable("Streams", columns, tuple(rows))
+    columns = ("stream", "decoded", "not used", "rejected", "address and state")
+    return TextTable("Streams", columns, tuple(rows), has_prose=True)
 
 
 def _channel_table(source: LiveSource) -> TextTable:

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 LINE_SECS = 10.0  # between the lines where stderr is no terminal
 REFRESHES_PER_SECOND = 4
-MAX_ROWS = 40
+MAX_ROWS = 40  # channels of a line
+FRAME_LINES = 10  # of the live table: its frame, and the lines that are not always there
 MARK_KEY = "m"
 
 
@@ -126,7 +127,7 @@ def live_display(shown: Shown) -> Iterator[Callable[[int], None]]:
 
     def on_chunk(_samples: int) -> None:
         with suppress(OSError):
-            live.update(_status_table(shown))
+            live.update(_status_table(shown, console.height))
 
     with Live(console=console, refresh_per_second=REFRESHES_PER_SECOND, transient=True) as live:
         yield on_chunk
@@ -173,11 +174,16 @@ def _status_line(shown: Shown, samples: int) -> str:
     )
     missing = status.missing
     alarm = f"; no value of {', '.join(missing)}" if missing else ""
+    faults = "".join(
+        f"; {each.stream.name}: {each.live.fault}"
+        for each in shown.source.inputs
+        if each.live.fault
+    )
     sizes = _sizes(shown.growing())
-    return f"{samples} samples, {sizes}: {channels or 'nothing heard'}{alarm}"
+    return f"{samples} samples, {sizes}: {channels or 'nothing heard'}{alarm}{faults}"
 
 
-def _status_table(shown: Shown) -> "Group":
+def _status_table(shown: Shown, height: int) -> "Group":
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text
@@ -188,7 +194,9 @@ def _status_table(shown: Shown) -> "Group":
     table.add_column("channel")
     for heading in ("rate", "age", "last value", "samples"):
         table.add_column(heading, justify="right", no_wrap=True)
-    for channel in source.status.channels[:MAX_ROWS]:
+    channels = source.status.channels
+    room = max(1, height - FRAME_LINES - len(source.inputs))
+    for channel in channels[:room]:
         table.add_row(
             Text(printable(channel.topic)),
             rate_in_words(channel),
@@ -197,7 +205,9 @@ def _status_table(shown: Shown) -> "Group":
             str(channel.samples),
             style="bold red" if channel.stale else None,
         )
-    lines = [Text(printable(text)) for text in _stream_lines(source)]
+    lines = [Text(printable(text), no_wrap=True) for text in _stream_lines(source)]
+    if len(channels) > room:
+        lines.insert(0, Text(f"and {len(channels) - room} more channels"))
     if missing := source.status.missing:
         lines.append(Text(f"no value of {', '.join(missing)}", style="bold red"))
     if mark := source.status.last_mark:

@@ -38,11 +38,7 @@ def _expand(arguments: Sequence[str]) -> list[str]:
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     """Add a subcommand for each source; one that cannot be loaded reports it when used."""
-    parser.add_argument(
-        "--dry-run",
-        action="store_true",
-        help=f"listen for {DRY_RUN_SECS:.0f} s, report what is heard, and write nothing",
-    )
+    _add_dry_run(parser, default=False)
     sources = parser.add_subparsers(metavar="SOURCE", dest="source_name", required=True)
     for name, command in _loaded(GROUP, RecorderCommand, "recorder", sources):
         own = _add_source(sources, name, command.help)
@@ -55,13 +51,25 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         own = _add_source(sources, name, stream_format.help)
         configure_stream(own, stream_format)
         _add_output(own, required=False)
+        _add_dry_run(own)
         own.set_defaults(recorder=stream_format)
     own = _add_source(
         sources, TRIAL, "all sources of a trial file, into one log; `record FILE.toml` for short"
     )
     own.add_argument("trial", metavar="FILE", help="the trial file")
     _add_output(own, required=False)
+    _add_dry_run(own)
     own.set_defaults(recorder=None)
+
+
+def _add_dry_run(parser: argparse.ArgumentParser, *, default: object = argparse.SUPPRESS) -> None:
+    """Add the option before and after the source; the default stands before it."""
+    parser.add_argument(
+        "--dry-run",
+        action="store_true",
+        default=default,
+        help=f"listen for {DRY_RUN_SECS:.0f} s, report what is heard, and write nothing",
+    )
 
 
 def _loaded(group: str, kind: type[Any], noun: str, sources: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - argparse's private class
@@ -116,6 +124,9 @@ def _record(arguments: argparse.Namespace) -> ExitCode:
     )
     if recording.interrupted:
         print("interrupted: the log ends there", file=sys.stderr)
+    if not recording.samples:
+        print("shiplog: no sample was recorded; the events of the log state why", file=sys.stderr)
+        return ExitCode.FAILURE
     if recording.dropped:
         print(f"{recording.dropped} packets came too fast and were dropped", file=sys.stderr)
         return ExitCode.DATA_LOST

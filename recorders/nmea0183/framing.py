@@ -123,6 +123,14 @@ def parse_sentence(line: bytes, *, require_checksum: bool = True) -> Sentence:
     return Sentence(*_parse_address(address, line[:1]), fields, tag)
 
 
+def tag_of(line: bytes) -> TagBlock:
+    """Return the TAG block of a line with a wrong sentence; an empty one where it is wrong too."""
+    try:
+        return _parse_tag(line[1:].partition(b"\\")[0]) if line[:1] == b"\\" else NO_TAG
+    except FramingError:
+        return NO_TAG
+
+
 def _parse_address(address: str, start: bytes) -> tuple[str, str]:
     """Return talker and formatter; both are the whole address if it is proprietary or of AIS."""
     if not address.isalnum():

@@ -10,7 +10,7 @@ from recorders.streams.packets import Packet
 from recorders.streams.sample_buffer import MAX_TOPICS, SampleBuffer
 
 from .environment_sentences import ENVIRONMENT
-from .framing import FramingError, Sentence, parse_sentence, split_packet
+from .framing import FramingError, Sentence, TagBlock, parse_sentence, split_packet, tag_of
 from .navigation_sentences import NAVIGATION
 from .steering_sentences import STEERING, Values
 from .transducer_sentences import TRANSDUCERS, MotionUnit
@@ -99,11 +99,11 @@ class SentenceDecoder:
             sentence = parse_sentence(line, require_checksum=self._options.require_checksum)
         except FramingError as error:
             self.counts.reject(str(error))
+            self._count_lost_lines(tag_of(line))
             return
         talker, formatter, fields, tag = sentence
         kind = talker if talker == formatter else talker + formatter
-        if tag.line is not None:
-            self._count_lost_lines(tag.source, tag.line)
+        self._count_lost_lines(tag)
         decode = self._decoders.get(kind) or self._decoders.get(formatter)
         if decode is None and formatter not in TIMED:
             self.counts.skip(kind)
@@ -138,8 +138,11 @@ class SentenceDecoder:
             samples.add("gnss_time", name, time_ns * 1e-9, received_ns)
         return time_ns
 
-    def _count_lost_lines(self, sender: str, line: int) -> None:
+    def _count_lost_lines(self, tag: TagBlock) -> None:
         """Count the lines that are missing between two line counts of a sender."""
+        sender, line = tag.source, tag.line
+        if line is None:
+            return
         last = self._lines.get(sender)
         if last is None and len(self._lines) >= MAX_TOPICS:
             return

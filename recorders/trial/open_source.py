@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import re
 import stat
 import sys
 from collections.abc import Callable, Sequence
@@ -154,8 +155,17 @@ def _transport(request: StreamRequest, clock: ReceptionClock) -> Transport | Non
     if is_live(address) or (address == "-" and not _is_recording(sys.stdin.fileno())):
         return open_transport(address, clock)
     if address != "-" and not Path(address).is_file():
-        raise LogError(f"no such file: {address}")
+        raise LogError(f"no such file: {address}{_address_hint(address)}")
     return None
+
+
+def _address_hint(address: str) -> str:
+    """Return the address that is probably meant by the name of a device."""
+    if address.startswith("/dev/") or re.fullmatch(r"COM\d+", address):
+        return f"; a serial port is serial://{address}"
+    if re.fullmatch(r"v?can\d+", address):
+        return "; a CAN bus is read by `shiplog record nmea2000`"
+    return ""
 
 
 def _is_recording(descriptor: int) -> bool:

@@ -38,7 +38,7 @@ def event_table(events: Sequence[Event], start_ns: int | None) -> TextTable:
     rest = len(events) - len(rows)
     remarks = (f"{rest} more events are in the log.",) if rest else ()
     columns = ("time (UTC)", "since start\n[s]", "level", "source", "text")
-    return TextTable("Events", columns, tuple(rows), remarks)
+    return TextTable("Events", columns, tuple(rows), remarks, has_prose=True)
 
 
 def events_to_json(events: Sequence[Event], start_ns: int | None) -> dict[str, Any]:

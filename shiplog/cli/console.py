@@ -14,6 +14,7 @@ from shiplog.text_table import TextTable
 from .printable import printable
 
 MIN_NAME_WIDTH = 12  # characters of a shortened cell in the first column
+MIN_PROSE_WIDTH = 30  # characters of a column that is wrapped
 EDGES, GAP = 4, 3  # of a printed table, in characters
 FIRST_ESTIMATE_SECS = 2.0  # of work, before the remaining time is estimated
 
@@ -90,7 +91,8 @@ def print_tables(tables: Sequence[TextTable], *, to_stderr: bool = False) -> Non
     """Print tables and their remarks, in the width of the console.
 
     No word and no number is broken: headings wrap between words, long names in the first column
-    are shortened in the middle, and a table that is still too wide is printed in parts.
+    are shortened in the middle, and a table that is still too wide is printed in parts. Sentences
+    in the last column wrap between words.
     """
     from rich.box import SIMPLE
     from rich.console import Console
@@ -99,13 +101,19 @@ def print_tables(tables: Sequence[TextTable], *, to_stderr: bool = False) -> Non
     console = Console(stderr=to_stderr, highlight=False, markup=False)  # [deg] is a unit
     for table in tables:
         rows = [tuple(map(printable, row)) for row in table.rows]
-        for number, part in enumerate(_fitted(table.columns, rows, console.width)):
+        fixed = len(table.columns) - table.has_prose  # columns that are not wrapped
+        room = console.width - (MIN_PROSE_WIDTH + GAP if table.has_prose else 0)
+        parts = _fitted(table.columns[:fixed], [row[:fixed] for row in rows], room)
+        for number, part in enumerate(parts):
             title = table.title if number == 0 else f"{table.title} (continued)"
             shown = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE)
             for i, heading in enumerate(part[0]):
                 shown.add_column(heading, justify="left" if i == 0 else "right", no_wrap=True)
-            for row in part[1:]:
-                shown.add_row(*row)
+            prose = fixed if number == 0 else len(table.columns)  # where it begins in this part
+            for heading in table.columns[prose:]:
+                shown.add_column(heading, overflow="fold")
+            for cells, row in zip(part[1:], rows, strict=True):
+                shown.add_row(*cells, *row[prose:])
             console.print(shown)
         for remark in table.remarks:
             console.print(printable(remark))

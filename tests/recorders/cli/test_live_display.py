@@ -36,7 +36,7 @@ def _shown(log: Path) -> Shown:
 
 def _text(shown: Shown) -> str:
     console = Console(file=io.StringIO(), width=120, color_system=None)
-    console.print(_status_table(shown))
+    console.print(_status_table(shown, 40))
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
 

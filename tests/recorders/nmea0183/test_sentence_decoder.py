@@ -52,6 +52,13 @@ def test_gaps_in_the_line_counts_of_a_sender_are_lost_lines(numbers: list[int], 
     assert sum(decoder.counts.rejected.values()) == lost
 
 
+def test_a_line_that_is_rejected_is_not_lost_too() -> None:
+    lines = [tagged(f"s:GR0001,n:{n}", "HEHDT,1.0,T") for n in (1, 2, 3)]
+    lines[1] = lines[1][:-2] + b"00"
+    decoder, _ = _run(lines)
+    assert decoder.counts.rejected == {"wrong checksum": 1}
+
+
 def test_gnss_time_is_the_time_of_measurement_on_request_for_the_whole_burst() -> None:
     lines = [sentence("HEHDT,1.0,T")]
     for n in range(5):

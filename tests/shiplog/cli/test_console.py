@@ -52,6 +52,18 @@ def test_a_long_name_keeps_its_beginning_and_its_end() -> None:
         assert "zigzag_20_20.mcap".endswith(tail)
 
 
+def test_sentences_of_the_last_column_wrap_between_words_beside_whole_cells(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "no connection to serial:///dev/ttyUSB0: device disconnected or multiple access"
+    table = TextTable("Events", ("time (UTC)", "text"), (("23:13:45", text),), has_prose=True)
+    lines = printed(table, 60, capsys, monkeypatch)
+    assert all(len(line) <= 60 for line in lines)
+    assert sum("23:13:45" in line for line in lines) == 1
+    cells = [line[13:].strip() for line in lines if line[13:].strip() and "─" not in line]
+    assert text in " ".join(cells)
+
+
 def test_a_table_without_rows_is_its_headings(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
