@@ -265,6 +265,17 @@ class _ChannelStatsCollector:
             return replace(occurrences, count=occurrences.count + count)
         return Occurrences(count, float(at_ns - self._start) * 1e-9, extent)
 
+    def _regularity(self) -> tuple[float, tuple[float, float]]:
+        """Return the irregularity of the intervals, and their range.
+
+        A value that was removed was sent in time: where no row is empty, the rows are judged.
+        """
+        sentinels = sum(self._sentinels.values())
+        removed = self._impossible.count + sentinels
+        rows = removed and self._missing == sentinels
+        intervals = self._row_intervals if rows else self._intervals
+        return _regularity(intervals.values * 1e-9, _median_secs(intervals))
+
     def cleaning(self) -> _Cleaning | None:
         """Return what the samples show to be unusable; None where a second pass is needless."""
         if self._channel.fields or not self._valid:
@@ -283,7 +294,7 @@ class _ChannelStatsCollector:
         """Return the statistics of all samples added; `max_speed` of the log, m/s."""
         fixes = self._fixes.result(max_speed) if self._fixes else None
         channel, interval = self._channel, _median_secs(self._intervals)
-        irregular_share, interval_range = _regularity(self._intervals.values * 1e-9, interval)
+        irregular_share, interval_range = self._regularity()
         hold = self._hold(interval)
         return ChannelStats(
             name=channel.name,

@@ -121,15 +121,15 @@ def heading_zero_findings(
         basis, figure = "on straight stretches", f"{offset:+.0f}"
     if abs(offset) < limit:
         return
-    cause = "a wrong zero"
+    kind, cause = "zero", "a wrong zero"
     if abs(offset) < MIN_OFFSET_DEG:
         cause = "magnetic variation not corrected, or a misaligned compass"
     elif abs(abs(offset) - 90) < 20:
-        cause = "counted from east or west instead of north"
+        kind, cause = "sign", "counted from east or west instead of north"
     elif abs(offset) > 160:
         cause = "counted from south, or a ship that goes astern with a positive speed"
     yield Finding(
-        "zero",
+        kind,
         "heading",
         f"{signals.topics['heading']}: the course of the fixes differs from it by {figure} deg "
         f"{basis}; likely {cause}; add {offset:.0f} deg to the heading",

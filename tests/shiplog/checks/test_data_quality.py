@@ -170,6 +170,16 @@ def test_a_latitude_beyond_the_pole_is_impossible() -> None:
     )
 
 
+def test_values_that_are_not_available_do_not_make_a_channel_irregular() -> None:
+    values = noise()
+    values[::5] = np.radians(511.0)
+    heading = channel(values, name="heading")
+    cleaned = compute_log_stats(TrialLog("trial.mcap", (heading,)), strict=True)
+    warnings = data_warnings(cleaned, ("heading",))
+    assert any("511" in warning for warning in warnings), warnings
+    assert not any("irregular" in warning for warning in warnings), warnings
+
+
 def test_irregular_sampling_gives_a_warning_and_jitter_does_not() -> None:
     irregular = np.cumsum(np.where(np.arange(600) % 3, 0.1, 0.4))
     (warning,) = warnings_of(channel(noise(), irregular))

@@ -97,8 +97,10 @@ def test_swapped_north_and_east_are_found(trial: TrialLog) -> None:
 
 def test_a_heading_from_east_is_found(trial: TrialLog) -> None:
     findings = contradictions(changed(trial, heading=lambda values: values - np.pi / 2))
-    assert [f.kind for f in findings] == ["zero"]
+    assert [f.kind for f in findings] == ["sign"]
     assert "from east" in findings[0].text
+    with pytest.raises(LogError, match="from east"):
+        refuse_contradictions(findings)
 
 
 @pytest.mark.parametrize("manoeuvre", ["zigzag-20-20", "pseudo-random", "turning-circle"])
