@@ -284,7 +284,7 @@ def test_the_first_run_is_the_same_replay_without_warm_up(trial: TrialLog, tmp_p
     assert warm.warm_up
     assert not first.warm_up
     assert first.verify is None
-    assert first.peer is warm.ours
+    assert first.peer.args == warm.ours.args
     assert start_up.SAMPLE.is_file()
 
 

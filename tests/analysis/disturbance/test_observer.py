@@ -588,7 +588,7 @@ def slowly(stats: SignalStats, interval: float) -> SignalStats:
         (
             {"models": ("ramp", "wave")},
             0.05,
-            "yaw a wave of 0.05 .* at 0.05 rad/s; lower disturbance.yaw_frequency, or remove",
+            "yaw a wave of 0.05 .* at 0.05 rad/s; lower disturbance.yaw_frequency, raise",
         ),
         (
             {"models": ("constant", "wave"), "surge_frequency": 0.7},
@@ -603,7 +603,7 @@ def slowly(stats: SignalStats, interval: float) -> SignalStats:
         (
             {"yaw_frequency": 1e-9},
             None,
-            "poles are too slow for the sampling interval .*; choose faster poles",
+            "disturbance.yaw_frequency must lie between 1e-06 and 1000, got 1e-09",
         ),
     ],
 )

@@ -116,7 +116,7 @@ def test_a_rudder_in_the_column_of_the_yaw_rate_is_found(vessel: Vessel, manoeuv
 def test_a_wrong_unit_of_the_yaw_rate_does_not_hide_a_heading_from_east(trial: TrialLog) -> None:
     log = changed(trial, yaw_rate=scaled(60.0), heading=lambda values: values - np.pi / 2)
     findings = {(f.kind, f.channel) for f in contradictions(log)}
-    assert findings == {("unit", "yaw_rate"), ("zero", "heading")}
+    assert findings == {("unit", "yaw_rate"), ("sign", "heading")}
 
 
 def test_fixes_without_a_position_are_no_wrong_unit(trial: TrialLog) -> None:

@@ -96,5 +96,5 @@ def test_a_heading_from_east_is_reported_on_a_straight_course() -> None:
     for speed in (signals.speed, UNKNOWN):
         east = replace(signals, heading=signals.heading - np.pi / 2, speed=speed)
         (finding,) = heading_zero_findings(east, 1, None)
-        assert finding.kind == "zero"
+        assert finding.kind == "sign"
         assert "from east" in finding.text
