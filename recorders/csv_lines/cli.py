@@ -7,7 +7,7 @@ from pathlib import Path
 from recorders.streams.format import OpenedFile, StreamFormat
 from recorders.streams.line_files import peek
 from recorders.streams.packets import Batches
-from recorders.streams.stamps import OPTION_VALUES, StampReader, find_stamp_form, read_stamps
+from recorders.streams.stamps import StampReader, add_stamp_option, find_stamp_form, read_stamps
 from shiplog.errors import LogError, UsageError
 
 from .csv_decoder import CsvDecoder
@@ -24,12 +24,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="description of the lines (docs/stream_formats.md)",
     )
-    parser.add_argument(
-        "--stamp",
-        choices=OPTION_VALUES,
-        default="auto",
-        help="time stamps before the lines of a file (default: auto, detected)",
-    )
+    add_stamp_option(parser)
     parser.add_argument(
         "--date",
         type=date.fromisoformat,

@@ -9,9 +9,9 @@ from recorders.streams.format import OpenedFile, StreamFormat
 from recorders.streams.line_files import peek
 from recorders.streams.packets import Batches, Packet
 from recorders.streams.stamps import (
-    OPTION_VALUES,
     StampForm,
     StampReader,
+    add_stamp_option,
     find_stamp_form,
     read_stamps,
 )
@@ -42,12 +42,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="time of measurement of what GNSS receivers send: that of reception, or the "
         "receiver's own (default: received)",
     )
-    parser.add_argument(
-        "--stamp",
-        choices=OPTION_VALUES,
-        default="auto",
-        help="time stamps before the lines of a file (default: auto, detected)",
-    )
+    add_stamp_option(parser)
     parser.add_argument(
         "--date",
         type=_date,

@@ -119,8 +119,8 @@ def find_reference(
         )
         return TimeReference(*key, start + first.clock_ns, 0, (source, *assumed))
     first_ns = first.day * DAY_NS + first.clock_ns
-    shift_ns, doubts = _date_shift(name, first_ns, _latest_ns(times), day, today)
-    return TimeReference(*key, first_ns + shift_ns, shift_ns, (source, *doubts))
+    shift_ns, warnings = _date_shift(name, first_ns, _latest_ns(times), day, today)
+    return TimeReference(*key, first_ns + shift_ns, shift_ns, (source, *warnings))
 
 
 def _latest_ns(times: dict[tuple[str, str], list[Utc]]) -> int:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from recorders.streams.counts import StreamCounts
 
-from .library import FrameError
+from .canboat_library import FrameError
 from .line_formats import FRAME_BYTES
 
 MAX_FAST_BYTES = 223

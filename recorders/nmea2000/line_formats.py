@@ -16,7 +16,7 @@ from typing import NamedTuple
 from shiplog.errors import UsageError
 from shiplog.units import did_you_mean
 
-from .library import FrameError, split_identifier
+from .canboat_library import FrameError, split_identifier
 
 MAX_IDENTIFIER = (1 << 29) - 1
 FRAME_BYTES = 8  # of a CAN frame

@@ -7,8 +7,8 @@ from recorders.streams.gnss_clock import GnssClock, Utc
 from recorders.streams.packets import Packet
 from recorders.streams.sample_buffer import SampleBuffer
 
+from .canboat_library import FrameError, fields, is_fast
 from .fast_packets import FastPackets
-from .library import FrameError, fields, is_fast
 from .line_formats import FRAME_BYTES, Frame, LineFormat, is_assembled, matching_format
 from .pgns import DAY_SECS, READINGS
 

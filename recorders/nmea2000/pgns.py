@@ -8,7 +8,7 @@ resolutions and filters differ.
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from .library import FrameError
+from .canboat_library import FrameError
 
 Fields = Mapping[str, int | float | None]
 Fix = tuple[float, float, float]

@@ -1,5 +1,6 @@
 """Time stamps before the packets of a file, as loggers print them: detected or stated."""
 
+import argparse
 import re
 from calendar import timegm
 from collections.abc import Sequence
@@ -43,6 +44,16 @@ class StampForm:
     example: str
     pattern: re.Pattern[bytes]
     unit_ns: int = 0
+
+
+def add_stamp_option(parser: argparse.ArgumentParser) -> None:
+    """Add the option ``--stamp``, which states the form of the stamps or has it detected."""
+    parser.add_argument(
+        "--stamp",
+        choices=OPTION_VALUES,
+        default="auto",
+        help="time stamps before the lines of a file (default: auto, detected)",
+    )
 
 
 def _form(name: str, example: str, begin: bytes, *, end: bytes = b"", unit: int = 0) -> StampForm:

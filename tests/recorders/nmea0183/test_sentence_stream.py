@@ -28,7 +28,7 @@ def _options(*words: str) -> argparse.Namespace:
 
 
 def _open(tmp_path: Path, lines: list[str], *words: str) -> OpenedFile:
-    path = tmp_path / "voyage.nmea"
+    path = tmp_path / "trial.nmea"
     path.write_text("\r\n".join(lines), encoding="utf-8", newline="")
     return NMEA0183.open_file(read_lines(str(path)), _options(*words))
 

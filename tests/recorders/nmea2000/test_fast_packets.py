@@ -8,8 +8,8 @@ pytest.importorskip("nmea2000")
 
 from nmea2000 import _canboat
 
+from recorders.nmea2000.canboat_library import FrameError
 from recorders.nmea2000.fast_packets import FastPackets
-from recorders.nmea2000.library import FrameError
 from recorders.streams.counts import StreamCounts
 
 INCOMPLETE = "part of an incomplete fast packet"

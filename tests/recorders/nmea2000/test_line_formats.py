@@ -6,7 +6,7 @@ import pytest
 from decoded_streams import damaged, file_lines
 from nmea2000 import _canboat
 
-from recorders.nmea2000.library import FrameError
+from recorders.nmea2000.canboat_library import FrameError
 from recorders.nmea2000.line_formats import (
     FORMATS,
     StampKind,

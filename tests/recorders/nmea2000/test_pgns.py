@@ -5,7 +5,7 @@ from math import isnan, radians
 
 import pytest
 
-from recorders.nmea2000.library import FrameError, fields
+from recorders.nmea2000.canboat_library import FrameError, fields
 from recorders.nmea2000.pgns import READINGS, Reading
 
 NA = 0xFF
