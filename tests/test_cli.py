@@ -55,7 +55,7 @@ def test_simulate_replay_check_and_convert_end_to_end(capsys: pytest.CaptureFixt
     assert "samples of 6 channels" in capsys.readouterr().out
     assert main(["replay", "trial.mcap", "--json", "trial.json"]) == OK
     out = capsys.readouterr().out
-    assert "whiteness" in out
+    assert "Filter residuals" in out
     assert "Disturbances" in out
     assert "yaw rate [deg/s]" in out
     assert Path("trial.rrd").stat().st_size > 10_000

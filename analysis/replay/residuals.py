@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import isnan, nan, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ LAGS = 20
 MIN_MEASUREMENTS = 40  # needed for the whiteness test, and of pairs at each lag
 MAX_REJECTED_SHARE = 0.01  # of the measurements; spikes are rarer
 SIGNIFICANCE = 0.01
+# Innovations that are correlated by less are white for all purposes: a prediction from the
+# `LAGS` before them would make their rms about 1 % smaller.
+MIN_CORRELATION = 0.05
 BAND_99 = 2.576  # standard deviations of a normal distribution: 99 % lie within
 
 # The variance of the normalised innovation squared, times the number of innovations: 2 is that of
@@ -43,6 +47,9 @@ class ResidualSummary:
         The 99 % band of that mean for white innovations.
     whiteness_p
         The p-value of the whiteness test; NaN with too few samples, or for a constant output.
+    correlation, correlation_lag_secs
+        The autocorrelation of largest magnitude among those of the test, and its lag, s. NaN where
+        the test gives no p-value.
     rejected
         The number of measurements rejected by the gate.
     """
@@ -54,12 +61,20 @@ class ResidualSummary:
     mean_nis: float
     nis_band: tuple[float, float]
     whiteness_p: float
+    correlation: float
+    correlation_lag_secs: float
     rejected: int
 
     @property
     def white(self) -> bool | None:
-        """Whether the test at 1 % does not reject whiteness; None where it was not tested."""
-        return None if isnan(self.whiteness_p) else self.whiteness_p >= SIGNIFICANCE
+        """Whether the innovations are white for all purposes; None where it was not tested.
+
+        They are not where the test at 1 % rejects whiteness and the largest correlation is
+        `MIN_CORRELATION` or more: in a long log even one of 0.01 is significant.
+        """
+        if isnan(self.whiteness_p):
+            return None
+        return self.whiteness_p >= SIGNIFICANCE or abs(self.correlation) < MIN_CORRELATION
 
     @property
     def judged(self) -> bool:
@@ -92,8 +107,8 @@ class ResidualTest:
     ----------
     name, unit
         The output and its SI unit.
-    median_step
-        The median number of instants from one measurement to the next.
+    median_step, dt_secs
+        The median number of instants from one measurement to the next, and their distance, s.
     noise_measured
         Whether the noise that the filter expects was estimated from the same log, by its third
         differences (`signal_stats.NoiseLevel`), so that it is itself uncertain.
@@ -106,6 +121,7 @@ class ResidualTest:
         name: str,
         unit: str,
         median_step: float,
+        dt_secs: float,
         *,
         noise_measured: bool,
         constant: bool = False,
@@ -114,6 +130,7 @@ class ResidualTest:
         self._constant = constant
         self._innovations, self._normalised = Moments(), Moments()
         self._products, self._rejected = _Products(median_step), 0
+        self._interval_secs = median_step * dt_secs
 
     def add(
         self, innovations: FloatArray, innovation_stds: FloatArray, rejected: NDArray[np.bool_]
@@ -140,15 +157,18 @@ class ResidualTest:
         count = self._innovations.count
         variance = MEASURED_NOISE_VARIANCE if self._noise_measured else STATED_NOISE_VARIANCE
         half_width = BAND_99 * sqrt(variance / count) if count else float("nan")
-        whiteness_p = self._products.whiteness(self._innovations.mean, count)
+        found = self._products.result(self._innovations.mean, count)
+        judged = not self._constant
         return ResidualSummary(
             name=self._name,
             unit=self._unit,
             count=count,
             rms=sqrt(self._innovations.mean_square),
-            mean_nis=nan if self._constant else self._normalised.mean_square,
+            mean_nis=self._normalised.mean_square if judged else nan,
             nis_band=(1 - half_width, 1 + half_width),
-            whiteness_p=nan if self._constant else whiteness_p,
+            whiteness_p=found.p if judged else nan,
+            correlation=found.largest if judged else nan,
+            correlation_lag_secs=found.lag * self._interval_secs if judged else nan,
             rejected=self._rejected,
         )
 
@@ -158,19 +178,41 @@ def assess_innovations(
     unit: str,
     innovations: FloatArray,
     innovation_stds: FloatArray,
+    dt_secs: float = 1.0,
     *,
     noise_measured: bool,
 ) -> ResidualSummary:
     """Test one output's innovations that are all in memory, (n,); see `ResidualTest`."""
     steps = np.diff(np.flatnonzero(np.isfinite(innovations)))
     median_step = float(np.median(steps)) if len(steps) else 1.0
-    test = ResidualTest(name, unit, median_step, noise_measured=noise_measured)
+    test = ResidualTest(name, unit, median_step, dt_secs, noise_measured=noise_measured)
     test.add(innovations, innovation_stds, np.zeros(len(innovations), bool))
     return test.result()
 
 
-def whiteness(innovations: FloatArray) -> float:
-    """Return the p-value of a portmanteau test for autocorrelation up to `LAGS` measurements.
+class Whiteness(NamedTuple):
+    """Result of the whiteness test: significance and size of the correlation.
+
+    Attributes
+    ----------
+    p
+        The p-value; NaN where there are too few measurements, as are the others.
+    largest
+        The autocorrelation of largest magnitude, -1 to 1.
+    lag
+        Its lag, in measurements.
+    """
+
+    p: float
+    largest: float
+    lag: float
+
+
+NOT_TESTED = Whiteness(nan, nan, nan)
+
+
+def whiteness(innovations: FloatArray) -> Whiteness:
+    """Test innovations for autocorrelation up to `LAGS` measurements: a portmanteau test.
 
     Each autocovariance is scaled by its own sampling error, sum(e_t^2 e_{t-k}^2), so that white
     noise whose strength varies, such as in proportion to the yaw rate, is not taken for coloured.
@@ -181,11 +223,6 @@ def whiteness(innovations: FloatArray) -> float:
     innovations
         (n,) NaN where nothing was measured.
 
-    Returns
-    -------
-    float
-        The p-value; NaN where there are too few measurements.
-
     References
     ----------
     Lobato, Nankervis and Savin, "Testing for autocorrelation using a modified Box-Pierce Q test",
@@ -194,15 +231,17 @@ def whiteness(innovations: FloatArray) -> float:
     Examples
     --------
     >>> noise = np.random.default_rng(0).standard_normal(1000)
-    >>> whiteness(noise) > 0.01, whiteness(np.cumsum(noise)) > 0.01
+    >>> whiteness(noise).p > 0.01, whiteness(np.cumsum(noise)).p > 0.01
     (True, False)
+    >>> whiteness(np.cumsum(noise)).lag
+    1
     """
     at = np.flatnonzero(np.isfinite(innovations))
     if len(at) < MIN_MEASUREMENTS:
-        return float("nan")
+        return NOT_TESTED
     products = _Products(float(np.median(np.diff(at))))
     products.add(innovations)
-    return products.whiteness(float(np.mean(innovations[at])), len(at))
+    return products.result(float(np.mean(innovations[at])), len(at))
 
 
 class _Products:
@@ -230,10 +269,8 @@ class _Products:
         )  # fmt: skip
         self._count += len(innovations)
 
-    def whiteness(self, m: float, count: int) -> float:
-        """Return the p-value for `count` innovations of mean `m`; NaN if they are too few."""
-        if count < MIN_MEASUREMENTS:
-            return float("nan")
+    def result(self, m: float, count: int) -> Whiteness:
+        """Return the result for `count` innovations of mean `m`."""
         m -= self._origin or 0.0
         pairs, ab, a_plus_b, ab_squared, a_plus_b_squared, both = self._sums.T
         covariance = ab - m * a_plus_b + m**2 * pairs
@@ -242,10 +279,15 @@ class _Products:
             - 2 * m * both + 2 * m**2 * ab - 2 * m**3 * a_plus_b
         )  # fmt: skip
         used = (pairs >= MIN_MEASUREMENTS) & (sampling_variance > 0)
+        if count < MIN_MEASUREMENTS or not used.any():
+            return NOT_TESTED
         statistic = float(np.sum(covariance[used] ** 2 / sampling_variance[used]))
-        return (
-            chi_squared_tail(statistic, int(np.count_nonzero(used))) if used.any() else float("nan")
-        )
+        # the mean of the squares of both innovations of each pair, so that no correlation exceeds 1
+        squares = a_plus_b_squared / 2 - ab - m * a_plus_b + m**2 * pairs
+        correlation = np.divide(covariance, squares, out=np.zeros(LAGS), where=used)
+        largest = int(np.argmax(np.abs(correlation)))
+        tail = chi_squared_tail(statistic, int(np.count_nonzero(used)))
+        return Whiteness(tail, float(correlation[largest]), largest + 1)
 
 
 @compiled

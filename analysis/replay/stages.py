@@ -153,5 +153,10 @@ def _residual_test(plan: Plan, output: int) -> ResidualTest:
     channel, noise_measured = plan.log_stats[name], plan.noise.measured[output]
     low, high = channel.value_range
     return ResidualTest(
-        name, channel.unit, interval, noise_measured=noise_measured, constant=low == high
+        name,
+        channel.unit,
+        interval,
+        plan.clock.dt_secs,
+        noise_measured=noise_measured,
+        constant=low == high,
     )

@@ -105,6 +105,8 @@ def _residuals(findings: Findings, output: int) -> JsonObject:
         "mean_nis": residuals.mean_nis,
         "nis_band_99": list(residuals.nis_band),
         "whiteness_p": residuals.whiteness_p,
+        "correlation": residuals.correlation,
+        "correlation_lag_secs": residuals.correlation_lag_secs,
         "white": residuals.white,
         "rejected": residuals.rejected,
         "measurement_std": float(noise.measurement_std[output]),

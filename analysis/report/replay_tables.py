@@ -6,13 +6,15 @@ from math import degrees, isfinite, pi
 import numpy as np
 
 from analysis.replay.replay_results import Findings
-from analysis.replay.residuals import ResidualSummary
+from analysis.replay.residuals import MIN_CORRELATION, SIGNIFICANCE, ResidualSummary
 from shiplog.checks.event_table import event_table
 from shiplog.text_table import TextTable
 from shiplog.units import CATALOGUE, conversion_factor
 
 from .display import BAND_STDS, DISTURBANCES
 from .markdown import markdown_page
+
+MIN_PRINTED_P = 1e-9  # below it the exact p-value is of no use
 
 
 def replay_tables(findings: Findings) -> tuple[TextTable, ...]:
@@ -71,15 +73,27 @@ def _residual_table(findings: Findings) -> TextTable:
             f"{rms:.3g}",
             f"{residuals.mean_nis:.3f}" if residuals.judged else "not judged",
             f"{max(low, 0.0):.2f}–{high:.2f}" if residuals.judged else "",
-            f"{residuals.whiteness_p:.2g}" if residuals.judged else "",
+            *_whiteness_cells(residuals),
             f"{residuals.rejected}",
         )
         rows.append(cells)
     columns = (
-        "output", "rms", "mean\nNIS", "expected\n(99 %)", "whiteness p", "rejected",
+        "output", "rms", "mean\nNIS", "expected\n(99 %)",
+        "white\np", "ρ", "lag\n[s]", "gated",
     )  # fmt: skip
     remarks = (*_filter_remarks(findings), *map(_residual_remark, findings.residuals))
     return TextTable("Filter residuals", columns, tuple(rows), remarks)
+
+
+def _whiteness_cells(residuals: ResidualSummary) -> tuple[str, str, str]:
+    """Return p-value, largest correlation and its lag; empty where whiteness was not tested."""
+    if residuals.white is None:
+        return "", "", ""
+    return (
+        f"{residuals.whiteness_p:.1g}" if residuals.whiteness_p > MIN_PRINTED_P else "<1e-9",
+        f"{residuals.correlation:.2f}",
+        f"{residuals.correlation_lag_secs:.3g}",
+    )
 
 
 def _filter_remarks(findings: Findings) -> Iterator[str]:
@@ -98,7 +112,8 @@ def _filter_remarks(findings: Findings) -> Iterator[str]:
         )
     yield (
         "Innovation: measured minus predicted. NIS: its square over the variance that the filter "
-        f"expects. Rejected: samples further than {settings.gate:g} σ from the prediction."
+        "expects. ρ: the largest correlation of the innovations with those before, and its lag. "
+        f"Gated: rejected, as further than {settings.gate:g} σ from the prediction."
     )
 
 
@@ -113,11 +128,16 @@ def _residual_remark(residuals: ResidualSummary) -> str:
         size = f"{'larger' if larger else 'smaller'} than expected"
     if residuals.white is None:
         return f"{name}: innovations {size}; too few samples to test whether they are white."
-    if residuals.white:
+    if not residuals.white:
+        return (
+            f"{name}: innovations {size} and NOT white (test at 1 %): the model or the noise does "
+            "not explain the data."
+        )
+    if residuals.whiteness_p >= SIGNIFICANCE:
         return f"{name}: innovations {size} and white (test at 1 %)."
     return (
-        f"{name}: innovations {size} and NOT white (test at 1 %): the model or the noise does not "
-        "explain the data."
+        f"{name}: innovations {size} and nearly white: their correlation is significant (test at "
+        f"1 %), but below {MIN_CORRELATION:g}."
     )
 
 

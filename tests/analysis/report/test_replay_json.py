@@ -15,7 +15,9 @@ def test_the_json_has_the_documented_keys(zigzag_analysis: Analysis) -> None:
     found = json.loads(json.dumps(replay_json(zigzag_analysis.findings), allow_nan=False))
     assert {"log", "model", "residuals", "disturbances", "coefficients", "warnings"} <= set(found)
     for output in ("yaw_rate", "speed"):
-        assert {"rms", "mean_nis", "whiteness_p"} <= set(found["residuals"][output])
+        assert {"rms", "mean_nis", "whiteness_p", "correlation", "correlation_lag_secs"} <= set(
+            found["residuals"][output]
+        )
     for name in ("a", "b1", "b2", "b3", "d", "e", "f", "g", "h"):
         assert {"value", "std", "unit"} <= set(found["coefficients"][name])
     assert found["coefficients"]["b2"]["unit"] == "1/(rad·s)"

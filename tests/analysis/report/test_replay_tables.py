@@ -16,6 +16,19 @@ def test_the_papers_wave_colours_the_innovations(zigzag_analysis: Analysis) -> N
     assert "yaw rate: innovations as large as expected and white" in page
 
 
+def test_the_size_of_the_correlation_is_beside_its_significance(zigzag_analysis: Analysis) -> None:
+    findings = zigzag_analysis.findings
+    speed = replace(findings.residuals[1], whiteness_p=1e-12, correlation_lag_secs=0.3)
+    pages = {}
+    for size in (-0.012, 0.12):
+        residuals = (findings.residuals[0], replace(speed, correlation=size))
+        pages[size] = replay_markdown(replace(findings, residuals=residuals))
+        assert f"| <1e-9 | {size:.2f} | 0.3 |" in pages[size]
+    assert "NOT white" in pages[0.12]
+    assert "NOT white" not in pages[-0.012]
+    assert "nearly white: their correlation is significant" in pages[-0.012]
+
+
 def test_a_coefficient_that_is_not_determined_is_not_printed(zigzag_analysis: Analysis) -> None:
     uncertain = replace(zigzag_analysis.findings.yaw.coefficients["b1"], value=1e-4, std=1e-3)
     findings = zigzag_analysis.findings
@@ -53,7 +66,7 @@ def test_the_innovations_of_a_stuck_gyro_are_not_judged(zigzag_log: TrialLog) ->
     ]
     findings = analyse(replace(zigzag_log, channels=tuple(channels))).findings
     rows = {row[0]: row for table in replay_tables(findings) for row in table.rows}
-    assert rows["yaw rate [deg/s]"][2:5] == ("not judged", "", "")
+    assert rows["yaw rate [deg/s]"][2:7] == ("not judged", "", "", "", "")
     assert float(rows["speed [kn]"][2]) > 0
     page = replay_markdown(findings)
     assert "yaw rate: innovations not judged, since the measurement is constant" in page
