@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 STAGES = {
     "read": ("shiplog.mcap",),
     "check": (
-        "shiplog.checks.log_stats", "shiplog.checks.data_quality", "shiplog.checks.stuck",
-        "shiplog.checks.consistency", "shiplog.checks.interpolate",
+        "shiplog.checks.log_stats", "shiplog.checks.time_stats", "shiplog.checks.data_quality",
+        "shiplog.checks.stuck", "shiplog.checks.consistency", "shiplog.checks.interpolate",
         "analysis.replay.channel_warnings",
     ),
     "resample": ("shiplog.resampling", "analysis.signals.hold"),

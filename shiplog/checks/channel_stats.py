@@ -38,6 +38,12 @@ class Occurrences:
     first_secs: float = 0.0
     extent: float = 0.0
 
+    def plus(self, count: int, secs: float, extent: float = 0.0) -> "Occurrences":
+        """Return these and `count` later ones; time and extent stay those of the first one."""
+        if self.count:
+            return replace(self, count=self.count + count)
+        return Occurrences(count, secs, extent)
+
 
 @dataclass(frozen=True, eq=False)
 class ChannelStats:

@@ -2,19 +2,16 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from copy import deepcopy
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shiplog.geodesy import positions_of
-from shiplog.types import Channel, ChunkedLog, FloatArray, TimeArray
+from shiplog.types import Channel, ChunkedLog, FloatArray
 from shiplog.units import CATALOGUE
 
 from .channel_stats import (
-    GAP_SECS,
     ChannelStats,
     LogStats,
     Occurrences,
@@ -27,12 +24,9 @@ from .on_change import HoldStats, is_order, is_written_on_change, stated_interpo
 from .quantiles import Quantiles
 from .sentinels import MAX_WRAPPED, sentinel_values, unwrapped_limit
 from .stuck import StuckCheck
+from .time_stats import ChannelTimeStats, Mask
 
-Mask = NDArray[np.bool_]
 ChannelKey = tuple[str, tuple[str, ...]]  # topic and fields
-
-MIN_INTERVALS = 10  # fewer do not show whether a channel is irregular
-LAST_INSTANT_NS = np.iinfo(np.int64).max
 
 
 def compute_log_stats(
@@ -101,24 +95,17 @@ class _ChannelStatsCollector:
         kind = CATALOGUE.get(channel.name)
         circular = kind is not None and kind.circular
         commanded = kind is not None and kind.commanded
+        self._times = ChannelTimeStats(commanded=commanded)
         self._stuck = None if commanded else StuckCheck(circular=circular)
         self._fixes = (
             FixScreen() if channel.name == "position" and len(channel.fields) > 1 else None
         )
-        self._samples = self._duplicates = self._missing = self._valid = self._negative = 0
-        self._start = self._last = self._last_valid = 0
-        self._span = self._valid_span = (LAST_INSTANT_NS, -LAST_INSTANT_NS)
+        self._missing = self._negative = 0
         self._value_range = (np.inf, -np.inf)
-        self._backward_steps, self._received_early = Occurrences(), Occurrences()
         self._infinite, self._impossible = Occurrences(), Occurrences()
-        self._max_delay_ns = 0
         self._impossible_values: Counter[float] = Counter()
         self._worst_excess = 0.0  # of an impossible value over its limit
-        self._long_intervals = [np.zeros((0, 2), np.int64)]  # rows of start and length, ns
-        self._intervals, self._values = Quantiles(), Quantiles()
-        self._row_intervals = self._intervals  # one object until the first invalid sample
-        self._changes = Quantiles() if kind is not None and kind.commanded else None
-        self._last_value = np.nan
+        self._values = Quantiles()
 
     @property
     def name(self) -> str:
@@ -139,8 +126,6 @@ class _ChannelStatsCollector:
         """Add the next samples of the channel."""
         if not len(channel):
             return
-        if not self._samples:
-            self._start = self._last = self._last_valid = int(channel.measured_ns[0])
         if self._sentinels:
             for value in self._sentinels:
                 self._sentinels[value] += int(np.count_nonzero(channel.values == value))
@@ -150,14 +135,11 @@ class _ChannelStatsCollector:
             self._fixes.add(channel)
             rows = _without_altitude(channel)
         valid = self._usable(channel, rows)
-        if not valid.all() and self._row_intervals is self._intervals:
-            self._row_intervals = deepcopy(self._intervals)
-        self._add_times(channel, valid)
+        self._times.add(channel, valid)
         self._add_values(channel, rows, valid)
         if self._stuck and valid.any():
-            secs = (channel.measured_ns - self._start) * 1e-9
+            secs = (channel.measured_ns - self._times.start_ns) * 1e-9
             self._stuck.add(*((secs, rows) if valid.all() else (secs[valid], rows[valid])))
-        self._samples += len(channel)
 
     def _usable(self, channel: Channel, rows: FloatArray) -> Mask:
         """Which samples are finite and, with `strict`, possible, (n,)."""
@@ -165,72 +147,16 @@ class _ChannelStatsCollector:
             return np.asarray(np.isfinite(rows).all(axis=1))
         return np.asarray((rows[:, 0] >= self._limits[0]) & (rows[:, 0] <= self._limits[1]))
 
-    def _add_times(self, channel: Channel, valid: Mask) -> None:
-        times = channel.measured_ns
-        with_last = np.concatenate(([self._last], times)) if self._samples else times
-        steps = np.diff(with_last)
-        backward = np.flatnonzero(steps < 0)
-        if len(backward):
-            first_step = -float(steps[backward[0]]) * 1e-9
-            self._backward_steps = self._with_more(
-                self._backward_steps, len(backward), with_last[backward[0]], first_step
-            )
-        if self._row_intervals is not self._intervals:
-            steps = np.diff(np.sort(with_last))
-            self._row_intervals.add(steps[steps > 0].astype(float))
-        self._add_intervals(channel, valid)
-        self._add_delays(channel)
-        self._span = _extended_span(self._span, times)
-        self._valid_span = _extended_span(self._valid_span, times[valid])
-        self._last = int(times[-1])
-        if valid.any():
-            self._last_valid = int(times[valid][-1])
-
-    def _add_intervals(self, channel: Channel, valid: Mask) -> None:
-        """Add the intervals between valid samples, and the changes of an input over them."""
-        times, values = channel.measured_ns[valid], channel.values[valid]
-        if self._valid:
-            times = np.concatenate(([self._last_valid], times))
-        steps = np.diff(times)
-        order: slice | NDArray[np.intp] = slice(None)
-        if (steps < 0).any():
-            order = np.argsort(times, kind="stable")
-            times = times[order]
-            steps = np.diff(times)
-        positive = steps > 0
-        self._duplicates += len(steps) - int(np.count_nonzero(positive))
-        self._intervals.add(steps[positive].astype(float))
-        long = np.flatnonzero(steps > GAP_SECS * 1e9)
-        self._long_intervals.append(np.column_stack((times[long], steps[long])))
-        if self._changes is not None and len(values):
-            if self._valid:
-                values = np.concatenate(([self._last_value], values))
-            self._changes.add(np.abs(np.diff(values[order]))[positive])
-            self._last_value = float(values[-1])
-
-    def _add_delays(self, channel: Channel) -> None:
-        lead = channel.measured_ns - channel.received_ns
-        self._max_delay_ns = max(self._max_delay_ns, -int(lead.min()))
-        largest_lead = float(lead.max()) * 1e-9
-        if largest_lead > 0:
-            extent = max(self._received_early.extent, largest_lead)
-            early = lead > 0
-            count, first_ns = int(np.count_nonzero(early)), int(channel.measured_ns[early.argmax()])
-            more = self._with_more(self._received_early, count, first_ns, 0.0)
-            self._received_early = replace(more, extent=extent)
-
     def _add_values(self, channel: Channel, rows: FloatArray, valid: Mask) -> None:
         if not valid.all() or channel.fields or not self._strict:
             times = channel.measured_ns
             self._missing += _missing(channel)
             infinite = np.flatnonzero(np.isinf(rows).any(axis=1))
             if len(infinite):
-                self._infinite = self._with_more(
-                    self._infinite, len(infinite), times[infinite[0]], 0.0
-                )
+                first_secs = self._times.secs(int(times[infinite[0]]))
+                self._infinite = self._infinite.plus(len(infinite), first_secs)
             self._add_impossible(channel, rows)
         values = rows[valid]
-        self._valid += len(values)
         if len(values) and not channel.fields:
             low, high = self._value_range
             # + 0.0: a negative zero becomes a zero
@@ -247,8 +173,8 @@ class _ChannelStatsCollector:
             extent = self._impossible.extent
             if excess[worst] > self._worst_excess:
                 self._worst_excess, extent = float(excess[worst]), float(rows[worst, 0])
-            first_ns = channel.measured_ns[impossible[0]]
-            more = self._with_more(self._impossible, len(impossible), first_ns, 0.0)
+            first_secs = self._times.secs(int(channel.measured_ns[impossible[0]]))
+            more = self._impossible.plus(len(impossible), first_secs)
             self._impossible = replace(more, extent=extent)
             self._count_impossible(rows[impossible, 0])
 
@@ -257,14 +183,6 @@ class _ChannelStatsCollector:
         if len(self._impossible_values) < MAX_IMPOSSIBLE_VALUES:
             self._impossible_values.update(values.tolist())
 
-    def _with_more(
-        self, occurrences: Occurrences, count: int, at_ns: int, extent: float
-    ) -> Occurrences:
-        """Add occurrences to those before; time and extent stay those of the first one."""
-        if occurrences.count:
-            return replace(occurrences, count=occurrences.count + count)
-        return Occurrences(count, float(at_ns - self._start) * 1e-9, extent)
-
     def _regularity(self) -> tuple[float, tuple[float, float]]:
         """Return the irregularity of the intervals, and their range.
 
@@ -272,13 +190,11 @@ class _ChannelStatsCollector:
         """
         sentinels = sum(self._sentinels.values())
         removed = self._impossible.count + sentinels
-        rows = removed and self._missing == sentinels
-        intervals = self._row_intervals if rows else self._intervals
-        return _regularity(intervals.values * 1e-9, _median_secs(intervals))
+        return self._times.regularity(rows=bool(removed) and self._missing == sentinels)
 
     def cleaning(self) -> _Cleaning | None:
         """Return what the samples show to be unusable; None where a second pass is needless."""
-        if self._channel.fields or not self._valid:
+        if self._channel.fields or not self._times.valid:
             return None
         (low, high), values = self._limits, self._values.values
         kind = CATALOGUE.get(self._channel.name)
@@ -293,7 +209,8 @@ class _ChannelStatsCollector:
     def result(self, max_speed: float) -> ChannelStats:
         """Return the statistics of all samples added; `max_speed` of the log, m/s."""
         fixes = self._fixes.result(max_speed) if self._fixes else None
-        channel, interval = self._channel, _median_secs(self._intervals)
+        channel, times = self._channel, self._times
+        interval = times.median_interval_secs()
         irregular_share, interval_range = self._regularity()
         hold = self._hold(interval)
         return ChannelStats(
@@ -301,17 +218,17 @@ class _ChannelStatsCollector:
             source=channel.source,
             unit=channel.unit,
             fields=channel.fields,
-            samples=self._samples,
-            span_ns=self._span if self._samples else (0, 0),
+            samples=times.samples,
+            span_ns=times.span_ns if times.samples else (0, 0),
             interval_secs=interval,
-            row_interval_secs=_median_secs(self._row_intervals),
-            gaps=() if hold else self._gaps(interval),
+            row_interval_secs=times.median_row_interval_secs(),
+            gaps=() if hold else times.gaps(),
             irregular_share=irregular_share,
             interval_range_secs=interval_range,
-            duplicate_times=self._duplicates,
-            backward_steps=self._backward_steps,
-            received_early=self._received_early,
-            max_delay_ns=self._max_delay_ns,
+            duplicate_times=times.duplicates,
+            backward_steps=times.backward_steps,
+            received_early=times.received_early,
+            max_delay_ns=times.max_delay_ns,
             missing=self._missing - sum(self._sentinels.values()),
             infinite=self._infinite,
             impossible=self._impossible,
@@ -319,13 +236,13 @@ class _ChannelStatsCollector:
             sentinels=tuple(self._sentinels.items()),
             limits=self._limits,
             stuck=self._stuck.result(interval) if self._stuck else None,
-            valid=fixes.usable if fixes else self._valid,
+            valid=fixes.usable if fixes else times.valid,
             valid_span_ns=(
-                fixes.usable_span_ns if fixes else self._valid_span if self._valid else (0, 0)
+                fixes.usable_span_ns if fixes else times.valid_span_ns if times.valid else (0, 0)
             ),
             value_range=self._value_range,
             median=self._values.median(),
-            negative_share=self._negative / self._valid if self._valid else 0.0,
+            negative_share=self._negative / times.valid if times.valid else 0.0,
             strict=self._strict,
             interpolation=stated_interpolation(channel),
             hold=hold,
@@ -335,27 +252,18 @@ class _ChannelStatsCollector:
     def _hold(self, interval: float) -> HoldStats | None:
         """Return the figures of a channel to be held; None where it is to be interpolated."""
         stated = stated_interpolation(self._channel)
-        if stated == "linear" or self._channel.fields or not self._valid:
+        if stated == "linear" or self._channel.fields or not self._times.valid:
             return None
-        intervals = self._intervals.values * 1e-9
+        intervals, changes = self._times.intervals.values * 1e-9, self._times.changes
         if not (stated or len(intervals)) and self.name.startswith("rudder"):
             return None  # one sample of a rudder shows nothing; revolutions may be written once
-        changes = np.zeros(0) if self._changes is None else self._changes.values
+        steps = np.zeros(0) if changes is None else changes.values
         if stated != "hold":
             order, gap_secs = is_order(self._channel.source), gap_threshold_secs(interval)
-            if self._changes is None or not is_written_on_change(
-                intervals, changes, gap_secs, order=order
-            ):
+            if changes is None or not is_written_on_change(intervals, steps, gap_secs, order=order):
                 return None
-        longest, largest = (float(each.max(initial=0.0)) for each in (intervals, changes))
+        longest, largest = (float(each.max(initial=0.0)) for each in (intervals, steps))
         return HoldStats(stated == "hold", longest, largest)
-
-    def _gaps(self, interval: float) -> tuple[tuple[float, float], ...]:
-        """Start and length of each gap, s."""
-        long = np.concatenate(self._long_intervals)
-        long = long[long[:, 1] * 1e-9 > gap_threshold_secs(interval)]
-        gaps = zip((long[:, 0] - self._span[0]) * 1e-9, long[:, 1] * 1e-9, strict=True)
-        return tuple((float(start), float(length)) for start, length in gaps)
 
 
 def _missing(channel: Channel) -> int:
@@ -381,26 +289,3 @@ def _excess(channel: Channel, rows: FloatArray, limits: tuple[float, float]) -> 
     if channel.fields:
         return np.full(len(rows), -np.inf)
     return np.asarray(np.maximum(limits[0] - rows[:, 0], rows[:, 0] - limits[1]))
-
-
-def _extended_span(span: tuple[int, int], times: TimeArray) -> tuple[int, int]:
-    if not len(times):
-        return span
-    return min(span[0], int(times.min())), max(span[1], int(times.max()))
-
-
-def _median_secs(intervals: Quantiles) -> float:
-    """Median of intervals in ns, as s; 0 without any."""
-    return intervals.median() * 1e-9 if len(intervals.values) else 0.0
-
-
-def _regularity(intervals: FloatArray, typical: float) -> tuple[float, tuple[float, float]]:
-    """Share of intervals that differ by more than half from the typical one, and their range.
-
-    Gaps are not counted.
-    """
-    steps = intervals[intervals <= gap_threshold_secs(typical)]
-    if len(steps) < MIN_INTERVALS:
-        return 0.0, (typical, typical)
-    low, high = np.percentile(steps, [1, 99])
-    return float(np.mean(np.abs(steps - typical) > 0.5 * typical)), (float(low), float(high))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from shiplog.checks.event_table import event_table
-from shiplog.checks.info import ChannelInfo, ForeignTopic, LogInfo, RawTopic, ValueRange
+from shiplog.checks.log_content import ChannelInfo, ForeignTopic, LogInfo, RawTopic, ValueRange
 from shiplog.text_table import TextTable
 
 

@@ -6,9 +6,7 @@ Others are kept as bytes, to be decoded one by one.
 
 import struct
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from io import BytesIO
-from typing import NamedTuple
 
 import numpy as np
 import zstandard
@@ -18,9 +16,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from shiplog.types import Event, FloatArray, TimeArray
-
-from .clock_repair import MixedTimes
+from .contents import EventMessage, McapContents, MessageCount, RawBlock, SampleBlock
 from .locate import (
     Offsets,
     complete_records,
@@ -29,7 +25,6 @@ from .locate import (
     locate_by_size,
     record_sizes,
 )
-from .pauses import Pauses
 from .records import MESSAGE_HEAD, RECORD_HEAD
 from .schema import (
     ENCODING,
@@ -46,176 +41,6 @@ MALFORMED = (  # what the decoders raise on damaged bytes; the exceptions have n
     McapError, zstandard.ZstdError, struct.error,
     ValueError, OverflowError, RuntimeError, MemoryError,
 )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class SampleBlock:
-    """The samples of one channel in one MCAP chunk.
-
-    Attributes
-    ----------
-    received, measured
-        (n,) times, ns.
-    values
-        (n, k), or n messages that are still to be decoded since their layout is not fixed.
-    number
-        The number of the MCAP chunk, or run of messages outside of MCAP chunks, in the file.
-    offsets
-        (n,) offsets of the messages in its data.
-    """
-
-    received: TimeArray
-    measured: TimeArray
-    values: FloatArray | list[bytes]
-    number: int
-    offsets: Offsets
-
-
-@dataclass
-class MessageCount:
-    """The messages of one topic that are counted but not decoded.
-
-    Attributes
-    ----------
-    count
-        The number of messages.
-    size
-        Their size in bytes.
-    first_ns, last_ns
-        The earliest and the latest time of reception, ns; of no messages, in the wrong order.
-    """
-
-    count: int = 0
-    size: int = 0
-    first_ns: int = 2**63 - 1
-    last_ns: int = -(2**63)
-
-    def add(self, heads: NDArray[np.void]) -> None:
-        """Count further messages, given their heads (n,)."""
-        received_ns = heads["received"].astype(np.int64)
-        self.count += len(heads)
-        self.size += int(record_sizes(heads).sum()) - MESSAGE_HEAD.itemsize * len(heads)
-        self.first_ns = min(self.first_ns, int(received_ns.min()))
-        self.last_ns = max(self.last_ns, int(received_ns.max()))
-
-
-@dataclass(frozen=True)
-class EventMessage:
-    """A message of the topic of events, as it is in the file.
-
-    Attributes
-    ----------
-    position
-        Its place in the file, common to all channels, as in `MessageColumns`.
-    time_ns
-        When it happened, ns since 1970-01-01 UTC.
-    data
-        The serialised message.
-    """
-
-    position: int
-    time_ns: int
-    data: bytes
-
-
-class RawBlock(NamedTuple):
-    """Raw packets of one channel in one MCAP chunk: its id, (n,) times of reception, n messages."""
-
-    channel_id: int
-    received_ns: TimeArray
-    messages: list[bytes]
-
-
-@dataclass
-class McapContents:
-    """What the scan of a file has collected so far.
-
-    Attributes
-    ----------
-    schemas, channels
-        The schema and channel records, by id.
-    selected
-        The ids of the channels whose messages are kept; None for all.
-    blocks
-        The samples not yet taken by `drain`, by channel id, in the order of the file.
-    pending_samples
-        The number of samples in `blocks`.
-    total_samples
-        The number of samples read so far.
-    undescribed
-        Messages whose channel is not described yet: the data, the channel id, the offsets, and the
-        number of their MCAP chunk.
-    undescribed_counts
-        The number of such messages, by channel id.
-    keep_undescribed
-        Whether to keep them, because a later record may describe their channel.
-    not_decoded
-        The numbers of raw packets, and of messages of other programs, by channel id.
-    keep_raw
-        Whether to keep the raw packets in `raw_blocks` too.
-    raw_blocks
-        The raw packets not yet taken, in the order of the file.
-    event_messages
-        The events not yet decoded.
-    events
-        The events decoded so far.
-    foreign_records
-        The attachments and metadata records of other programs, in words; a dict for their order.
-    metadata
-        Text about the trial, by key.
-    vessel_toml
-        The attached vessel file, or None.
-    in_order
-        Whether each MCAP chunk was received after the one before, by its own times.
-    latest_ns
-        The last time of reception in the MCAP chunks so far, ns.
-    finished
-        Whether the file has its footer.
-    truncated
-        Whether an unfinished file ends within a record.
-    damage
-        One warning for each damaged part.
-    data_blocks
-        The number of MCAP chunks, and runs of messages outside of them, read so far.
-    clock_warnings
-        Warnings about times of messages in the samples drained so far.
-    mixed_times
-        Steps of clocks that were not repaired in the samples drained so far.
-    pauses
-        Gaps in all channels in the samples drained so far.
-    """
-
-    schemas: dict[int, records.Schema] = field(default_factory=dict)
-    channels: dict[int, records.Channel] = field(default_factory=dict)
-    selected: frozenset[int] | None = None
-    blocks: dict[int, list[SampleBlock]] = field(default_factory=dict)
-    pending_samples: int = 0
-    total_samples: int = 0
-    undescribed: list[tuple[bytes, int, Offsets, int]] = field(default_factory=list)
-    undescribed_counts: dict[int, int] = field(default_factory=dict)
-    keep_undescribed: bool = True
-    not_decoded: dict[int, MessageCount] = field(default_factory=dict)
-    keep_raw: bool = False
-    raw_blocks: list[RawBlock] = field(default_factory=list)
-    event_messages: list[EventMessage] = field(default_factory=list)
-    events: list[Event] = field(default_factory=list)
-    foreign_records: dict[str, None] = field(default_factory=dict)
-    metadata: dict[str, str] = field(default_factory=dict)
-    vessel_toml: str | None = None
-    in_order: bool = True
-    latest_ns: int = 0
-    finished: bool = False
-    truncated: bool = False
-    damage: list[str] = field(default_factory=list)
-    data_blocks: int = 0
-    clock_warnings: list[str] = field(default_factory=list)
-    mixed_times: list[MixedTimes] = field(default_factory=list)
-    pauses: Pauses = field(default_factory=Pauses)
-
-    def drain(self) -> dict[int, list[SampleBlock]]:
-        """Return the blocks collected so far, by channel id, and release them."""
-        blocks, self.blocks, self.pending_samples = self.blocks, {}, 0
-        return blocks
 
 
 def collect_messages(data: bytes, indexes: list[bytes], contents: McapContents) -> bool:

@@ -9,7 +9,7 @@ from mcap import records
 from shiplog.errors import LogError
 from shiplog.types import RawPackets
 
-from .decode import McapContents, RawBlock
+from .contents import McapContents, RawBlock
 from .reader import open_mcap
 from .scan import scan
 from .schema import RAW, RAW_NAME

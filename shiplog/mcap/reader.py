@@ -13,7 +13,8 @@ from shiplog.errors import LogError, UsageError
 from shiplog.types import TimeArray, TrialLog
 
 from .clock_repair import MixedTimes, refuse_mixed_times
-from .decode import McapContents, is_events, schema_of
+from .contents import McapContents
+from .decode import is_events, schema_of
 from .index_times import received_in_order
 from .records import MAGIC
 from .scan import scan

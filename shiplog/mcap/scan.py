@@ -14,13 +14,8 @@ from typing import IO
 import numpy as np
 from mcap.opcode import Opcode
 
-from .decode import (
-    MALFORMED,
-    McapContents,
-    collect_messages,
-    collect_undescribed,
-    read_record,
-)
+from .contents import McapContents
+from .decode import MALFORMED, collect_messages, collect_undescribed, read_record
 from .decompress import mcap_chunk_data, truncated_mcap_chunk_data
 from .locate import complete_records
 from .records import MAGIC, MCAP_CHUNK_HEAD, RECORD_HEAD, crc32_of_range

@@ -13,7 +13,7 @@ from shiplog.types.inputs_in_force import inputs_in_force, with_inputs_in_force
 from shiplog.types.time_cut import TimeCut, empty_cut_error, resolve_cut
 
 from .clock_repair import MixedTimes, refuse_mixed_times
-from .decode import McapContents
+from .contents import McapContents
 from .reader import contents_described_by, open_mcap, read_unchecked, sample_count
 from .scan import scan
 from .summary import are_in_order, read_summary

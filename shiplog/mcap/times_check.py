@@ -7,7 +7,7 @@ import numpy as np
 
 from shiplog.types import TimeArray, is_sorted
 
-from .decode import McapContents, SampleBlock
+from .contents import McapContents, SampleBlock
 from .forward_steps import MIN_FORWARD_NS
 from .unset_times import are_set
 

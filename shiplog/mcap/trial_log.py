@@ -17,7 +17,8 @@ from shiplog.types import (
 from shiplog.units import CATALOGUE, conversion_factor
 
 from .clock_repair import MessageColumns, drop_impossible_times, repair_clock_steps
-from .decode import McapContents, SampleBlock, is_foreign, schema_of
+from .contents import McapContents, SampleBlock
+from .decode import is_foreign, schema_of
 from .schema import FORMAT_VERSION, Schema
 from .unset_times import replace_unset_times
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mcap import records
 
-from shiplog.mcap.decode import McapContents, SampleBlock
+from shiplog.mcap.contents import McapContents, SampleBlock
 from shiplog.mcap.times_check import TimesCheck
 
 SECOND = 1_000_000_000
