@@ -316,6 +316,7 @@ STREAMS = (
         count=lambda data: len(split_packet(data)) or 1,
     ),
     _bus("CAN frames", _can_frame),
+    _bus("CAN frames --time gnss", _can_frame, ("--time", "gnss")),
     _bus("canboat", _canboat, assembled=True),
     _bus("canboat plain", _canboat),
     _bus("candump", _candump),
@@ -325,6 +326,9 @@ STREAMS = (
     _bus("actisense-ascii", _actisense, assembled=True),
     _bus("ikonvert", _ikonvert, assembled=True),
     FuzzedStream("signalk", "signalk", delta_packet, count=count_values),
+    FuzzedStream(
+        "signalk --time gnss", "signalk", delta_packet, ("--time", "gnss"), count=count_values
+    ),
     FuzzedStream("csv-lines", "csv-lines", values_packet, ("--layout", str(LAYOUT))),
 )
 """Streams of every built-in format."""

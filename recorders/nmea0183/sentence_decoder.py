@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isnan
 
 from recorders.streams.counts import StreamCounts
@@ -74,8 +75,10 @@ class SentenceDecoder:
         )
         self._clock = GnssClock(
             self.counts.warn,
+            is_applied=self._options.gnss_time,
             received_is_known=self._options.received_is_known,
-            remedy="with --time gnss its samples have its own time",
+            in_bursts=True,
+            clock_kinds=("ZDA",),
         )
         self._twins = TwinDevices()
         self._lines: dict[str, int] = {}  # the last line count by sender
@@ -119,11 +122,11 @@ class SentenceDecoder:
             self.counts.skip(f"{kind} without a value")
             return
         self.counts.accept(kind)
-        measured_ns = received_ns
+        add = partial(self._add, samples, (source, kind), values, received_ns)
         if self._options.gnss_time:
-            measured_ns = time_ns or self._clock.measured_ns(source, received_ns)
-        if not self._add(samples, source, values, received_ns, measured_ns):
-            self.counts.flag(kind)
+            self._clock.write_measured(source, formatter, (received_ns, time_ns), add)
+        else:
+            add(received_ns)
 
     def _gnss_time_ns(
         self, source: str, sentence: Sentence, received_ns: int, samples: SampleBuffer
@@ -153,12 +156,13 @@ class SentenceDecoder:
     def _add(
         self,
         samples: SampleBuffer,
-        source: str,
+        source_and_kind: tuple[str, str],
         values: Values,
         received_ns: int,
         measured_ns: int,
-    ) -> bool:
-        """Add the values of a sentence; return whether all of them are valid."""
+    ) -> None:
+        """Add the values of a sentence; flag it where one of them is invalid."""
+        source, kind = source_and_kind
         valid = True
         for channel, value, suffix in values:
             topic = f"{source}.{suffix}" if suffix else source
@@ -171,4 +175,5 @@ class SentenceDecoder:
                 valid = False
             elif channel in CHECKED:
                 self._twins.add(channel, topic, value)
-        return valid
+        if not valid:
+            self.counts.flag(kind)

@@ -6,6 +6,7 @@ from datetime import date
 
 from recorders.streams.counts import StreamCounts
 from recorders.streams.format import OpenedFile, StreamFormat
+from recorders.streams.gnss_clock import add_time_option
 from recorders.streams.line_files import peek
 from recorders.streams.packets import Batches, Packet
 from recorders.streams.stamps import (
@@ -35,13 +36,7 @@ _MOST = 0.5  # a share of lines
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options of NMEA 0183."""
-    parser.add_argument(
-        "--time",
-        choices=("received", "gnss"),
-        default="received",
-        help="time of measurement of what GNSS receivers send: that of reception, or the "
-        "receiver's own (default: received)",
-    )
+    add_time_option(parser)
     add_stamp_option(parser)
     parser.add_argument(
         "--date",

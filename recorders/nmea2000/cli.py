@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from recorders.streams.counts import StreamCounts
 from recorders.streams.format import OpenedFile, StreamFormat
+from recorders.streams.gnss_clock import add_time_option
 from recorders.streams.line_files import peek
 from recorders.streams.packets import Batches
 from shiplog.errors import LogError, UsageError
@@ -22,6 +23,7 @@ _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     """Add the options of NMEA 2000."""
+    add_time_option(parser)
     parser.add_argument(
         "--line-format",
         metavar="NAME",
@@ -41,7 +43,8 @@ def _make_decoder(options: argparse.Namespace) -> "PgnDecoder":
     from .line_formats import find_format
     from .pgn_decoder import PgnDecoder
 
-    return PgnDecoder(find_format(options.line_format) if options.line_format else None)
+    line_format = find_format(options.line_format) if options.line_format else None
+    return PgnDecoder(line_format, gnss_time=options.time == "gnss")
 
 
 def _open_file(batches: Batches, options: argparse.Namespace) -> OpenedFile:
@@ -58,7 +61,7 @@ def _open_file(batches: Batches, options: argparse.Namespace) -> OpenedFile:
             f"none of the first {len(lines)} lines is of a known format of NMEA 2000; known are "
             f"{', '.join(FORMATS)}"
         )
-    decoder = PgnDecoder()
+    decoder = PgnDecoder(gnss_time=options.time == "gnss")
     decoder.set_format(line_format, lines)
     start_ns = _instant_ns(options.start) if options.start else None
     for _ in LineTimes(line_format, start_ns, StreamCounts()).apply(iter([head])):

@@ -1,6 +1,7 @@
 """Decoder of NMEA 2000: frames, assembled to messages where they are parts, to samples."""
 
 from collections.abc import Sequence
+from functools import partial
 
 from recorders.streams.counts import StreamCounts
 from recorders.streams.gnss_clock import GnssClock, Utc
@@ -10,11 +11,13 @@ from recorders.streams.sample_buffer import SampleBuffer
 from .canboat_library import FrameError, fields, is_fast
 from .fast_packets import FastPackets
 from .line_formats import FRAME_BYTES, Frame, LineFormat, is_assembled, matching_format
-from .pgns import DAY_SECS, READINGS
+from .pgns import DAY_SECS, READINGS, Reading
 
 FAST_PGNS = frozenset(pgn for pgn in READINGS if is_fast(pgn))
 ADDRESS_CLAIM = 60928
 NULL_ADDRESS = 254  # of devices that have found no address
+_OF_RECEIVERS = (129025, 129026, 129029)  # a gateway sends other sensors from the same address
+_CLOCKS = (" 126992", " 129033")  # time without a fix
 
 
 class PgnDecoder:
@@ -28,6 +31,8 @@ class PgnDecoder:
     ----------
     line_format
         The format of the lines; None to take that of the first line which is of one.
+    gnss_time
+        Whether the time of measurement of a GNSS receiver's samples is the receiver's own.
 
     Attributes
     ----------
@@ -35,12 +40,12 @@ class PgnDecoder:
         The format of the lines, or None while it is not known.
     """
 
-    def __init__(self, line_format: LineFormat | None = None) -> None:
+    def __init__(self, line_format: LineFormat | None = None, *, gnss_time: bool = False) -> None:
         self._counts = StreamCounts()
         self.line_format = line_format
         self._assembled = line_format is not None and bool(line_format.assembled)
         self._fast_packets = FastPackets(self._counts)
-        self._clock = GnssClock(self._warn)
+        self._clock = GnssClock(self._warn, is_applied=gnss_time, clock_kinds=_CLOCKS)
         self._kinds: dict[tuple[int, int], str] = {}
         self._names: dict[int, bytes] = {}  # the NAMEs of devices by address (ISO 11783-5)
         self._bus: bytes | None = None
@@ -138,31 +143,60 @@ class PgnDecoder:
         return self._fast_packets.push(frame.pgn, frame.source, frame.data)
 
     def _add(self, frame: Frame, data: bytes, received_ns: int, samples: SampleBuffer) -> None:
-        """Add the samples of a message."""
+        """Add the samples of a message, those of a receiver as soon as their time is known."""
         values = fields(frame.pgn, data)
         readings = READINGS[frame.pgn](values) if values else []
+        time_ns = self._gnss_time_ns(frame, readings, received_ns)
+        if time_ns is not None:
+            readings = [
+                reading._replace(value=time_ns * 1e-9)
+                if reading.channel == "gnss_time"
+                else reading
+                for reading in readings
+            ]
+        write = partial(self._write, frame, readings, samples, received_ns)
+        if frame.pgn in _OF_RECEIVERS:
+            self._clock.write_measured(
+                str(frame.source), str(frame.pgn), (received_ns, time_ns), write
+            )
+        else:
+            write(received_ns)
+
+    def _write(
+        self,
+        frame: Frame,
+        readings: Sequence[Reading],
+        samples: SampleBuffer,
+        received_ns: int,
+        measured_ns: int,
+    ) -> None:
+        """Write what a message measures, and count the message."""
         added = 0
         for channel, value, part in readings:
+            source = f"{frame.source}.{part}" if part else str(frame.source)
             if value is None:
                 continue
-            source = f"{frame.source}.{part}" if part else str(frame.source)
-            if channel == "gnss_time" and isinstance(value, float):
-                value = self._corrected(frame, value, received_ns)  # noqa: PLW2901 - of a rollover
             if isinstance(value, tuple):
-                added += samples.add_position(source, value, received_ns)
-            else:
+                added += samples.add_position(source, value, received_ns, measured_ns)
+            elif channel == "gnss_time":  # against its time of reception it shows the latency
                 added += samples.add(channel, source, value, received_ns)
+            else:
+                added += samples.add(channel, source, value, received_ns, measured_ns)
         if added:
             self._counts.accept(self._kind(frame))
         else:
             self._counts.skip(f"{frame.pgn} without a value")
 
-    def _corrected(self, frame: Frame, secs: float, received_ns: int) -> float:
-        """Compare the time of a receiver with that of reception, and correct a rollover of it."""
+    def _gnss_time_ns(
+        self, frame: Frame, readings: Sequence[Reading], received_ns: int
+    ) -> int | None:
+        """Return the time that a receiver states, ns, with a rollover of its week corrected."""
+        secs = next((r.value for r in readings if r.channel == "gnss_time"), None)
+        if not isinstance(secs, float):
+            return None
         days, clock_secs = divmod(secs, DAY_SECS)
-        utc = Utc(round(clock_secs * 1e9), int(days))
-        time_ns = self._clock.set_time(str(frame.source), f" {frame.pgn}", utc, received_ns)
-        return secs if time_ns is None else time_ns * 1e-9
+        utc = Utc(round(clock_secs * 1e4) * 10**5, int(days))  # in units of 0.1 ms
+        return self._clock.set_time(str(frame.source), f" {frame.pgn}", utc, received_ns)
 
     def _warn(self, text: str, time_ns: int | None) -> None:
         """Keep a warning about a receiver, whose address it begins with."""

@@ -4,6 +4,7 @@ import argparse
 
 from recorders.streams.counts import StreamCounts
 from recorders.streams.format import OpenedFile, StreamFormat
+from recorders.streams.gnss_clock import add_time_option
 from recorders.streams.line_files import peek
 from recorders.streams.packets import NO_TIME, Batches, Packet
 from recorders.streams.stamps import StampReader, find_stamp_form, read_stamps
@@ -16,6 +17,7 @@ HEAD_LINES = 1000  # of a file, in which time stamps before the deltas are looke
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     """Add the options of Signal K."""
+    add_time_option(parser)
     parser.add_argument(
         "--self",
         metavar="CONTEXT",
@@ -25,14 +27,15 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 
 def _make_decoder(options: argparse.Namespace) -> DeltaDecoder:
-    return DeltaDecoder(options.self)
+    return DeltaDecoder(options.self, gnss_time=options.time == "gnss")
 
 
 def _open_file(batches: Batches, options: argparse.Namespace) -> OpenedFile:
     """Take the times of the lines from stamps before them, or else from the deltas."""
     head, batches = peek(batches, HEAD_LINES)
     form = find_stamp_form(head)
-    decoder = DeltaDecoder(options.self, own_times=form is None)
+    own_times = form is None
+    decoder = DeltaDecoder(options.self, own_times=own_times, gnss_time=options.time == "gnss")
     if form is None:
         timed = _with_delta_times(batches, decoder.counts)
     else:

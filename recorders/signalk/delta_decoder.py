@@ -4,20 +4,32 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from math import isfinite, nan
-from typing import Any
+from typing import Any, NamedTuple
 
 from recorders.streams.counts import StreamCounts
+from recorders.streams.gnss_clock import GnssClock, Utc
 from recorders.streams.packets import END_NS, MAX_PACKET_BYTES, Packet
 from recorders.streams.sample_buffer import SampleBuffer
+from shiplog.tables.printed_times import DAY_NS
 
-from .signalk_paths import find_target
+from .signalk_paths import OF_RECEIVERS, find_target
 
 MAX_SOURCE_LENGTH = 64
 MAX_PATH_LENGTH = 80
 MAX_CONTEXTS = 64  # of ships, own and others; names come from the wire
+_TIME = "navigation.datetime"
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _NO_NAME = re.compile(r"[^A-Za-z0-9._-]+")  # what no part of a topic should hold
+
+
+class _Update(NamedTuple):
+    """The source of an update, and its times, ns: of reception, and as a receiver states it."""
+
+    source: str
+    received_ns: int
+    gnss_ns: int | None
 
 
 class DeltaError(ValueError):
@@ -35,12 +47,19 @@ class DeltaDecoder:
     own_times
         Whether the times of the updates are those of measurement, as in a file without other time
         stamps; if not, these are the times of reception, the clock that all sources share.
+    gnss_time
+        Whether the time of measurement of a GNSS receiver's samples is the receiver's own.
     """
 
-    def __init__(self, own_ship: str | None = None, *, own_times: bool = False) -> None:
+    def __init__(
+        self, own_ship: str | None = None, *, own_times: bool = False, gnss_time: bool = False
+    ) -> None:
         self._own_ships = {"vessels.self"} | ({own_ship} if own_ship else set())
         self._own_times = own_times
         self._counts = StreamCounts()
+        self._clock = GnssClock(
+            self._counts.warn, is_applied=gnss_time, received_is_known=not own_times
+        )
         self._other_ships: set[str] = set()
 
     @property
@@ -58,8 +77,11 @@ class DeltaDecoder:
                     self._counts.reject(str(error))
 
     def finish(self, samples: SampleBuffer) -> None:
-        """Warn where no delta was of the own ship."""
+        """Report the latencies of the receivers; warn where no delta was of the own ship."""
         del samples
+        self._clock.finish()
+        for key, text in self._clock.notes():
+            self._counts.note(key, text)
         if self._other_ships and not self._counts.accepted:
             names = ", ".join(sorted(self._other_ships)[:3])
             self._counts.warn(
@@ -101,28 +123,51 @@ class DeltaDecoder:
         values = _list(update.get("values", []))
         if not values:
             self._counts.skip("update without a value")
-        for value in values:
-            try:
-                self._add_value(value, source, (received_ns, measured_ns), samples)
-            except DeltaError as error:
-                self._counts.reject(str(error))
+        gnss_ns = self._gnss_time_ns(values, source, measured_ns)
+        origin = _Update(source, received_ns, gnss_ns)
+        for pair in values:
+            add = partial(self._take_value, pair, origin, samples)
+            path = pair.get("path") if isinstance(pair, dict) else None
+            if isinstance(path, str) and path in OF_RECEIVERS:
+                self._clock.write_measured(source, path, (measured_ns, gnss_ns), add)
+            else:
+                add(measured_ns)
+
+    def _gnss_time_ns(self, values: Sequence[Any], source: str, received_ns: int) -> int | None:
+        """Return the time that a receiver states in an update, with its week corrected."""
+        stated = [v.get("value") for v in values if isinstance(v, dict) and v.get("path") == _TIME]
+        try:
+            day, clock_ns = divmod(instant_ns(stated[0]), DAY_NS)
+        except (DeltaError, IndexError):
+            return None
+        return self._clock.set_time(source, f" {_TIME}", Utc(clock_ns, day), received_ns)
+
+    def _take_value(
+        self, pair: object, update: _Update, samples: SampleBuffer, measured_ns: int
+    ) -> None:
+        """Add the samples of a path and its value, or count why there are none."""
+        try:
+            self._add_value(pair, update, samples, measured_ns)
+        except DeltaError as error:
+            self._counts.reject(str(error))
 
     def _add_value(
-        self, pair: object, source: str, times: tuple[int, int], samples: SampleBuffer
+        self, pair: object, update: _Update, samples: SampleBuffer, measured_ns: int
     ) -> None:
         """Add the samples of a path and its value."""
         if not isinstance(pair, dict) or not isinstance(path := pair.get("path"), str):
             raise DeltaError("value without a path")
         value = pair.get("value")
+        source, times = update.source, (update.received_ns, measured_ns)
         added = 0
         if path == "navigation.position":
             fix = _fix(value)
             added += fix is not None and samples.add_position(source, fix, *times)
-        elif path == "navigation.datetime":
-            time_ns = None if value is None else instant_ns(value)
-            added += time_ns is not None and samples.add(
-                "gnss_time", source, time_ns * 1e-9, *times
-            )
+        elif path == _TIME:
+            stated_ns = None if value is None else instant_ns(value)
+            if stated_ns is not None:
+                secs = (update.gnss_ns or stated_ns) * 1e-9
+                added += samples.add("gnss_time", source, secs, *times)
         else:
             for target, number in list(_numbers(path, value)):  # all of them, or none
                 name = f"{source}.{target.part}" if target.part else source

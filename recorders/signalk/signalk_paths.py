@@ -57,6 +57,15 @@ TARGETS: Mapping[str, Target] = {
     "environment.outside.humidity": Target("humidity", part="outside"),
     "environment.water.temperature": Target("water_temperature", offset=-KELVIN),
 }
+OF_RECEIVERS = (
+    "navigation.position",
+    "navigation.speedOverGround",
+    "navigation.courseOverGroundTrue",
+    "navigation.gnss.satellites",
+    "navigation.gnss.horizontalDilution",
+)
+"""What a GNSS receiver measures: a source of Signal K can be a gateway with other sensors, too."""
+
 _REVOLUTIONS = re.compile(r"propulsion\.([A-Za-z0-9_-]{1,32})\.revolutions")
 
 

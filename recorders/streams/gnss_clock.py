@@ -1,27 +1,22 @@
 """Times of GNSS receivers against the times of reception: week rollover, latency, and its jumps."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+import argparse
+from collections.abc import Callable, Collection, Iterator
 from datetime import UTC, datetime
-from statistics import median
 from typing import NamedTuple
 
-import numpy as np
-
-from shiplog.checks.quantiles import Quantiles
 from shiplog.tables.printed_times import DAY_NS, HALF_DAY_NS
+
+from .gnss_receiver import MAX_WAIT_NS, GnssReceiver, HeldMessage, WriteSamples
+from .receiver_times import Latency, ReceiverTimes, TimeSteps
 
 ROLLOVER_NS = 1024 * 7 * DAY_NS  # the GPS week of ten bits begins again at 0
 MAX_ROLLOVERS = 2
 _MAX_DATE_ERROR_NS = 2 * DAY_NS  # a clock of the recorder that is wrong by less is an offset
 _MIN_LATENCY_SECS = 0.2  # reported from here on
 _MIN_OFFSET_SECS = 2.0  # no receiver is as late: the clock of the recorder is wrong
-_JUMP_SECS = 0.5
-_BLOCK = 30  # latencies between comparisons of medians
-_BUFFER = 4096
-_SILENCE_NS = 10 * 10**9  # a receiver's time is continued so long
 _MAX_SOURCES = 64
-_MAX_LATENCIES = 1 << 16  # kept of each kind of sentence: the sources are those of the wire
+_SILENCE_NS = 10 * 10**9  # after which another kind of message states the time
 
 Warn = Callable[[str, int | None], None]
 """Takes a warning and its time, ns since 1970-01-01 UTC; None is the end of the stream."""
@@ -61,148 +56,186 @@ def rollovers(utc_ns: int, reference_ns: int) -> int:
     return count if 1 <= count <= MAX_ROLLOVERS and error_ns < _MAX_DATE_ERROR_NS else 0
 
 
-class Latency:
-    """The time of reception minus the time in the sentence, of one kind of sentence.
-
-    Attributes
-    ----------
-    count
-        The number of values.
-    """
-
-    def __init__(self) -> None:
-        self._values = Quantiles(_MAX_LATENCIES)
-        self._buffer: list[float] = []
-        self._block: list[float] = []
-        self._block_median: float | None = None
-        self.count = 0
-
-    def add(self, secs: float) -> float | None:
-        """Add a value, s; return the size of a jump of the median where one has just shown."""
-        self.count += 1
-        self._buffer.append(secs)
-        if len(self._buffer) >= _BUFFER:
-            self._flush()
-        self._block.append(secs)
-        if len(self._block) < _BLOCK:
-            return None
-        before, self._block_median = self._block_median, median(self._block)
-        self._block.clear()
-        jump = 0.0 if before is None else self._block_median - before
-        return jump if abs(jump) > _JUMP_SECS else None
-
-    def quantiles(self) -> tuple[float, float, float]:
-        """Return the median and the 5 % and 95 % quantiles, s."""
-        self._flush()
-        low, middle, high = np.quantile(self._values.values, (0.05, 0.5, 0.95)).tolist()
-        return middle, low, high
-
-    def _flush(self) -> None:
-        self._values.add(np.array(self._buffer))
-        self._buffer.clear()
-
-
-@dataclass
-class _Receiver:
-    """The last time of one receiver."""
-
-    utc_ns: int | None = None
-    latency_ns: int = 0
-    period_ns: int = 10**9
-    rollovers: int = 0
-    contradicts: bool = False
-    latencies: dict[str, Latency] = field(default_factory=dict)  # by formatter
-
-
 class GnssClock:
-    """The times of all receivers of a stream.
+    """The times of all receivers of a stream, and the times of measurement of what they send.
+
+    The times of a receiver are those of its fixes. A message without a time was measured at the
+    epoch of its burst, where its source sends bursts of one message of each kind; else before its
+    reception by the least recent latency of the receiver, because a message can be delayed and
+    never be early. A receiver whose times do not step as its messages come, such as one that states
+    the last full second of a clock of its own, does not state the times of its measurements.
+
+    The first messages of a receiver wait until its times show whether they can be used: a change
+    from one clock to another in the middle of a log would be a step of its clock.
 
     Parameters
     ----------
     warn
         Receives warnings: a rollover, a jump, a date that contradicts the times of reception.
+    is_applied
+        Whether the time of measurement is the receiver's own, rather than that of reception.
     received_is_known
         Whether the times of reception are known; if not, there are no latencies.
-    remedy
-        What to do about a late receiver, for the warning; empty where there is nothing to do.
+    in_bursts
+        Whether the sources are talkers of NMEA 0183, which send bursts and may be no receivers.
+    clock_kinds
+        The kinds of messages that state the time without a fix; they are used only where their
+        source sends no others.
     """
 
-    def __init__(self, warn: Warn, *, received_is_known: bool = True, remedy: str = "") -> None:
+    def __init__(
+        self,
+        warn: Warn,
+        *,
+        is_applied: bool = False,
+        received_is_known: bool = True,
+        in_bursts: bool = False,
+        clock_kinds: Collection[str] = (),
+    ) -> None:
         self._warn = warn
+        self._is_applied = is_applied
         self._received_is_known = received_is_known
-        self._remedy = f"; {remedy}" if remedy else ""
-        self._receivers: dict[str, _Receiver] = {}
+        self._in_bursts = in_bursts
+        self._clock_kinds = clock_kinds
+        self._receivers: dict[str, GnssReceiver] = {}
 
-    def set_time(self, source: str, formatter: str, utc: Utc, received_ns: int) -> int | None:
-        """Take the time in a sentence, and return it as ns since 1970-01-01 UTC.
+    def set_time(self, source: str, kind: str, utc: Utc, received_ns: int) -> int | None:
+        """Take the time in a message, and return it as ns since 1970-01-01 UTC.
 
         A date that is early by rollovers of the GPS week is corrected. None where the date
         contradicts the time of reception otherwise.
         """
-        receiver = self._receivers.get(source)
+        receiver = self._receiver_of(source, received_ns)
         if receiver is None:
-            if len(self._receivers) >= _MAX_SOURCES:
-                return None
-            receiver = self._receivers[source] = _Receiver()
+            return None
         utc_ns = self._dated(source, receiver, utc, received_ns)
         if utc_ns is None:
             return None
-        if receiver.utc_ns is not None and utc_ns > receiver.utc_ns:
-            receiver.period_ns = utc_ns - receiver.utc_ns
-        receiver.utc_ns, receiver.latency_ns = utc_ns, received_ns - utc_ns
+        if self._becomes_reference(receiver.times, kind, received_ns):
+            receiver.times.set_reference(kind)
+        if kind == receiver.times.reference:
+            receiver.times.set_time(utc_ns, received_ns)
         if self._received_is_known:
-            latency = receiver.latencies.setdefault(formatter, Latency())
-            if (jump := latency.add(receiver.latency_ns * 1e-9)) is not None:
-                self._warn(
-                    f"{source}{formatter}: reception against GNSS time jumps by {jump:+.2f} s: "
-                    "the recorder's clock or the receiver was set",
-                    received_ns,
-                )
+            self._compare(source, receiver, kind, (utc_ns, received_ns))
         return utc_ns
 
-    def measured_ns(self, source: str, received_ns: int) -> int:
-        """Return the time of measurement of a sentence without a time, ns.
+    def write_measured(
+        self,
+        source: str,
+        kind: str,
+        times: tuple[int, int | None],
+        write: WriteSamples,
+    ) -> None:
+        """Write the samples of a message with their time of measurement, now or when it is known.
 
-        It is that of the burst to which it belongs, where its talker sends times; else that of
-        reception.
+        Parameters
+        ----------
+        source, kind
+            The receiver, and the kind of the message.
+        times
+            The time of reception, ns, and the one in the message, as `set_time` has returned it;
+            None where it has none.
+        write
+            Writes the samples, given the time of measurement, ns. Calls keep their order for each
+            source.
         """
+        received_ns, stated_ns = times
+        receiver = self._receiver_of(source, received_ns) if self._is_applied else None
+        if receiver is None or receiver.is_applied is False:
+            write(received_ns)
+            return
+        receiver.add(HeldMessage(kind, received_ns, stated_ns, write))
+        if receiver.is_applied is not None:
+            receiver.release(in_bursts=self._in_bursts)
+
+    def _receiver_of(self, source: str, received_ns: int) -> GnssReceiver | None:
+        """Return a receiver, a new one where there is room for it."""
         receiver = self._receivers.get(source)
-        if receiver is None or receiver.utc_ns is None:
-            return received_ns
-        time_ns = received_ns - receiver.latency_ns
-        since_ns = time_ns - receiver.utc_ns
-        if not 0 <= since_ns < _SILENCE_NS:
-            return received_ns
-        if since_ns < 1.5 * receiver.period_ns:
-            return receiver.utc_ns + round(since_ns / receiver.period_ns) * receiver.period_ns
-        return time_ns
+        if receiver is None and len(self._receivers) < _MAX_SOURCES:
+            receiver = self._receivers[source] = GnssReceiver(received_ns)
+        return receiver
 
     def notes(self) -> Iterator[tuple[str, str]]:
-        """Yield the latency of each kind of sentence, as key and text for the metadata of a log."""
+        """Yield the latency of each kind of message, as key and text for the metadata of a log."""
         for source, receiver in self._receivers.items():
-            for formatter, latency in receiver.latencies.items():
+            for kind, latency in receiver.latencies.items():
                 middle, low, high = latency.quantiles()
-                key = f"latency_s.{source}.{formatter.strip()}"
+                key = f"latency_s.{source}.{kind.strip()}"
                 yield key, f"{middle:.3f} (90 % from {low:.3f} to {high:.3f})"
 
     def finish(self) -> None:
-        """Report latencies that matter, one warning for each receiver."""
+        """Write what waits, and report what the times of the receivers show."""
         for source, receiver in self._receivers.items():
-            late = {
-                formatter: middle
-                for formatter, latency in receiver.latencies.items()
-                if abs(middle := latency.quantiles()[0]) > _MIN_LATENCY_SECS
-            }
-            if not late:
-                continue
-            listed = ", ".join(f"{kind.strip()} {secs:.2f} s" for kind, secs in late.items())
-            if max(map(abs, late.values())) < _MIN_OFFSET_SECS and min(late.values()) > 0:
-                cause = f"the receiver is late{self._remedy}"
-            else:
-                cause = "the recorder's clock is wrong by about as much"
-            self._warn(f"{source}: reception minus GNSS time is {listed}: {cause}", None)
+            receiver.decide()
+            receiver.release(in_bursts=self._in_bursts)
+            if self._is_applied and not (receiver.is_applied or receiver.slips):
+                self._report_reception(source, receiver)
+            self._report_latency(source, receiver)
 
-    def _dated(self, source: str, receiver: _Receiver, utc: Utc, received_ns: int) -> int | None:
+    def _report_reception(self, source: str, receiver: GnssReceiver) -> None:
+        """Report why the samples of a receiver have the time of reception."""
+        if receiver.is_offset:
+            cause = "its own differs by more than a latency"
+        elif receiver.times.count:
+            cause = f"its first time came over {MAX_WAIT_NS // 10**9} s after its first message"
+        elif self._in_bursts:
+            return  # no receiver
+        else:
+            cause = "it sends no time"
+        self._warn(f"{source}: its samples have the time of reception: {cause}", None)
+
+    def _report_latency(self, source: str, receiver: GnssReceiver) -> None:
+        """Report latencies that matter, in one warning."""
+        late = {
+            kind: middle
+            for kind, latency in receiver.latencies.items()
+            if abs(middle := latency.quantiles()[0]) > _MIN_LATENCY_SECS
+        }
+        if not late or receiver.slips:
+            return
+        listed = ", ".join(f"{kind.strip()} {secs:.2f} s" for kind, secs in late.items())
+        if max(map(abs, late.values())) < _MIN_OFFSET_SECS and min(late.values()) > 0:
+            cause = "the receiver is late"
+            if not self._is_applied:
+                cause += "; with --time gnss its samples have its own time"
+        else:
+            cause = "the recorder's clock is wrong by about as much"
+        self._warn(f"{source}: reception minus GNSS time is {listed}: {cause}", None)
+
+    def _becomes_reference(self, times: ReceiverTimes, kind: str, received_ns: int) -> bool:
+        """Whether a kind of message states the time of a receiver from here on."""
+        if not times.reference or received_ns - times.received_ns >= _SILENCE_NS:
+            return True
+        return times.reference in self._clock_kinds and kind not in self._clock_kinds
+
+    def _compare(
+        self, source: str, receiver: GnssReceiver, kind: str, times: tuple[int, int]
+    ) -> None:
+        """Compare a time in a message with that of its reception, and warn of a jump or slip."""
+        utc_ns, received_ns = times
+        latency = receiver.latencies.setdefault(kind, Latency())
+        if (jump := latency.add((received_ns - utc_ns) * 1e-9)) is not None:
+            self._warn(
+                f"{source}{kind}: reception against GNSS time jumps by {jump:+.2f} s: "
+                "the recorder's clock or the receiver was set",
+                received_ns,
+            )
+        slip = receiver.steps.setdefault(kind, TimeSteps()).slip(utc_ns, received_ns)
+        is_unused = kind in self._clock_kinds and kind != receiver.times.reference
+        if slip is None or receiver.slips or is_unused:
+            return
+        receiver.slips = True
+        text = (
+            f"{source}{kind}: GNSS time steps by {slip[0]:.2f} s within {slip[1]:.2f} s of "
+            "reception: it is not the time of measurement"
+        )
+        if receiver.is_applied:
+            text += "; record it without --time gnss"
+        elif self._is_applied:
+            text += ", which is that of reception"
+        self._warn(text, received_ns)
+
+    def _dated(self, source: str, receiver: GnssReceiver, utc: Utc, received_ns: int) -> int | None:
         if utc.day is None:
             return nearest_ns(utc.clock_ns, received_ns)
         utc_ns = utc.day * DAY_NS + utc.clock_ns
@@ -225,6 +258,17 @@ class GnssClock:
                 received_ns,
             )
         return None
+
+
+def add_time_option(parser: argparse.ArgumentParser) -> None:
+    """Add the option ``--time``, which applies the times of receivers."""
+    parser.add_argument(
+        "--time",
+        choices=("received", "gnss"),
+        default="received",
+        help="time of measurement of what GNSS receivers send: that of reception, or the "
+        "receiver's own (default: received)",
+    )
 
 
 def _day(time_ns: int) -> str:

@@ -166,9 +166,53 @@ def test_the_latency_of_a_receiver_is_noted_and_a_late_one_warned_about() -> Non
     decoded = decode_file(NMEA2000, lines)
     assert decoded.values("/gnss_time/27")[0] == pytest.approx(1.7e9)
     assert decoded.counts.notes["latency_s.27.126992"].startswith("0.400 ")
-    assert decoded.counts.warnings == (
-        "address 27: reception minus GNSS time is 126992 0.40 s: the receiver is late",
+    [warning] = decoded.counts.warnings
+    assert warning == (
+        "address 27: reception minus GNSS time is 126992 0.40 s: "
+        "the receiver is late; with --time gnss its samples have its own time"
     )
+
+
+def _receiver(seconds: int, latency: float) -> list[bytes]:
+    """Return the frames of a receiver with a fix each second and five rapid positions."""
+    lines = []
+    for n in range(seconds):
+        days, clock = divmod(1.7e9 + n, 86_400)
+        fix = FIX[:1] + struct.pack("<HI", int(days), round(clock * 10_000)) + FIX[7:]
+        frames = _canboat.fast_packet_fragment(n % 8, fix)
+        lines += [candump(129029, frame, time=1.7e9 + n + latency) for frame in frames]
+        for k in range(5):
+            data = struct.pack("<ii", 540_000_000, 100_000_000)
+            lines.append(candump(129025, data, time=1.7e9 + n + latency + 0.2 * k))
+            lines.append(candump(127250, bytes.fromhex("ff1027ff7fff7ffc"), time=1.7e9 + n))
+    return lines
+
+
+def test_gnss_time_is_the_time_of_measurement_of_a_receivers_messages_on_request() -> None:
+    lines = _receiver(20, 0.4)
+    received, applied = decode_file(NMEA2000, lines), decode_file(NMEA2000, lines, "--time", "gnss")
+    fix, rapid = applied.channels["/position/27.gnss"], applied.channels["/position/27"]
+    start_ns = 1_700_000_000 * 10**9
+    assert fix.measured_ns.tolist() == [start_ns + n * 10**9 for n in range(20)]
+    np.testing.assert_allclose(rapid.received_ns - rapid.measured_ns, 0.4e9, atol=2000)
+    for topic, channel in received.channels.items():
+        assert channel.measured_ns.tolist() == channel.received_ns.tolist()
+        assert applied.channels[topic].received_ns.tolist() == channel.received_ns.tolist()
+        assert applied.channels[topic].values.tobytes() == channel.values.tobytes()
+    for topic in ("/heading/27", "/gnss_time/27.gnss"):
+        channel = applied.channels[topic]
+        assert channel.measured_ns.tolist() == channel.received_ns.tolist()
+    assert received.counts.accepted == applied.counts.accepted
+
+
+@pytest.mark.parametrize("size", [1, 13])
+def test_where_batches_are_cut_changes_no_time_of_measurement(size: int) -> None:
+    lines = _receiver(12, 0.4)
+    cut = decode_file(NMEA2000, lines, "--time", "gnss", size=size)
+    whole = decode_file(NMEA2000, lines, "--time", "gnss")
+    assert {t: c.measured_ns.tolist() for t, c in cut.channels.items()} == {
+        t: c.measured_ns.tolist() for t, c in whole.channels.items()
+    }
 
 
 def test_a_rollover_of_the_gps_week_is_corrected_with_a_warning() -> None:

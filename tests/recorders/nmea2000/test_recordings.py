@@ -62,6 +62,46 @@ def test_triton_has_five_speeds_of_which_three_are_stuck(recordings: Path, tmp_p
     assert log["/magnetic_heading/27"].values.size == 521
 
 
+def test_gnss_time_of_triton_is_applied_where_it_is_that_of_the_fix(
+    recordings: Path, tmp_path: Path
+) -> None:
+    """Address 23 states the last full second of a clock that is out of step with its messages.
+
+    Against the positions of 52, its own spread by 1.1 m at the stated times and by 0.6 m at those
+    of reception.
+    """
+    file = recordings / "nmea2000" / "triton-engine-setup.all"
+    log, counts = _record(file, tmp_path / "t.mcap", "--time", "gnss")
+    fix, rapid = log["/position/52.gnss"], log["/position/52"]
+    assert set(np.diff(fix.measured_ns).tolist()) == {10**9}
+    assert set((fix.measured_ns % 10**9).tolist()) == {200_000_000}
+    assert np.ptp(rapid.received_ns - rapid.measured_ns) == 0
+    late = log["/position/23.gnss"]
+    assert late.measured_ns.tolist() == late.received_ns.tolist()
+    assert len(counts.warnings) == 1
+    assert "23 129029: GNSS time steps by 2.00 s within 1.01 s" in counts.warnings[0]
+
+
+def test_latencies_of_susteranna_are_applied_without_a_step_of_any_clock(
+    recordings: Path, tmp_path: Path
+) -> None:
+    file = recordings / "nmea2000" / "susteranna-actisense-serial.raw"
+    _record(file, tmp_path / "s.mcap", "--time", "gnss")
+    log = shiplog.read(tmp_path / "s.mcap")
+    latencies = {
+        source: np.unique(
+            log[f"position/{source}"].received_ns - log[f"position/{source}"].measured_ns
+        )
+        for source in ("0", "18", "127")
+    }
+    assert {s: (v * 1e-9).round(3).tolist() for s, v in latencies.items()} == {
+        "0": [0.0],  # its time stands still for four seconds
+        "18": [0.963],
+        "127": [0.517],
+    }
+    assert not [text for text in log.warnings if "clock of the sensor" in text]
+
+
 def test_furuno_turns_without_a_rudder(recordings: Path, tmp_path: Path) -> None:
     file = recordings / "nmea2000" / "furuno-130842-wide-turn.raw"
     log, counts = _record(file, tmp_path / "f.mcap")

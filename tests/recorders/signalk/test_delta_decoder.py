@@ -102,6 +102,36 @@ def test_stamps_before_the_deltas_are_their_times_of_reception() -> None:
     assert (channel.measured_ns - (TIME_NS - 250_000_000)).tolist() == [0, 10**9, 2 * 10**9]
 
 
+def _timed(n: int) -> bytes:
+    """Return a delta of a receiver with a fix and its time, and one of its other sensors."""
+    fix = ("navigation.position", {"latitude": 54, "longitude": 10})
+    time = f"2026-11-29T08:00:{n:02d}Z"
+    stamp = f"2026-11-29T08:00:{n:02d}.300Z"
+    values = [fix, ("navigation.datetime", time), ("navigation.headingTrue", 1.0)]
+    return delta(*values, time=stamp)
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+def test_gnss_time_is_the_time_of_measurement_of_a_receivers_values_on_request(
+    stamped: bool,
+) -> None:
+    stamps = [b"2026-11-29T08:00:%02d.300Z " % n if stamped else b"" for n in range(20)]
+    lines = [stamp + _timed(n) for n, stamp in enumerate(stamps)]
+    decoded = decode_file(SIGNALK, lines, "--time", "gnss")
+    seconds = [TIME_NS - 250_000_000 + n * 10**9 for n in range(20)]
+    assert decoded.channels["/position/n2k.204"].measured_ns.tolist() == seconds
+    heading = decoded.channels["/heading/n2k.204"]
+    assert heading.measured_ns.tolist() == [ns + 300_000_000 for ns in seconds]
+    assert decoded.values("/gnss_time/n2k.204") == [ns * 1e-9 for ns in seconds]
+
+
+def test_the_latency_of_a_receiver_is_noted_and_a_late_one_warned_about() -> None:
+    lines = [b"2026-11-29T08:00:%02d.300Z " % n + _timed(n) for n in range(20)]
+    counts = decode_file(SIGNALK, lines).counts
+    assert counts.notes["latency_s.n2k.204.navigation.datetime"].startswith("0.300 ")
+    assert "the receiver is late; with --time gnss" in counts.warnings[0]
+
+
 def test_other_ships_are_not_recorded() -> None:
     mine = "vessels.urn:mrn:imo:mmsi:230029970"
     lines = [
