@@ -4,6 +4,8 @@ analyse
     Replay a log: states, disturbances, coefficients, residuals, as one `Analysis`.
 plan_replay, Replay
     The same in chunks, for logs longer than memory: the plan first, then the replay.
+estimate
+    Estimate the states of any linear system, given by a system file, from a log.
 identify
     Fit a ship model to one or several logs, with intervals and validation.
 ReadingOptions
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from analysis.check.compare import Comparison, compare
     from analysis.identification.identified_ship import IdentifiedShip
     from analysis.identification.identify import identify
+    from analysis.linear.estimate import SystemEstimate, estimate
     from analysis.replay.plan import Plan, plan_replay
     from analysis.replay.reading_options import ReadingOptions
     from analysis.replay.replay import Replay, analyse
@@ -42,8 +45,10 @@ _MODULES = {
     "ReadingOptions": "replay.reading_options",
     "Replay": "replay.replay",
     "ReplayChunk": "replay.replay_results",
+    "SystemEstimate": "linear.estimate",
     "analyse": "replay.replay",
     "compare": "check.compare",
+    "estimate": "linear.estimate",
     "identify": "identification.identify",
     "plan_replay": "replay.plan",
 }
@@ -57,8 +62,10 @@ __all__ = [
     "ReadingOptions",
     "Replay",
     "ReplayChunk",
+    "SystemEstimate",
     "analyse",
     "compare",
+    "estimate",
     "identify",
     "plan_replay",
 ]

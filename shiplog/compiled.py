@@ -29,6 +29,7 @@ COMPILED_SOURCES = (
     "recorders/simulated",
     "analysis/disturbance",
     "analysis/filters",
+    "analysis/linear",
     "analysis/regression",
     "analysis/signals",
     "analysis/replay/residuals.py",

@@ -23,3 +23,7 @@ class VesselError(ShiplogError):
 
 class LayoutError(ShiplogError):
     """A layout file with errors, or a table that does not match its layout."""
+
+
+class SystemFileError(ShiplogError):
+    """A system file with errors; the message lists all of them."""

@@ -1,11 +1,12 @@
-"""The verbs of the analysis: replay, identify, check.
+"""The verbs of the analysis: replay, identify, estimate, check.
 
 A module for each; what a verb computes is imported when it runs. Nothing imports this folder but
 the entry points of `shiplog.verbs`.
 """
 
 from .check_verb import CHECK
+from .estimate_verb import ESTIMATE
 from .identify_verb import IDENTIFY
 from .replay_verb import REPLAY
 
-__all__ = ["CHECK", "IDENTIFY", "REPLAY"]
+__all__ = ["CHECK", "ESTIMATE", "IDENTIFY", "REPLAY"]

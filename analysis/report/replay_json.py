@@ -12,6 +12,7 @@ from analysis.filters.noise_model import Wave
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit
 from analysis.replay.replay_results import Findings
+from analysis.replay.residuals import ResidualSummary
 from shiplog import __version__
 from shiplog.checks.channel_stats import ChannelStats
 from shiplog.checks.event_table import events_to_json
@@ -65,7 +66,7 @@ def replay_json(findings: Findings) -> JsonObject:
         "track_origin": findings.track_origin,
         "warnings": list(findings.warnings),
     } | events_to_json(findings.events, plan.log_stats.span_ns[0])
-    return _without_nan(result)  # type: ignore[no-any-return]
+    return without_nan(result)  # type: ignore[no-any-return]
 
 
 def _log(findings: Findings) -> JsonObject:
@@ -96,8 +97,8 @@ def _channel(channel: ChannelStats) -> JsonObject:
     }
 
 
-def _residuals(findings: Findings, output: int) -> JsonObject:
-    residuals, noise = findings.residuals[output], findings.plan.noise
+def residual_json(residuals: ResidualSummary) -> JsonObject:
+    """Return the test of an output's innovations as plain numbers."""
     return {
         "unit": residuals.unit,
         "count": residuals.count,
@@ -109,6 +110,12 @@ def _residuals(findings: Findings, output: int) -> JsonObject:
         "correlation_lag_secs": residuals.correlation_lag_secs,
         "white": residuals.white,
         "rejected": residuals.rejected,
+    }
+
+
+def _residuals(findings: Findings, output: int) -> JsonObject:
+    noise = findings.plan.noise
+    return residual_json(findings.residuals[output]) | {
         "measurement_std": float(noise.measurement_std[output]),
         "measurement_std_origin": "log" if noise.measured[output] else "vessel file",
         "process_ratio": float(noise.process_ratio[output]),
@@ -174,10 +181,10 @@ def _windows(fit: CoefficientFit) -> JsonObject:
     }
 
 
-def _without_nan(value: Any) -> Any:  # noqa: ANN401 - walks a tree of JSON
+def without_nan(value: Any) -> Any:  # noqa: ANN401 - walks a tree of JSON
     """Replace every float that JSON does not know by None."""
     if isinstance(value, dict):
-        return {key: _without_nan(inner) for key, inner in value.items()}
+        return {key: without_nan(inner) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_without_nan(inner) for inner in value]
+        return [without_nan(inner) for inner in value]
     return None if isinstance(value, float) and not isfinite(value) else value

@@ -73,7 +73,7 @@ def _residual_table(findings: Findings) -> TextTable:
             f"{rms:.3g}",
             f"{residuals.mean_nis:.3f}" if residuals.judged else "not judged",
             f"{max(low, 0.0):.2f}–{high:.2f}" if residuals.judged else "",
-            *_whiteness_cells(residuals),
+            *whiteness_cells(residuals),
             f"{residuals.rejected}",
         )
         rows.append(cells)
@@ -81,11 +81,11 @@ def _residual_table(findings: Findings) -> TextTable:
         "output", "rms", "mean\nNIS", "expected\n(99 %)",
         "white\np", "ρ", "lag\n[s]", "gated",
     )  # fmt: skip
-    remarks = (*_filter_remarks(findings), *map(_residual_remark, findings.residuals))
+    remarks = (*_filter_remarks(findings), *map(residual_remark, findings.residuals))
     return TextTable("Filter residuals", columns, tuple(rows), remarks)
 
 
-def _whiteness_cells(residuals: ResidualSummary) -> tuple[str, str, str]:
+def whiteness_cells(residuals: ResidualSummary) -> tuple[str, str, str]:
     """Return p-value, largest correlation and its lag; empty where whiteness was not tested."""
     if residuals.white is None:
         return "", "", ""
@@ -117,7 +117,7 @@ def _filter_remarks(findings: Findings) -> Iterator[str]:
     )
 
 
-def _residual_remark(residuals: ResidualSummary) -> str:
+def residual_remark(residuals: ResidualSummary) -> str:
     """Describe the size and the whiteness of an output's innovations in a sentence."""
     name = _words(residuals.name)
     if not residuals.judged:

@@ -24,7 +24,15 @@ from .verb import ExitCode, Verb
 GROUP = "shiplog.verbs"
 # new objects before a search for garbage; a replay leaves none of size, and imports are kept
 RARE_COLLECTION = 100_000
-ORDER = ("record", "info", "convert", "replay", "identify", "check")  # others follow by name
+ORDER = (
+    "record",
+    "info",
+    "convert",
+    "replay",
+    "identify",
+    "estimate",
+    "check",
+)  # others follow by name
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

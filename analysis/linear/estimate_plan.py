@@ -1,0 +1,233 @@
+"""The plan of an estimation: all that must be known of a log before the estimator starts."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.replay.passes import resampled_chunks
+from analysis.replay.reading_options import ReadingOptions
+from shiplog.errors import LogError, UsageError
+from shiplog.progress import ProgressCallback
+from shiplog.resampling import Clock, choose_clock
+from shiplog.screening import ScreenedLog, Screening, screen_log
+from shiplog.types import FloatArray, Log
+
+from .estimator_model import EstimatorModel
+from .initial_estimate import StartSignals
+from .joined_system import (
+    OutputSampling,
+    Quantity,
+    estimator_model,
+    quantities,
+    require_distinguishable,
+    state_names,
+)
+from .methods import EstimatorDesign, KalmanMethod
+from .system import LinearSystem
+from .system_signals import BoundSignal, OutputStats, bind_signals, is_interpolated
+
+MIN_MEASUREMENTS = 4  # the noise is estimated from third differences
+MIN_STRIDE = 1.5  # steps between samples from which an interpolated output is thinned
+
+
+@dataclass(frozen=True, eq=False)
+class EstimatePlan:
+    """The plan of an estimation.
+
+    Attributes
+    ----------
+    name
+        Name of the log.
+    system
+        The system, with fitted spectra.
+    screening
+        What is used of the log.
+    clock
+        The uniform clock.
+    outputs, inputs, schedule
+        The signals in the units of the system.
+    stds
+        (m,): standard deviation of the noise of one measurement of each output.
+    measured
+        (m,): whether it was estimated from the log.
+    start
+        First values and rms values of the outputs.
+    model, design
+        The joined system and the gain; of a varying plant those of the start.
+    quantities
+        What is reported of the estimate.
+    states
+        Names of all N states.
+    smooth
+        Whether the states are smoothed backwards from the end.
+    warnings
+        Problems of the data, each in a sentence.
+    """
+
+    name: str
+    system: LinearSystem
+    screening: Screening
+    clock: Clock
+    outputs: tuple[BoundSignal, ...]
+    inputs: tuple[BoundSignal, ...]
+    schedule: tuple[BoundSignal, ...]
+    stds: FloatArray
+    measured: tuple[bool, ...]
+    start: StartSignals
+    model: EstimatorModel
+    design: EstimatorDesign
+    quantities: tuple[Quantity, ...]
+    states: tuple[str, ...]
+    smooth: bool
+    warnings: tuple[str, ...]
+
+
+def plan_estimate(
+    log: Log,
+    system: LinearSystem,
+    options: ReadingOptions,
+    on_progress: ProgressCallback,
+    *,
+    smooth: bool = False,
+) -> EstimatePlan:
+    """Plan an estimation: choose the clock, measure the noise, design the gain.
+
+    Parameters
+    ----------
+    log
+        The log as recorded.
+    system
+        The system.
+    options
+        Of these the sources of channels, and the channels to derive.
+    on_progress
+        Called with each step and its share done.
+    smooth
+        Smooth the states backwards from the end.
+
+    Raises
+    ------
+    LogError
+        A channel is missing or cannot be used.
+    UsageError
+        A unit does not fit, disturbances cannot be distinguished, or there is no gain.
+    """
+    on_progress("check the log", 0.0)
+    names = tuple(dict.fromkeys(binding.channel for binding in system.bindings))
+    screened = screen_log(
+        log, names, purpose=f"the system {system.name!r}", sources=options.sources,
+        derive=options.derive,
+    )  # fmt: skip
+    stats = screened.screening.stats
+    step = system.step_secs or _step_secs(system, screened)
+    clock = choose_clock(screened, stats, step, channels=names)
+    bound = bind_signals(system.bindings, stats)
+    m, r = len(system.outputs), len(system.inputs)
+    outputs = tuple(_with_stride(signal, clock) for signal in bound[:m])
+    collected = _output_stats(screened, clock, outputs, on_progress)
+    stds, measured = _noise(outputs, collected, clock)
+    intervals = np.array([_interval(each, clock) for each in outputs])
+    model = estimator_model(system, OutputSampling(stds**2, intervals, clock.dt_secs))
+    require_distinguishable(system, model)
+    _require_method(system, smooth=smooth)
+    return EstimatePlan(
+        name=log.name,
+        system=system,
+        screening=screened.screening,
+        clock=clock,
+        outputs=outputs,
+        inputs=bound[m : m + r],
+        schedule=bound[m + r :],
+        stds=stds,
+        measured=measured,
+        start=StartSignals(
+            np.array([each.first for each in collected]),
+            np.sqrt([each.moments.mean_square for each in collected]),
+        ),
+        model=model,
+        design=system.method.design(model),
+        quantities=quantities(system, model),
+        states=state_names(system),
+        smooth=smooth,
+        warnings=screened.screening.warnings,
+    )
+
+
+def _step_secs(system: LinearSystem, log: ScreenedLog) -> float | None:
+    """Return the step of the clock: the shortest interval of an output, or the longest.
+
+    A constant gain assumes that all outputs are measured at every step.
+    """
+    stats = log.screening.stats
+    intervals = [stats[output.channel].interval_secs for output in system.outputs]
+    intervals = [each for each in intervals if each > 0]
+    if not intervals:
+        return None
+    is_optimal = isinstance(system.method, KalmanMethod) and not system.method.steady_state
+    return min(intervals) if is_optimal else max(intervals)
+
+
+def _with_stride(signal: BoundSignal, clock: Clock) -> BoundSignal:
+    channel = clock.channels[signal.binding.channel]
+    ratio = channel.interval_secs / clock.dt_secs
+    thinned = is_interpolated(channel) and not channel.hold and ratio > MIN_STRIDE
+    return replace(signal, stride=round(ratio)) if thinned else signal
+
+
+def _interval(output: BoundSignal, clock: Clock) -> float:
+    """Return the time from one measurement of an output to the next, s."""
+    channel = clock.channels[output.binding.channel]
+    return max(0.0 if channel.hold else channel.interval_secs, clock.dt_secs)
+
+
+def _output_stats(
+    log: ScreenedLog, clock: Clock, outputs: tuple[BoundSignal, ...], on_progress: ProgressCallback
+) -> tuple[OutputStats, ...]:
+    collected = tuple(OutputStats() for _ in outputs)
+    for signals in resampled_chunks(log, clock, on_progress, "resample"):
+        for output, stats in zip(outputs, collected, strict=True):
+            stats.add(output.measured(signals))
+    for output, stats in zip(outputs, collected, strict=True):
+        if stats.moments.count < MIN_MEASUREMENTS:
+            raise LogError(
+                f"channel {output.binding.channel!r} has {stats.moments.count} samples where the"
+                f" other channels have some, too, but {MIN_MEASUREMENTS} are needed; check the"
+                f" recorder or choose another log: {log.name}"
+            )
+    return collected
+
+
+def _noise(
+    outputs: tuple[BoundSignal, ...], collected: tuple[OutputStats, ...], clock: Clock
+) -> tuple[FloatArray, tuple[bool, ...]]:
+    """Return the noise (m,) of one measurement on the clock, stated or estimated from the log.
+
+    The mean of the samples within a step of the clock has less noise than one sample.
+    """
+    stds, measured = np.zeros(len(outputs)), []
+    for k, (output, stats) in enumerate(zip(outputs, collected, strict=True)):
+        channel = clock.channels[output.binding.channel]
+        stated = output.binding.std
+        if stated is None:
+            stds[k] = stats.noise_std
+        else:
+            averaged = 1.0 if is_interpolated(channel) else channel.interval_secs / clock.dt_secs
+            stds[k] = abs(output.binding.scale) * stated * np.sqrt(min(averaged, 1.0))
+        measured.append(stated is None)
+    return stds, tuple(measured)
+
+
+def _require_method(system: LinearSystem, *, smooth: bool) -> None:
+    """Refuse a method that the system or the request does not allow."""
+    method = system.method
+    if system.linearise is not None and not method.per_tick:
+        raise UsageError(
+            f"the method {method.name!r} has a constant gain, but the plant varies along its"
+            " trajectory; use kalman, per-tick or reduced-order"
+        )
+    is_optimal = isinstance(method, KalmanMethod) and not method.steady_state
+    if smooth and not is_optimal:
+        raise UsageError(
+            f"the method {method.name!r} cannot be smoothed: the smoother assumes the optimal gain;"
+            " use kalman with a time-varying gain"
+        )

@@ -1,0 +1,171 @@
+"""The estimator of a plan over chunks of signals: gains, ticks of a varying plant, stages."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.errors import UsageError
+from shiplog.types import FloatArray
+
+from .estimate_plan import EstimatePlan
+from .initial_estimate import initial_estimate
+from .joined_system import OutputSampling, estimator_model
+from .linear_loop import StretchModel, StretchResult, run_stretch, stretch_model
+from .methods import EstimatorDesign
+
+MAX_STRETCH = 4096  # samples whose covariances are in memory at once
+
+
+@dataclass(frozen=True, eq=False)
+class EstimatorRun:
+    """What the estimator returns for the k instants of a chunk.
+
+    Attributes
+    ----------
+    first
+        Number of instants at its start without an estimate, for want of inputs; NaN there.
+    states, covariances
+        (k, N) and (k, N, N).
+    predicted, innovations, variances
+        (k, m): as in `StretchResult`.
+    """
+
+    first: int
+    states: FloatArray
+    covariances: FloatArray
+    predicted: FloatArray
+    innovations: FloatArray
+    variances: FloatArray
+
+
+class Estimator:
+    """The estimator of a plan; it carries its state from chunk to chunk.
+
+    Parameters
+    ----------
+    plan
+        The plan.
+    """
+
+    def __init__(self, plan: EstimatePlan) -> None:
+        self._plan, system = plan, plan.system
+        self._sampling = OutputSampling(plan.model.r, plan.model.intervals, plan.clock.dt_secs)
+        ticks = (system.tick_secs or plan.clock.dt_secs) / plan.clock.dt_secs
+        self._tick = None if system.linearise is None else max(1, round(ticks))
+        self._design, self._model = plan.design, stretch_model(plan.model, plan.design)
+        self._started, self._count, self._skipped = False, 0, 0
+        self._x: FloatArray = np.zeros(0)
+        self._P: FloatArray = np.zeros((0, 0))
+        self._before: FloatArray = np.zeros(0)
+        self._stages: list[FloatArray] = []
+
+    def step(self, y: FloatArray, u: FloatArray, at: FloatArray) -> EstimatorRun:
+        """Run over the next chunk.
+
+        Parameters
+        ----------
+        y
+            (k, m): measured outputs, NaN where there are none.
+        u
+            (k, inputs): inputs, NaN before their first sample.
+        at
+            (k, s): scheduling signals, likewise.
+        """
+        first = 0
+        if not self._started:
+            known = np.isfinite(u).all(axis=1) & np.isfinite(at).all(axis=1)
+            first = int(np.argmax(known)) if known.any() else len(y)
+            self._skipped += first
+            if known.any():
+                self._start(u[first], at[first])
+        results, k = [_no_estimate(first, self._model)], first
+        while k < len(y):
+            end = min(k + self._length(), len(y))
+            results.append(self._run(y[k:end], u[k:end]))
+            if self._tick and self._count % self._tick == 0:
+                self._linearise(at[end - 1])
+            k = end
+        arrays = [np.concatenate([getattr(r, name) for r in results]) for name in _KEPT]
+        return EstimatorRun(first, *arrays)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return a warning where the estimate began late."""
+        if not self._skipped:
+            return ()
+        secs = self._skipped * self._plan.clock.dt_secs
+        return (f"the inputs are not known before {secs:.1f} s; the estimates begin there",)
+
+    def _start(self, u: FloatArray, at: FloatArray) -> None:
+        plan = self._plan
+        self._x, self._P = initial_estimate(plan.system, plan.model, plan.start, u)
+        self._before = u.copy()
+        self._stages = [self._x.copy() for _ in range(plan.design.stages - 1)]
+        if self._tick:
+            self._linearise(at)
+
+    def _length(self) -> int:
+        """Return the number of samples until the next tick, or the longest stretch."""
+        return self._tick - self._count % self._tick if self._tick else MAX_STRETCH
+
+    def _linearise(self, at: FloatArray) -> None:
+        """Linearise the plant at the estimate and the scheduling signals, (s,), of this instant."""
+        system = self._plan.system
+        assert system.linearise is not None  # noqa: S101 - there is a tick only with it
+        there = system.linearise(self._x[: len(system.plant.A)], at)
+        model = estimator_model(system, self._sampling, there)
+        if self._design.correction is not None:
+            secs = self._count * self._plan.clock.dt_secs
+            try:
+                self._design = system.method.design(model)
+            except UsageError as error:
+                raise UsageError(f"no gain at {secs:.1f} s: {error}") from None
+        self._model = stretch_model(model, self._design)
+
+    def _run(self, y: FloatArray, u: FloatArray) -> StretchResult:
+        before = self._before.copy()
+        result = run_stretch(
+            self._model, self._x, self._P, self._before, np.ascontiguousarray(y),
+            np.ascontiguousarray(u), not self._started,
+        )  # fmt: skip
+        states = result.states
+        for stage in self._stages:
+            states = self._run_stage(stage, before.copy(), states, u)
+        self._started = True
+        self._count += len(y)
+        return result._replace(states=states)
+
+    def _run_stage(
+        self, x: FloatArray, before: FloatArray, measured: FloatArray, u: FloatArray
+    ) -> FloatArray:
+        """Run a stage of a cascade whose measurements are the states of the stage before."""
+        model, N = stage_model(self._model, self._design), len(x)
+        result = run_stretch(
+            model, x, np.zeros((N, N)), before, measured, np.ascontiguousarray(u), not self._started
+        )
+        return result.states
+
+
+_KEPT = ("states", "covariances", "predicted", "innovations", "variances")
+
+
+def stage_model(model: StretchModel, design: EstimatorDesign) -> StretchModel:
+    """Return the model of a stage of a cascade, whose output is the whole state."""
+    N, inputs = model.G0.shape
+    assert design.stage_correction is not None  # noqa: S101 - of a cascade
+    return model._replace(
+        C=np.eye(N),
+        D=np.zeros((N, inputs)),
+        r=np.ones(N),
+        M=np.ascontiguousarray(design.stage_correction),
+        optimal=False,
+    )
+
+
+def _no_estimate(count: int, model: StretchModel) -> StretchResult:
+    """Return the result of instants without an estimate: NaN throughout."""
+    N, m = model.M.shape
+    vector, matrix = np.full((count, N), np.nan), np.full((count, N, N), np.nan)
+    outputs = np.full((count, m), np.nan)
+    return StretchResult(
+        vector, matrix, outputs, outputs, outputs, np.zeros((count, m, N)), outputs, outputs
+    )

@@ -1,0 +1,337 @@
+"""Parser of system files; reports all errors of a file at once."""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import tf2ss
+
+from analysis.design.augmentation import Exosystem, Plant
+from analysis.design.shaping import TransferFunction
+from shiplog.errors import SystemFileError, UsageError
+from shiplog.toml_text import list_errors, parse_toml
+from shiplog.types import FloatArray
+from shiplog.units import UNITS, did_you_mean
+
+from .file_section import FileSection
+from .method_section import parse_method, parse_regulator
+from .plants import BUILT_IN, PlantForm
+from .spectra import RATIONAL, SPECTRA, ShapedNoise
+from .system import ChannelBinding, LinearSystem, SystemDisturbance
+
+KIND = "system file"
+DISTURBANCE_MODELS = ("constant", "ramp", "polynomial", "exponential", "harmonic")
+
+
+def load_system(path: str | os.PathLike[str]) -> LinearSystem:
+    """Load a system file.
+
+    Raises
+    ------
+    SystemFileError
+        The file cannot be read or has errors; the message lists all of them.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise SystemFileError(
+            f"cannot read the system file ({reason}); name another: {path}"
+        ) from error
+    return parse_system(text, os.fspath(path))
+
+
+def parse_system(text: str, where: str) -> LinearSystem:
+    """Parse the text of a system file.
+
+    Parameters
+    ----------
+    text
+        TOML; docs/linear_systems.md describes the keys.
+    where
+        Name of the file, for messages, and for files that it names.
+
+    Raises
+    ------
+    SystemFileError
+        The text has errors; the message lists all of them.
+
+    Examples
+    --------
+    >>> parse_system("plant.model = 'rol'", "roll.toml")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    shiplog.errors.SystemFileError: ... plant.model must be one of ... did you mean 'roll'?...
+    """
+    errors: list[str] = []
+    top = FileSection(parse_toml(text, where, KIND, SystemFileError), "", errors)
+    try:
+        system = _system(top, Path(where))
+    except UsageError as error:  # of a matrix function
+        errors.append(str(error))
+    top.finish()
+    if errors:
+        raise SystemFileError(list_errors(list(dict.fromkeys(errors)), KIND, where))
+    return system
+
+
+def _system(top: FileSection, where: Path) -> LinearSystem:
+    plant = FileSection(top.table.get("plant", {}), "plant", top.errors)
+    if "plant" not in top:
+        top.errors.append("[plant] is missing")
+    form = _plant(plant, where.parent)
+    plant.finish()
+    outputs, inputs = _bindings(top, "outputs"), _bindings(top, "inputs")
+    if not outputs:
+        top.errors.append("[outputs.NAME] is missing: name the channels that are measured")
+    schedule = _schedule(top, form)
+    form = _bound(form, outputs, inputs, top.errors)
+    states, sensors = tuple(form.states), tuple(each.name for each in outputs)
+    names = tuple(each.name for each in inputs)
+    noise = FileSection(top.table.get("noise", {}), "noise", top.errors)
+    W = _process_noise(noise, form) if "noise" in top else np.zeros((len(states),) * 2)
+    noise.finish()
+    disturbances = [_disturbance(each, states, names, sensors) for each in top.items("disturbance")]
+    shaped = [_shaped(each, states, sensors) for each in top.items("coloured")]
+    extra = [each.name for each in disturbances] + [each.name for each in shaped]
+    _require_different([*states, *extra], top.errors)
+    initial = FileSection(top.table.get("initial", {}), "initial", top.errors)
+    known = [*states, *(d.name for d in disturbances)]
+    x0, stds = initial.by_name("state", known), initial.by_name("std", known, least=0.0)
+    if "initial" in top:
+        initial.finish()
+    method = parse_method(top, states)
+    return LinearSystem(
+        name=top.text("name", where.stem),
+        plant=Plant(form.A, form.B, _given(form.C), states, sensors),
+        D=_given(form.D),
+        units=tuple(form.states.values()),
+        inputs=inputs,
+        outputs=outputs,
+        W=W,
+        method=method,
+        disturbances=tuple(disturbances),
+        shaped=tuple(shaped),
+        initial=x0,
+        initial_std=stds,
+        schedule=schedule,
+        linearise=form.linearise,
+        tick_secs=_optional(top, "tick_secs"),
+        step_secs=_optional(top, "step_secs"),
+        regulator=parse_regulator(top, states, names),
+    )
+
+
+def _given(matrix: FloatArray | None) -> FloatArray:
+    return np.zeros((1, 1)) if matrix is None else matrix
+
+
+def _optional(section: FileSection, key: str) -> float | None:
+    return section.number(key, positive=True) if key in section else None
+
+
+def _plant(section: FileSection, folder: Path) -> PlantForm:
+    """Parse ``[plant]``: a model by name, a transfer function, or matrices."""
+    if "model" in section:
+        name = section.text("model", choices=tuple(BUILT_IN))
+        if name in BUILT_IN:
+            return BUILT_IN[name](section, folder)
+    elif "num" in section or "den" in section:
+        num, den = section.numbers("num"), section.numbers("den")
+        if len(num) and 1 < len(den) >= len(num) and den[0]:
+            A, B, C, D = tf2ss(num, den)
+            states = {f"x{k}": "1" for k in range(1, len(A) + 1)}
+            return PlantForm(A, B, states, C=C, D=D)
+        section.errors.append("plant.den must be longer than 1 and not shorter than plant.num")
+    else:
+        return _matrices(section)
+    return PlantForm(np.zeros((1, 1)), np.zeros((1, 0)), {"x": "1"})
+
+
+def _matrices(section: FileSection) -> PlantForm:
+    A = section.matrix("A", None, None)
+    if A is None or A.shape[0] != A.shape[1]:
+        section.errors.append("[plant] needs a square A, or num and den, or model")
+        A = np.zeros((1, 1))
+    n = len(A)
+    B, C = section.matrix("B", n, None), section.matrix("C", None, n)
+    B = np.zeros((n, 0)) if B is None else B
+    D = section.matrix("D", None if C is None else len(C), B.shape[1])
+    states = section.texts("states") or {f"x{k}": "1" for k in range(1, n + 1)}
+    if len(states) != n:
+        section.errors.append(f"plant.states has {len(states)} names, A has {n} rows")
+        states = {f"x{k}": "1" for k in range(1, n + 1)}
+    return PlantForm(A, B, states, C=C, D=D, G=section.matrix("G", n, None))
+
+
+def _bindings(top: FileSection, key: str) -> tuple[ChannelBinding, ...]:
+    """Parse the sections that bind outputs, inputs or scheduling signals to channels."""
+    return tuple(
+        _binding(name, section, has_std=key == "outputs")
+        for name, section in top.sections(key).items()
+    )
+
+
+def _binding(name: str, section: FileSection, *, has_std: bool = False) -> ChannelBinding:
+    unit = section.text("unit") if "unit" in section else None
+    if unit is not None and unit not in UNITS:
+        hint = did_you_mean(unit, UNITS).replace(";", ",")
+        section.errors.append(f"{section.name('unit')} = {unit!r} is not known{hint}")
+    scale = section.number("scale", 1.0)
+    if scale == 0:
+        section.errors.append(f"{section.name('scale')} must not be 0")
+    binding = ChannelBinding(
+        name, section.text("channel", name), unit, section.number("offset", 0.0), scale,
+        section.number("std", positive=True) if has_std and "std" in section else None,
+    )  # fmt: skip
+    section.finish()
+    return binding
+
+
+def _schedule(top: FileSection, form: PlantForm) -> tuple[ChannelBinding, ...]:
+    """Bind the scheduling signals of a plant; by default each is the channel of its name."""
+    sections = top.sections("schedule")
+    for name in sections:
+        if name not in form.schedule:
+            known = ", ".join(form.schedule) or "none"
+            top.errors.append(f"schedule.{name} is not a signal of the plant; it has {known}")
+    return tuple(
+        _binding(name, sections[name]) if name in sections else ChannelBinding(name, name, unit)
+        for name, unit in form.schedule.items()
+    )
+
+
+def _bound(
+    form: PlantForm,
+    outputs: Sequence[ChannelBinding],
+    inputs: Sequence[ChannelBinding],
+    errors: list[str],
+) -> PlantForm:
+    """Return the plant with one row of C for each output and one column of B for each input."""
+    states, n = list(form.states), len(form.A)
+    C, B, D = form.C, form.B, form.D
+    if C is None:
+        C = np.zeros((len(outputs) or 1, n))
+        for row, output in zip(C, outputs, strict=False):
+            if output.name in states:
+                row[states.index(output.name)] = 1.0
+            else:
+                hint = did_you_mean(output.name, states).replace(";", ",")
+                errors.append(
+                    f"outputs.{output.name} is no state of the plant{hint} (without C each output"
+                    f" is one of {', '.join(states)})"
+                )
+    elif len(C) != len(outputs):
+        errors.append(f"C has {len(C)} rows, but there are {len(outputs)} [outputs.NAME]")
+        C = np.zeros((len(outputs) or 1, n))
+    if form.inputs is not None:
+        known = list(form.inputs)
+        errors += [
+            f"inputs.{each.name} is no input of the plant; it has {', '.join(known)}"
+            for each in inputs
+            if each.name not in known
+        ]
+        if form.linearise is not None and len(inputs) != len(known):
+            errors.append(f"[inputs.NAME] is missing: this plant needs {', '.join(known)}")
+        B = B[:, [known.index(each.name) for each in inputs if each.name in known]]
+    elif B.shape[1] != len(inputs):
+        errors.append(f"B has {B.shape[1]} columns, but there are {len(inputs)} [inputs.NAME]")
+        B = np.zeros((n, len(inputs)))
+    fits = D is not None and D.shape == (len(C), B.shape[1])
+    return PlantForm(
+        form.A, B, form.states, form.inputs, C, D if fits else np.zeros((len(C), B.shape[1])),
+        form.G, form.schedule, form.linearise,
+    )  # fmt: skip
+
+
+def _process_noise(section: FileSection, form: PlantForm) -> FloatArray:
+    """Parse the intensity (n, n) of the process noise: by state, or Q for the columns of G."""
+    states, n = list(form.states), len(form.A)
+    by_state = section.by_name("process", states, least=0.0)
+    W = np.diag([by_state.get(name, 0.0) for name in states])
+    if "Q" not in section:
+        return W
+    G = np.eye(n) if form.G is None else form.G
+    diagonal = section.table["Q"]
+    is_list = isinstance(diagonal, list) and not any(isinstance(q, list) for q in diagonal)
+    Q = np.diag(section.numbers("Q")) if is_list else section.matrix("Q", None, None)
+    if Q is None or len(Q) != G.shape[1] or Q.shape != Q.T.shape:
+        section.errors.append(f"noise.Q must have {G.shape[1]} intensities, one for each noise")
+        return W
+    if not np.allclose(Q, Q.T) or np.linalg.eigvalsh(Q)[0] < -1e-10 * np.abs(Q).max():
+        section.errors.append("noise.Q must be symmetric and positive semidefinite")
+    return W + G @ Q @ G.T
+
+
+def _disturbance(
+    section: FileSection, states: Sequence[str], inputs: Sequence[str], sensors: Sequence[str]
+) -> SystemDisturbance:
+    """Parse a ``[[disturbance]]``."""
+    name = section.text("name")
+    exosystem = _exosystem(section)
+    found = SystemDisturbance(
+        name,
+        exosystem,
+        section.by_name("on_state", states),
+        section.by_name("on_input", inputs),
+        section.by_name("on_sensor", sensors),
+        section.number("intensity", 0.0, least=0.0),
+        section.text("unit", "1"),
+    )
+    if not (found.on_state or found.on_input or found.on_sensor):
+        section.errors.append(
+            f"{section.label} acts on nothing: give on_state, on_input or on_sensor"
+        )
+    section.finish()
+    return found
+
+
+def _exosystem(section: FileSection) -> Exosystem:
+    model = section.text("model", choices=DISTURBANCE_MODELS)
+    if model == "harmonic":
+        frequency = section.number("frequency", positive=True)
+        return Exosystem.harmonic(frequency if frequency > 0 else 1.0)
+    if model == "exponential":
+        rate, degree = section.number("rate"), section.count("degree", 0, least=0)
+        return Exosystem.exponential(rate if np.isfinite(rate) else 0.0, degree)
+    degrees = {"polynomial": section.count("degree", least=0)} if model == "polynomial" else {}
+    return Exosystem.polynomial(degrees.get(model, int(model == "ramp")))
+
+
+def _shaped(section: FileSection, states: Sequence[str], sensors: Sequence[str]) -> ShapedNoise:
+    """Parse a ``[[coloured]]``."""
+    name, unit = section.text("name"), section.text("unit", "1")
+    spectrum = section.text("spectrum", choices=(*SPECTRA, RATIONAL))
+    parameters, rational = _spectrum_parameters(section, spectrum)
+    on_state = section.by_name("on_state", states)
+    on_sensor = section.by_name("on_sensor", sensors)
+    if bool(on_state) == bool(on_sensor):
+        section.errors.append(f"{section.label} needs on_state or on_sensor, not both")
+    fit = section.names("fit", parameters)
+    section.finish()
+    return ShapedNoise(name, spectrum, parameters, on_state, on_sensor, fit, rational, unit)
+
+
+def _spectrum_parameters(
+    section: FileSection, spectrum: str
+) -> tuple[Mapping[str, float], TransferFunction | None]:
+    if spectrum in SPECTRA:
+        defaults = SPECTRA[spectrum].parameters
+        return {
+            key: section.number(key, default, positive=True) for key, default in defaults.items()
+        }, None
+    num, den = section.numbers("num"), section.numbers("den")
+    stable = len(den) > 1 and den[0] and np.roots(den).real.max(initial=-np.inf) < 0
+    if not stable or not 0 < len(num) < len(den):
+        section.errors.append(
+            f"{section.label} needs num and den of a stable filter with fewer zeros than poles"
+        )
+        num, den = np.ones(1), np.ones(2)
+    std = {"std": section.number("std", positive=True)} if "std" in section else {}
+    return std, TransferFunction(num / den[0], den / den[0])
+
+
+def _require_different(names: Sequence[str], errors: list[str]) -> None:
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        errors.append(f"the name {', '.join(map(repr, repeated))} is used more than once")
