@@ -24,6 +24,11 @@ class FrameError(ValueError):
     """A line, frame or message that is rejected; the text is the reason, from a fixed set."""
 
 
+def ngt1_codec() -> _canboat.GatewayCodec:
+    """Make a codec of the binary messages of an Actisense NGT-1."""
+    return _canboat.GatewayCodec("ngt1")
+
+
 def is_fast(pgn: int) -> bool:
     """Whether the messages of a PGN are longer than one frame, as fast packets."""
     return bool(backend.is_fast_pgn(pgn))

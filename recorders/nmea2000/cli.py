@@ -1,4 +1,4 @@
-"""NMEA 2000 as a format of streams: its options, and its own addresses of CAN buses."""
+"""NMEA 2000 as a format of streams: its options, and its own addresses of buses and gateways."""
 
 import argparse
 from datetime import UTC, datetime, timedelta
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .pgn_decoder import PgnDecoder
 
 HEAD_LINES = 5000  # of a file, from which the format is detected
+_BINARY = b"\x1b\x01", b"\x10\x02"  # Actisense's logs (EBL), and the messages of its gateways
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -56,6 +57,11 @@ def _open_file(batches: Batches, options: argparse.Namespace) -> OpenedFile:
     head, batches = peek(batches, HEAD_LINES)
     lines = [packet.data for packet in head]
     line_format = find_format(options.line_format) if options.line_format else detect_format(lines)
+    if line_format is None and any(line.startswith(_BINARY) for line in lines):
+        raise LogError(
+            "the file is binary, such as an EBL log: export it as text, with its times, by "
+            "Actisense's EBL Reader; an NGT-1 is recorded live from ngt1:///dev/ttyUSB0"
+        )
     if line_format is None:
         raise LogError(
             f"none of the first {len(lines)} lines is of a known format of NMEA 2000; known are "
@@ -84,12 +90,13 @@ def _instant_ns(text: str) -> int:
 
 
 def _transport(address: str, clock: "ReceptionClock") -> "Transport | None":
-    """Make the transport of a CAN bus; None where the address is not one of these."""
+    """Make the transport of a CAN bus or an NGT-1; None where the address is not one of these."""
     from .can_address import parse_can_address
+    from .ngt1 import ngt1_transport
 
     parsed = parse_can_address(address)
     if parsed is None:
-        return None
+        return ngt1_transport(address, clock)
     from .can_bus import CanBusTransport
 
     return CanBusTransport(address, parsed, clock)

@@ -1,6 +1,8 @@
 """Lines over a serial port, by pyserial."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Protocol
 
 from recorders.streams.line_splitter import LineSplitter
 from recorders.streams.packets import Packet
@@ -10,6 +12,16 @@ if TYPE_CHECKING:
     import serial
 
 DEFAULT_BAUD = 4800  # of NMEA 0183; 38400 at high speed
+
+
+class Splitter(Protocol):
+    """What splits bytes as they come into lines or messages."""
+
+    def lines(self, data: bytes) -> list[bytes]:
+        """Return the lines that the next bytes complete."""
+
+
+_split_lines = partial(LineSplitter, begins_inside=True)
 
 
 class SerialTransport:
@@ -25,23 +37,38 @@ class SerialTransport:
         The rate, bit/s.
     clock
         The clock of reception.
+    make_splitter
+        Makes what splits the bytes, anew for each connection; by default into lines.
+    greeting
+        Sent to the device when the port is opened.
     """
 
     lost = 0  # the system reports none
 
-    def __init__(self, address: str, device: str, baud: int, clock: ReceptionClock) -> None:
+    def __init__(
+        self,
+        address: str,
+        device: str,
+        baud: int,
+        clock: ReceptionClock,
+        *,
+        make_splitter: Callable[[], Splitter] = _split_lines,
+        greeting: bytes = b"",
+    ) -> None:
         self.address = address
         self._device, self._baud = device, baud
         self._clock = clock
         self._port: serial.Serial | None = None
-        self._splitter = LineSplitter()
+        self._make_splitter, self._greeting = make_splitter, greeting
+        self._splitter = make_splitter()
 
     def open(self) -> None:
         """Open the port, for this process alone; the first line, which may be cut, is discarded."""
         import serial  # noqa: PLC0415 - only where a serial port is used
 
-        self._splitter = LineSplitter(begins_inside=True)
+        self._splitter = self._make_splitter()
         self._port = serial.Serial(self._device, self._baud, exclusive=True)
+        self._port.write(self._greeting)
 
     def receive(self, timeout_secs: float) -> list[Packet]:
         """Return the lines that have arrived, stamped when their ends arrived."""
