@@ -24,6 +24,7 @@ from .augmentation import (
 from .distinguishability import Ambiguity, ambiguities, system_ambiguities
 from .luenberger import POLE_PATTERNS
 from .matrices import as_finite_array
+from .noise_placement import place_for_noise
 from .observability import ComplexArray
 from .placement import checked_poles, place_multilevel
 from .riccati import kalman_gain
@@ -84,7 +85,8 @@ def disturbance_observer(
     """Design the observer of a plant's states and of its disturbances.
 
     Uncoupled parts of the augmented plant are channels, designed one by one, in the order of their
-    first states.
+    first states. In a channel of several sensors many gains have the poles: with `sensor_noise` it
+    is the one of the least noise, otherwise that of `place_multilevel`.
 
     Parameters
     ----------
@@ -99,9 +101,10 @@ def disturbance_observer(
         rad/s: one, or one for each channel.
     state_noise
         (N,): intensity of white noise on the rate of change of each state of plant and exosystems,
-        in squared units of the rate times second; for "kalman".
+        in squared units of the rate times second; for "kalman", and zero by default with poles.
     sensor_noise
-        (m,): intensity of white noise of each sensor, in squared units times second; for "kalman".
+        (m,): intensity of white noise of each sensor, in squared units times second; for "kalman",
+        optional with poles.
 
     Raises
     ------
@@ -130,16 +133,19 @@ def disturbance_observer(
     N, m = len(system.A), len(system.C)
     channels = _channels(system)
     requested = _requested_poles(spectrum, frequency, [len(states) for states, _ in channels])
+    if requested is not None and state_noise is None and sensor_noise is not None:
+        state_noise = np.zeros(N)
     L, poles = np.zeros((N, m)), []
     for k, (states, sensors) in enumerate(channels):
         A, C = system.A[np.ix_(states, states)], system.C[np.ix_(sensors, states)]
-        if requested is None:
-            Q = np.diag(_intensities("state_noise", state_noise, N)[states])
-            R = np.diag(_intensities("sensor_noise", sensor_noise, m)[sensors])
-            kalman = kalman_gain(A, np.eye(len(A)), C, Q, R)
-            gain, closed_poles = kalman.gain, kalman.poles
-        else:
+        if requested is not None and state_noise is None and sensor_noise is None:
             gain, closed_poles = place_multilevel(A, C, requested[k]), requested[k]
+        else:
+            W = np.diag(_intensities("state_noise", state_noise, N)[states])
+            R = np.diag(_intensities("sensor_noise", sensor_noise, m)[sensors])
+            gain, closed_poles = _noise_gain(
+                A, C, None if requested is None else requested[k], W, R
+            )
         L[np.ix_(states, sensors)] = gain
         poles.append(closed_poles)
     return DisturbanceObserver(
@@ -204,10 +210,20 @@ def _requested_poles(
     ]
 
 
+def _noise_gain(
+    A: FloatArray, C: FloatArray, poles: ComplexArray | None, W: FloatArray, R: FloatArray
+) -> tuple[FloatArray, ComplexArray]:
+    """Compute the gain (n, m) of a channel of known noise, and its poles; `None`: the optimal."""
+    if poles is None:
+        kalman = kalman_gain(A, np.eye(len(A)), C, W, R)
+        return kalman.gain, kalman.poles
+    return place_for_noise(A, C, poles, W, R).gain, poles
+
+
 def _intensities(name: str, values: ArrayLike | None, size: int) -> FloatArray:
     """Check intensities of white noise: (size,), none of them negative."""
     if values is None:
-        raise UsageError(f"{name} is missing; kalman needs its intensities, ({size},)")
+        raise UsageError(f"{name} is missing; the gain depends on its intensities, ({size},)")
     intensities = as_finite_array(name, values)
     if intensities.shape != (size,) or np.any(intensities < 0):
         raise UsageError(

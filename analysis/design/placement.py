@@ -6,21 +6,20 @@ corrected: (2.10) places A + L C instead of A - L C, (2.7) starts from A instead
 and the last Φ is printed as m × m.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import block_diag
 
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
 from .matrices import as_matrix, as_square_matrix
+from .multilevel import OBSERVABILITY_TOLERANCE, Multilevel, decompose
 from .observability import ComplexArray
 
-OBSERVABILITY_TOLERANCE = 1e-10  # smallest singular value of an observable direction
 MIN_PARTICIPATION = 1e-6  # a state with a smaller component is not part of a mode
 CONJUGATE_TOLERANCE = 1e-9  # relative distance of a pole from the conjugate of its partner
 CLUSTER_RADIUS = 1e-3  # eigenvalues this close may be one multiple eigenvalue
@@ -53,8 +52,9 @@ def place_multilevel(A: ArrayLike, C: ArrayLike, poles: ArrayLike) -> FloatArray
     odd size for which no real pole remains shares a complex pair with the level above. Poles may be
     repeated as often as wanted, and the gain does not depend on the units of the states.
 
-    With several measurements other gains give the same poles. Uncoupled channels should be placed
-    one by one; placed together they become coupled.
+    With several measurements other gains give the same poles, many of them with far less noise:
+    where the noise is known, use `place_for_noise`. Uncoupled channels should be placed one by one;
+    placed together by this function they become coupled.
 
     Parameters
     ----------
@@ -87,6 +87,53 @@ def place_multilevel(A: ArrayLike, C: ArrayLike, poles: ArrayLike) -> FloatArray
     >>> place_multilevel([[0, 1], [0, 0]], [[1, 0]], [-1, -1]).round(6).tolist()
     [[2.0], [1.0]]
     """
+    return placements(A, C, poles).plain()
+
+
+@dataclass(frozen=True, eq=False)
+class Placements:
+    """All gains that multi-level placement finds for a pair (A, C) and its poles.
+
+    Attributes
+    ----------
+    A, C
+        The pair in natural units.
+    units
+        (n,): the states are `units` times those of A and C.
+    rate
+        1/s: A, the poles and the gain in natural units are those in 1/s over `rate`.
+    poles
+        (n,), in natural units.
+    levels
+        The decomposition of the pair.
+    """
+
+    A: FloatArray
+    C: FloatArray
+    units: FloatArray
+    rate: float
+    poles: ComplexArray
+    levels: Multilevel
+
+    def plain(self) -> FloatArray:
+        """Return the gain (n, m) whose free numbers are zero; raise `UsageError` as `placed`."""
+        return self.placed(self.levels.gain(np.zeros(self.levels.freedom)))
+
+    def placed(self, L: FloatArray) -> FloatArray:
+        """Convert a gain (n, m) from natural units; raise `UsageError` where its poles moved."""
+        error = polynomial_error(self.A - L @ self.C, self.poles)
+        if error > MAX_POLYNOMIAL_ERROR:
+            raise UsageError(
+                f"poles {self.poles.shape}: rounding changes the characteristic polynomial by a"
+                f" relative {error:.1g}; with A {self.A.shape} and C {self.C.shape} a mode is"
+                " almost unobservable or the scales differ too much: measure more states, or use a"
+                " Kalman gain"
+            )
+        return self.rate * self.units[:, None] * L
+
+
+def placements(A: ArrayLike, C: ArrayLike, poles: ArrayLike) -> Placements:
+    """Decompose an observable pair for `place_multilevel`, with its parameters and errors."""
     A = as_square_matrix("A", A)
     C = as_matrix("C", C, columns=len(A))
     requested = checked_poles("poles", poles, len(A))
@@ -97,15 +144,9 @@ def place_multilevel(A: ArrayLike, C: ArrayLike, poles: ArrayLike) -> FloatArray
             " cannot be seen in the measurements; measure another state"
         )
     pair = _natural_units(A, C, float(np.abs(requested).max()))
-    L = _placed(pair.A, pair.C, requested / pair.rate)
-    error = polynomial_error(pair.A - L @ pair.C, requested / pair.rate)
-    if error > MAX_POLYNOMIAL_ERROR:
-        raise UsageError(
-            f"poles {requested.shape}: rounding changes the characteristic polynomial by a relative"
-            f" {error:.1g}; with A {A.shape} and C {C.shape} a mode is almost unobservable or the"
-            " scales differ too much: measure more states, or use a Kalman gain"
-        )
-    return pair.rate * pair.units[:, None] * L
+    requested = requested / pair.rate
+    levels = decompose(pair.A, pair.C, requested)
+    return Placements(pair.A, pair.C, pair.units, pair.rate, requested, levels)
 
 
 def unobservable_modes(A: ArrayLike, C: ArrayLike) -> tuple[UnobservableMode, ...]:
@@ -283,116 +324,3 @@ def _natural_units(A: FloatArray, C: FloatArray, fastest: float = 0.0) -> _Pair:
         visibility = np.maximum(visibility, (visibility[:, None] * np.abs(A)).max(axis=0))
     units = 1 / np.where(visibility > 0, visibility, 1.0)
     return _Pair(A * units / units[:, None], C * units, units, rate)
-
-
-class _Level(NamedTuple):
-    """The transposed pair (A, B) at a level: B = U V, and N whose rows complete U's columns."""
-
-    A: FloatArray
-    U: FloatArray
-    V_inverse: FloatArray
-    N: FloatArray
-
-
-def _levels(A: FloatArray, B: FloatArray) -> list[_Level]:
-    """Decompose an observable pair, transposed, A (n, n), B (n, m): (2.2), (2.3), (2.9)."""
-    levels = []
-    while True:
-        left, values, right = np.linalg.svd(B)
-        rank = int(np.sum(values > OBSERVABILITY_TOLERANCE))
-        U, N = left[:, :rank], left[:, rank:].T
-        levels.append(_Level(A, U, right[:rank].T / values[:rank], N))
-        if rank == len(A):
-            return levels
-        if rank == 0:
-            raise UsageError(
-                f"the mode at {format_mode(np.linalg.eigvals(A)[0])} is almost unobservable"
-                " from the measurements; measure another state"
-            )
-        A, B = N @ A @ N.T, N @ A @ U
-
-
-class _Share(NamedTuple):
-    """The poles of one level.
-
-    Attributes
-    ----------
-    closes
-        Half of a pair whose other half is at the level below.
-    pairs
-        Complex pairs, each given by one pole.
-    reals
-        Real poles.
-    opens
-        Half of a pair whose other half is at the level above.
-    """
-
-    closes: complex | None
-    pairs: Sequence[complex]
-    reals: Sequence[float]
-    opens: complex | None
-
-
-def _shares(sizes: Sequence[int], poles: ComplexArray) -> list[_Share]:
-    """Distribute the poles over levels of these sizes, last level first; split few pairs."""
-    reals = [float(pole.real) for pole in poles if pole.imag == 0]
-    pairs = [complex(pole) for pole in poles if pole.imag > 0]
-    shares: list[_Share] = []
-    half: complex | None = None
-    for size in reversed(sizes):
-        closes, half = half, None
-        room = size - (closes is not None)
-        own = []
-        if room % 2:
-            if reals:
-                own.append(reals.pop())
-            else:
-                half = pairs.pop()
-        whole = [pairs.pop() for _ in range(min(room // 2, len(pairs)))]
-        own += [reals.pop() for _ in range(2 * (room // 2 - len(whole)))]
-        shares.append(_Share(closes, whole, own, half))
-    return shares
-
-
-def _placed(A: FloatArray, C: FloatArray, poles: ComplexArray) -> FloatArray:
-    """Compute L of `place_multilevel` in natural units, from the last level up: (2.5), (2.6).
-
-    With T = B⁻, T (A - B K) = Φ T + Ψ N: the states T x follow Φ, and Ψ is zero except for a pair
-    that is shared by two levels.
-    """
-    levels = _levels(A.T, C.T)
-    K = np.zeros((levels[-1].U.shape[1], 0))
-    below = np.zeros(0)
-    for level, share in zip(
-        reversed(levels), _shares([x.U.shape[1] for x in levels], poles), strict=True
-    ):
-        T = level.U.T + K @ level.N
-        Phi, Psi, half = _dynamics(share, below, below @ level.N @ level.A @ level.U)
-        K = level.V_inverse @ (T @ level.A - Phi @ T - Psi @ level.N)
-        below = half @ T
-    return K.T
-
-
-def _dynamics(
-    share: _Share, below: FloatArray, into_below: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Compute Φ (r, r), Ψ (r, k) and the direction (r,) of an open half, for a level of r states.
-
-    Half of a pair σ ± jω is a real σ at the level below, where the coordinate `below` (k,) has the
-    dynamics σ and is driven by `into_below` (r,) from the states of this level. With σ along that
-    direction here and the feedback -ω² over its length from below, the two form
-    [σ, g; -ω²/g, σ], whose eigenvalues are σ ± jω.
-    """
-    r = len(into_below)
-    frame, Psi = np.eye(r), np.zeros((r, len(below)))
-    blocks = []
-    if share.closes is not None:
-        frame = np.linalg.qr(into_below[:, None], mode="complete")[0]
-        along = frame[:, 0]
-        Psi = -np.outer(along, below) * share.closes.imag**2 / (into_below @ along)
-        blocks.append(np.array([[share.closes.real]]))
-    blocks += [np.array([[p.real, p.imag], [-p.imag, p.real]]) for p in share.pairs]
-    blocks += [np.array([[p]]) for p in share.reals]
-    if share.opens is not None:
-        blocks.append(np.array([[share.opens.real]]))
-    return frame @ block_diag(*blocks) @ frame.T, Psi, frame[:, -1]

@@ -13,7 +13,9 @@ from analysis.design.exosystem import (
     disturbance_observer,
 )
 from analysis.design.luenberger import butterworth_poles
+from analysis.design.noise_placement import place_for_noise
 from analysis.design.placement import polynomial_error
+from analysis.design.riccati import error_covariance
 from shiplog import UsageError
 
 CONSTANT, RAMP = Exosystem.polynomial(0), Exosystem.polynomial(1)
@@ -214,6 +216,24 @@ def test_kalman_design_equals_the_kalman_gain_of_the_augmented_plant() -> None:
     assert np.sort_complex(observer.poles) == pytest.approx(np.sort_complex(poles), rel=1e-6)
 
 
+def test_poles_are_placed_with_the_least_noise_where_the_sensors_noise_is_given() -> None:
+    R = [1e-5, 2e-7]
+    plain, quiet = (
+        disturbance_observer(
+            HEADING_AND_RATE, [moment(CONSTANT), bias()], frequency=0.1, sensor_noise=noise
+        )
+        for noise in (None, R)
+    )
+    expected = place_for_noise(quiet.A, quiet.C, quiet.poles, np.zeros((4, 4)), np.diag(R))
+    assert np.array_equal(quiet.L, expected.gain)
+    assert polynomial_error(quiet.A - quiet.L @ quiet.C, quiet.poles) < 1e-12
+    variances = [
+        np.diag(error_covariance(quiet.A, L, quiet.C, np.zeros((4, 4)), np.diag(R)))
+        for L in (plain.L, quiet.L)
+    ]
+    assert np.log(variances[1] / variances[0]).mean() < -1
+
+
 def test_kalman_design_of_a_constant_without_noise_raises_an_error() -> None:
     with pytest.raises(UsageError, match=r"mode at 0.* no noise drives it"):
         disturbance_observer(
@@ -275,7 +295,12 @@ def test_output_of_an_exosystem_is_an_exponential_times_a_polynomial(
         ({"frequency": None}, "frequency is missing; butterworth poles need one"),
         ({"frequency": -1.0}, "frequency is -1.0; expected a positive one"),
         ({"frequency": [1.0, 2.0]}, "one for each of the 1 channels"),
-        ({"spectrum": "kalman"}, r"state_noise is missing; kalman needs its intensities, \(2,\)"),
+        (
+            {"spectrum": "kalman"},
+            r"state_noise is missing; the gain depends on its intensities, \(2,\)",
+        ),
+        ({"state_noise": [1.0, 1.0]}, r"sensor_noise is missing; the gain .*, \(1,\)"),
+        ({"sensor_noise": [0.0]}, r"R, \(1, 1\), has the eigenvalue 0; expected a positive def"),
         (
             {"spectrum": "kalman", "state_noise": [1.0], "sensor_noise": [1.0]},
             r"state_noise is of shape \(1,\); expected \(2,\)",

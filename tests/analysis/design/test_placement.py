@@ -7,8 +7,8 @@ from scipy.linalg import block_diag
 from scipy.signal import place_poles
 
 from analysis.design.luenberger import butterworth_poles
+from analysis.design.multilevel import _levels
 from analysis.design.placement import (
-    _levels,
     place_multilevel,
     polynomial_error,
     unobservable_modes,
