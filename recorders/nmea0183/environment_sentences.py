@@ -1,13 +1,13 @@
 """Sentences of wind, depth and water temperature."""
 
-from .sentence_values import is_valid, measured, number_at, signed, text_at
+from .sentence_values import Fields, is_valid, measured, number_at, signed, text_at
 from .steering_sentences import DEG, KMH, KNOT, Values
 
 _SPEED_UNITS = {"N": KNOT, "K": KMH, "M": 1.0, "S": 0.44704}  # S: statute miles/h
 _FOOT, _FATHOM = 0.3048, 1.8288
 
 
-def wind_angle_and_speed(fields: list[str]) -> Values:
+def wind_angle_and_speed(fields: Fields) -> Values:
     """``MWV,x.x,R,x.x,N,A``: angle from the bow in deg, relative or true, speed, unit, status.
 
     The direction of the true wind needs a heading, so that of a true wind only the speed is used.
@@ -24,19 +24,19 @@ def wind_angle_and_speed(fields: list[str]) -> Values:
     raise ValueError(reference)
 
 
-def relative_wind(fields: list[str]) -> Values:
+def relative_wind(fields: Fields) -> Values:
     """``VWR,x.x,L,x.x,N,x.x,M,x.x,K``: angle to the left or right of the bow in deg, speed."""
     angle = signed(number_at(fields, 0), text_at(fields, 1), "R", "L")
     speed, factor = _speed(fields, ((2, KNOT), (4, 1.0), (6, KMH)))
     return _apparent(angle, speed, factor, valid=True, suffix="VWR")
 
 
-def true_relative_wind(fields: list[str]) -> Values:
+def true_relative_wind(fields: Fields) -> Values:
     """``VWT,x.x,L,x.x,N,x.x,M,x.x,K``: as ``VWR``, of the true wind; only its speed is used."""
     return measured("wind_speed", *_speed(fields, ((2, KNOT), (4, 1.0), (6, KMH))), suffix="VWT")
 
 
-def wind_direction(fields: list[str]) -> Values:
+def wind_direction(fields: Fields) -> Values:
     """``MWD,x.x,T,x.x,M,x.x,N,x.x,M``: directions it blows from in deg, speed in knots, m/s."""
     return (
         *measured("wind_direction", number_at(fields, 0), DEG),
@@ -59,7 +59,7 @@ def _speed_factor(unit: str) -> float:
     return _SPEED_UNITS[unit]
 
 
-def _speed(fields: list[str], units: tuple[tuple[int, float], ...]) -> tuple[float | None, float]:
+def _speed(fields: Fields, units: tuple[tuple[int, float], ...]) -> tuple[float | None, float]:
     """Return the number of the first of several fields that is filled, and its factor."""
     for index, factor in units:
         number = number_at(fields, index)
@@ -68,22 +68,22 @@ def _speed(fields: list[str], units: tuple[tuple[int, float], ...]) -> tuple[flo
     return None, 1.0
 
 
-def depth_below_transducer(fields: list[str]) -> Values:
+def depth_below_transducer(fields: Fields) -> Values:
     """``DBT,x.x,f,x.x,M,x.x,F``: depth below the transducer in ft, m, fathoms."""
     return measured("depth", *_depth(fields), suffix="below_transducer")
 
 
-def depth_below_surface(fields: list[str]) -> Values:
+def depth_below_surface(fields: Fields) -> Values:
     """``DBS,x.x,f,x.x,M,x.x,F``: depth below the surface in ft, m, fathoms."""
     return measured("depth", *_depth(fields))
 
 
-def depth_below_keel(fields: list[str]) -> Values:
+def depth_below_keel(fields: Fields) -> Values:
     """``DBK,x.x,f,x.x,M,x.x,F``: depth below the keel in ft, m, fathoms."""
     return measured("depth", *_depth(fields), suffix="below_keel")
 
 
-def depth(fields: list[str]) -> Values:
+def depth(fields: Fields) -> Values:
     """``DPT,x.x,x.x,x.x``: depth below the transducer, offset in m, range.
 
     A positive offset is the distance from the transducer to the surface, a negative one that to the
@@ -95,11 +95,11 @@ def depth(fields: list[str]) -> Values:
     return measured("depth", below + offset, suffix="" if offset > 0 else "below_keel")
 
 
-def _depth(fields: list[str]) -> tuple[float | None, float]:
+def _depth(fields: Fields) -> tuple[float | None, float]:
     return _speed(fields, ((2, 1.0), (0, _FOOT), (4, _FATHOM)))
 
 
-def water_temperature(fields: list[str]) -> Values:
+def water_temperature(fields: Fields) -> Values:
     """``MTW,x.x,C``: water temperature in °C."""
     if text_at(fields, 1) not in ("C", ""):
         raise ValueError(fields[1])

@@ -3,24 +3,35 @@ r"""Sentences in lines and datagrams: start, checksum, TAG block and address.
 A line is ``$TTSSS,field,...*hh``: talker, sentence, fields, and the XOR of all characters between
 ``$`` and ``*``. In IEC 61162-450 a datagram begins with ``UdPbC\0`` and each sentence with a TAG
 block ``\s:GR0001,n:12*hh\``.
+
+The library marlin takes a sentence apart and checks it. What it accepts and we do not is rejected
+here: characters that are not printable, text after the checksum, addresses of another length. It
+does not check a TAG block, which is read here.
 """
 
 import re
-from itertools import product
-from string import hexdigits
+from functools import lru_cache, reduce
+from operator import xor
 from typing import NamedTuple
+
+from marlin.envelope import EnvelopeError, parse
 
 from recorders.streams.packets import END_NS, MAX_PACKET_BYTES
 
 DATAGRAM_HEADER = b"UdPbC\0"
+_WHOLE = re.compile(rb"[$!][^$!\\\r\n]*\*[0-9A-Fa-f]{2}")  # the usual packet: one sentence
 _PIECE = re.compile(rb"(?:\\[^\\]*\\)?[$!][^$!\\]*|[^$!]+")  # a sentence with its TAG block
 _TAG_PARAMETER = re.compile(r"([a-z]):([ -~]+)")
 _SOURCE = re.compile(r"[A-Za-z0-9_-]{1,15}")
+_HEX_BYTE = re.compile(rb"[0-9A-Fa-f]{2}")
 _MAX_TAG_NUMBER = 10**15
-_CHECKSUMS = {bytes(two): int(bytes(two), 16) for two in product(hexdigits.encode(), repeat=2)}
-_SHORT = 128  # bytes of nearly all sentences
-_SHIFTS = (512, 256, 128, 64, 32, 16, 8)
-_LONG_SHIFTS = (16384, 8192, 4096, 2048, 1024, *_SHIFTS)  # of up to MAX_PACKET_BYTES
+_REASONS = {
+    "missing_checksum_delimiter": "no checksum",
+    "invalid_checksum_digits": "malformed checksum",
+    "checksum_mismatch": "wrong checksum",
+    "invalid_utf8_in_sentence_type": "characters that are not printable",
+}
+"""The reasons for which marlin rejects a sentence; the others concern the address."""
 
 
 class FramingError(Exception):
@@ -58,14 +69,14 @@ class Sentence(NamedTuple):
     formatter
         The kind, such as ``HDT``; of a proprietary sentence its whole address.
     fields
-        The fields after the address.
+        The fields after the address, in ASCII.
     tag
         The TAG block before it.
     """
 
     talker: str
     formatter: str
-    fields: list[str]
+    fields: tuple[bytes, ...]
     tag: TagBlock = NO_TAG
 
 
@@ -74,6 +85,8 @@ def split_packet(data: bytes) -> list[bytes]:
 
     A line into which another sentence was cut is returned in parts, of which the last may be whole.
     """
+    if _WHOLE.fullmatch(data):
+        return [data]
     data = data.removeprefix(DATAGRAM_HEADER).strip(b"\r\n\0 \t")
     lines = data.splitlines() if b"\n" in data or b"\r" in data else [data]
     if len(lines) == 1 and data.count(b"$") + data.count(b"!") == 1:
@@ -99,7 +112,7 @@ def parse_sentence(line: bytes, *, require_checksum: bool = True) -> Sentence:
     Examples
     --------
     >>> parse_sentence(b"$HEHDT,218.53,T*12")
-    Sentence(talker='HE', formatter='HDT', fields=['218.53', 'T'], tag=TagBlock(source='', time_ns=None, line=None))
+    Sentence(talker='HE', formatter='HDT', fields=(b'218.53', b'T'), tag=TagBlock(source='', time_ns=None, line=None))
     """  # noqa: E501
     if len(line) >= MAX_PACKET_BYTES:
         raise FramingError("line too long")
@@ -111,16 +124,20 @@ def parse_sentence(line: bytes, *, require_checksum: bool = True) -> Sentence:
             raise FramingError("TAG block without a sentence")
     if line[:1] not in (b"$", b"!"):
         raise FramingError("no sentence")
-    star = line.rfind(b"*")
-    if star >= 0:
-        _require_checksum(line[1:star], line[star + 1 :])
-    elif require_checksum:
-        raise FramingError("no checksum")
-    text = line[1 : star if star >= 0 else None].decode("latin-1")
+    star = line.find(b"*")
+    if star < 0 and not require_checksum:
+        line += b"*%02X" % checksum(line[1:])
+    elif 0 <= star != len(line) - 3:
+        raise FramingError("malformed checksum")
+    try:
+        parsed = parse(line)
+    except EnvelopeError as error:
+        raise FramingError(_REASONS.get(error.variant, "malformed address")) from error
+    text = line.decode("latin-1")
     if not (text.isascii() and text.isprintable()):
         raise FramingError("characters that are not printable")
-    address, *fields = text.split(",")
-    return Sentence(*_parse_address(address, line[:1]), fields, tag)
+    address = _address(parsed.start_delimiter, parsed.talker, parsed.sentence_type)
+    return Sentence(*address, parsed.fields, tag)
 
 
 def tag_of(line: bytes) -> TagBlock:
@@ -131,17 +148,20 @@ def tag_of(line: bytes) -> TagBlock:
         return NO_TAG
 
 
-def _parse_address(address: str, start: bytes) -> tuple[str, str]:
+@lru_cache(maxsize=256)
+def _address(start: bytes, talker: bytes | None, kind: str) -> tuple[str, str]:
     """Return talker and formatter; both are the whole address if it is proprietary or of AIS."""
+    prefix = "" if talker is None else talker.decode()
+    address = prefix + kind
     if not address.isalnum():
         raise FramingError("malformed address")
     if start == b"!":
         return f"!{address}", f"!{address}"
-    if address[0] == "P":
+    if talker is None:
         return address, address
-    if len(address) != 5:
+    if len(kind) != 3:
         raise FramingError("malformed address")
-    return address[:2], address[2:]
+    return prefix, kind
 
 
 def checksum(body: bytes) -> int:
@@ -152,38 +172,22 @@ def checksum(body: bytes) -> int:
     >>> f"{checksum(b'HEHDT,218.53,T'):02X}"
     '12'
     """
-    folded = int.from_bytes(body)
-    for shift in _SHIFTS if len(body) <= _SHORT else _LONG_SHIFTS:
-        folded ^= folded >> shift  # halves over each other, down to a byte
-    return folded & 0xFF
-
-
-def _require_checksum(body: bytes, digits: bytes) -> None:
-    stated = _CHECKSUMS.get(digits)
-    if stated is None:
-        raise FramingError("malformed checksum")
-    if stated != checksum(body):
-        raise FramingError("wrong checksum")
+    return reduce(xor, body, 0)
 
 
 def _parse_tag(content: bytes) -> TagBlock:
     """Return what a TAG block states; parameters that are not used are checked for form only."""
-    body, star, digits = content.rpartition(b"*")
-    if not star:
+    body, _, digits = content.rpartition(b"*")
+    if not _HEX_BYTE.fullmatch(digits):
         raise FramingError("malformed TAG block")
-    try:
-        _require_checksum(body, digits)
-        found = {}
-        for part in body.decode("ascii").split(","):
-            match = _TAG_PARAMETER.fullmatch(part)
-            if match is None:
-                raise FramingError("malformed TAG block")
-            found[match[1]] = match[2]
-    except (FramingError, UnicodeDecodeError) as error:
-        wrong = str(error) == "wrong checksum"
-        raise FramingError(
-            "wrong checksum of a TAG block" if wrong else "malformed TAG block"
-        ) from error
+    if int(digits, 16) != checksum(body):
+        raise FramingError("wrong checksum of a TAG block")
+    found = {}
+    for part in body.decode("latin-1").split(","):
+        match = _TAG_PARAMETER.fullmatch(part)
+        if match is None:
+            raise FramingError("malformed TAG block")
+        found[match[1]] = match[2]
     source = found.get("s", "")
     if source and not _SOURCE.fullmatch(source):
         raise FramingError("malformed TAG block")

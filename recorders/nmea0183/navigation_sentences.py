@@ -2,14 +2,14 @@
 
 from math import nan
 
-from .sentence_values import Fix, Value, is_valid, measured, number_at, signed, text_at
+from .sentence_values import Fields, Fix, Value, is_valid, measured, number_at, signed, text_at
 from .steering_sentences import DEG, KMH, KNOT, Values
 
 FIX_MODES = "ADFPR"  # autonomous, differential, float, precise, real-time kinematic
 _FIX_QUALITIES = ("1", "2", "3", "4", "5", "9")  # not 0 none, 6 estimated, 7 manual, 8 simulated
 
 
-def fix_data(fields: list[str]) -> Values:
+def fix_data(fields: Fields) -> Values:
     """``GGA,time,lat,N,lon,E,quality,satellites,hdop,altitude,M,...``."""
     quality = number_at(fields, 5)
     valid = has_fix(fields[5:])
@@ -21,18 +21,18 @@ def fix_data(fields: list[str]) -> Values:
     )
 
 
-def has_fix(fields: list[str]) -> bool:
+def has_fix(fields: Fields) -> bool:
     """Whether the quality of ``GGA``, the first of these fields, is that of a measured position."""
     return text_at(fields, 0) in _FIX_QUALITIES
 
 
-def geographic_position(fields: list[str]) -> Values:
+def geographic_position(fields: Fields) -> Values:
     """``GLL,lat,N,lon,E,time,A,mode``: position, time, status."""
     valid = is_valid(fields, 5) and is_valid(fields, 6, FIX_MODES)
     return _position(fields[:4], valid=valid, suffix="GLL")
 
 
-def gnss_fix(fields: list[str]) -> Values:
+def gnss_fix(fields: Fields) -> Values:
     """``GNS,time,lat,N,lon,E,modes,satellites,hdop,altitude,...``; a mode for each system."""
     valid = has_mode(fields)
     return (
@@ -42,12 +42,12 @@ def gnss_fix(fields: list[str]) -> Values:
     )
 
 
-def has_mode(fields: list[str]) -> bool:
+def has_mode(fields: Fields) -> bool:
     """Whether ``GNS`` has a fix of at least one system."""
     return any(mode in FIX_MODES for mode in text_at(fields, 5))
 
 
-def minimum_navigation(fields: list[str]) -> Values:
+def minimum_navigation(fields: Fields) -> Values:
     """``RMC,time,A,lat,N,lon,E,knots,course,ddmmyy,variation,E,mode,status``."""
     valid = has_valid_rmc(fields)
     variation = signed(number_at(fields, 9), text_at(fields, 10) or "E", "E", "W")
@@ -59,12 +59,12 @@ def minimum_navigation(fields: list[str]) -> Values:
     )
 
 
-def has_valid_rmc(fields: list[str]) -> bool:
+def has_valid_rmc(fields: Fields) -> bool:
     """Whether status and mode of ``RMC`` are those of a measured position."""
     return is_valid(fields, 1) and is_valid(fields, 11, FIX_MODES)
 
 
-def course_and_speed(fields: list[str]) -> Values:
+def course_and_speed(fields: Fields) -> Values:
     """``VTG,x.x,T,x.x,M,x.x,N,x.x,K,mode``: courses in deg, speed over ground in knots, km/h."""
     valid = is_valid(fields, 8, FIX_MODES)
     knots, kmh = number_at(fields, 4), number_at(fields, 6)
@@ -76,7 +76,7 @@ def course_and_speed(fields: list[str]) -> Values:
 
 
 def _position(
-    fields: list[str], altitude: float | None = None, *, valid: bool, suffix: str = ""
+    fields: Fields, altitude: float | None = None, *, valid: bool, suffix: str = ""
 ) -> Values:
     """Return the fix in the fields ``lat,N,lon,E``; nothing where one of them is empty.
 
@@ -93,7 +93,7 @@ def _position(
     return (Value("position", fix if valid else (nan, nan, nan), suffix),)
 
 
-def _angle(fields: list[str], index: int, highest: float) -> float | None:
+def _angle(fields: Fields, index: int, highest: float) -> float | None:
     """Return an angle printed as ``dddmm.mmm``, deg."""
     number = number_at(fields, index)
     if number is None:

@@ -3,6 +3,9 @@
 from math import isfinite, nan
 from typing import NamedTuple
 
+Fields = tuple[bytes, ...]
+"""The fields of a sentence, in printable ASCII."""
+
 Fix = tuple[float, float, float]
 """Latitude and longitude in deg, altitude in m; NaN where not known."""
 
@@ -26,12 +29,12 @@ class Value(NamedTuple):
     suffix: str = ""
 
 
-def text_at(fields: list[str], index: int) -> str:
+def text_at(fields: Fields, index: int) -> str:
     """Return a field without padding; empty where the sentence is too short."""
-    return fields[index].strip() if index < len(fields) else ""
+    return fields[index].strip().decode() if index < len(fields) else ""
 
 
-def number_at(fields: list[str], index: int) -> float | None:
+def number_at(fields: Fields, index: int) -> float | None:
     """Return the number in a field; None where it is empty.
 
     Raises
@@ -39,16 +42,16 @@ def number_at(fields: list[str], index: int) -> float | None:
     ValueError
         The field is not a finite number.
     """
-    text = fields[index] if index < len(fields) else ""
+    text = fields[index] if index < len(fields) else b""
     if not text or text.isspace():
         return None
     value = float(text)
-    if not isfinite(value) or "_" in text:
+    if not isfinite(value) or b"_" in text:
         raise ValueError(text)
     return value
 
 
-def is_valid(fields: list[str], index: int, valid: str = "A") -> bool:
+def is_valid(fields: Fields, index: int, valid: str = "A") -> bool:
     """Whether a status is one of the letters for valid data.
 
     Sentences of old devices end before the status; a sentence without it is taken as valid.

@@ -4,7 +4,7 @@ from math import radians
 
 from shiplog.units import conversion_factor
 
-from .sentence_values import Value, is_valid, measured, number_at, signed, text_at
+from .sentence_values import Fields, Value, is_valid, measured, number_at, signed, text_at
 
 DEG = radians(1)
 DEG_PER_MIN = conversion_factor("deg/min", "rad/s")
@@ -14,12 +14,12 @@ PERCENT = 0.01
 Values = tuple[Value, ...]
 
 
-def rate_of_turn(fields: list[str]) -> Values:
+def rate_of_turn(fields: Fields) -> Values:
     """``ROT,x.x,A``: rate in deg/min, negative where the bow turns to port; status."""
     return measured("yaw_rate", number_at(fields, 0), DEG_PER_MIN, valid=is_valid(fields, 1))
 
 
-def rudder_angle(fields: list[str]) -> Values:
+def rudder_angle(fields: Fields) -> Values:
     """``RSA,x.x,A,x.x,A``: starboard or single rudder, status; port rudder, status; in deg.
 
     A negative angle turns the bow to port.
@@ -27,25 +27,25 @@ def rudder_angle(fields: list[str]) -> Values:
     return _two_rudders("rudder", fields)
 
 
-def rudder_order(fields: list[str]) -> Values:
+def rudder_order(fields: Fields) -> Values:
     """``ROR,x.x,A,x.x,A,a``: the orders to the rudders, as the angles of ``RSA``."""
     return _two_rudders("rudder_order", fields)
 
 
-def _two_rudders(channel: str, fields: list[str]) -> Values:
+def _two_rudders(channel: str, fields: Fields) -> Values:
     return (
         *measured(channel, number_at(fields, 0), DEG, valid=is_valid(fields, 1)),
         *measured(channel, number_at(fields, 2), DEG, valid=is_valid(fields, 3), suffix="port"),
     )
 
 
-def steering_order(fields: list[str]) -> Values:
+def steering_order(fields: Fields) -> Values:
     """``HTC,A,x.x,a,...`` and ``HTD``: override, commanded rudder in deg, L or R, and modes."""
     order = signed(number_at(fields, 1), text_at(fields, 2), "R", "L")
     return measured("rudder_order", order, DEG)
 
 
-def revolutions(fields: list[str]) -> Values:
+def revolutions(fields: Fields) -> Values:
     """``RPM,S,n,x.x,x.x,A``: shaft or engine, its number, 1/min, pitch in % (negative astern)."""
     kind, number = text_at(fields, 0), text_at(fields, 1)
     if kind not in ("S", "E") or (number and not (number.isdecimal() and len(number) < 4)):
@@ -58,7 +58,7 @@ def revolutions(fields: list[str]) -> Values:
     )
 
 
-def water_speed_and_heading(fields: list[str]) -> Values:
+def water_speed_and_heading(fields: Fields) -> Values:
     """``VHW,x.x,T,x.x,M,x.x,N,x.x,K``: headings in deg, speed through the water in knots, km/h."""
     knots, kmh = number_at(fields, 4), number_at(fields, 6)
     return (
@@ -68,7 +68,7 @@ def water_speed_and_heading(fields: list[str]) -> Values:
     )
 
 
-def dual_speed(fields: list[str]) -> Values:
+def dual_speed(fields: Fields) -> Values:
     """``VBW,x.x,x.x,A,x.x,x.x,A,...``: speeds ahead and to starboard in knots, water and ground.
 
     The speed over ground is the length of the vector, where both of its components are given.
@@ -83,17 +83,17 @@ def dual_speed(fields: list[str]) -> Values:
     )
 
 
-def true_heading(fields: list[str]) -> Values:
+def true_heading(fields: Fields) -> Values:
     """``HDT,x.x,T``: heading in deg."""
     return measured("heading", number_at(fields, 0), DEG)
 
 
-def true_heading_and_status(fields: list[str]) -> Values:
+def true_heading_and_status(fields: Fields) -> Values:
     """``THS,x.x,a``: heading in deg; A measured, E estimated, M manual, S simulated, V invalid."""
     return measured("heading", number_at(fields, 0), DEG, valid=is_valid(fields, 1, "AE"))
 
 
-def magnetic_sensor(fields: list[str]) -> Values:
+def magnetic_sensor(fields: Fields) -> Values:
     """``HDG,x.x,x.x,a,x.x,a``: compass, deviation E or W, variation E or W, in deg.
 
     Magnetic is the compass with the deviation, east positive; true is magnetic with the variation.
@@ -111,7 +111,7 @@ def magnetic_sensor(fields: list[str]) -> Values:
     )
 
 
-def magnetic_heading(fields: list[str]) -> Values:
+def magnetic_heading(fields: Fields) -> Values:
     """``HDM,x.x,M``: magnetic heading in deg."""
     return measured("magnetic_heading", number_at(fields, 0), DEG, suffix="HDM")
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from .sentence_values import Value, measured, number_at, text_at
+from .sentence_values import Fields, Value, measured, number_at, text_at
 from .steering_sentences import DEG, PERCENT, Values
 
 _ANGLES = {"roll": "roll", "pitch": "pitch", "ptch": "pitch", "heel": "heel"}
@@ -12,7 +12,7 @@ _BAR = 1e5  # Pa
 _INVALID = "2"  # quality of PSXN,20: 0 normal, 1 reduced, 2 invalid
 
 
-def transducers(fields: list[str]) -> Values:
+def transducers(fields: Fields) -> Values:
     """``XDR,a,x.x,a,c--c,...``: type, value, unit and name of each transducer.
 
     The names are the maker's own. Roll and heel are positive with the starboard side down, pitch
@@ -21,12 +21,12 @@ def transducers(fields: list[str]) -> Values:
     return _transducers(fields, _by_name)
 
 
-def weather_transducers(fields: list[str]) -> Values:
+def weather_transducers(fields: Fields) -> Values:
     """``WIXDR``: as `transducers`; a temperature or pressure without a name is that of the air."""
     return _transducers(fields, lambda name: _by_name(name or "air"))
 
 
-def _transducers(fields: list[str], temperature_channel: Callable[[str], str | None]) -> Values:
+def _transducers(fields: Fields, temperature_channel: Callable[[str], str | None]) -> Values:
     values: list[Value] = []
     for first in range(0, len(fields) - 2, 4):
         kind, unit = text_at(fields, first), text_at(fields, first + 2)
@@ -91,7 +91,7 @@ class MotionUnit:
     def __init__(self) -> None:
         self._heading_is_valid = self._attitude_is_valid = True
 
-    def decode(self, fields: list[str]) -> Values:
+    def decode(self, fields: Fields) -> Values:
         """``PSXN,20,horizontal,height,heading,attitude`` and ``PSXN,23,roll,pitch,heading,heave``.
 
         Roll is positive with the port side up, pitch with the bow up, heave downwards; in deg, m.

@@ -6,14 +6,14 @@ from datetime import date
 from recorders.streams.gnss_clock import Utc
 
 from .navigation_sentences import FIX_MODES, has_fix, has_mode, has_valid_rmc
-from .sentence_values import is_valid, text_at
+from .sentence_values import Fields, is_valid, text_at
 
 _EPOCH = date(1970, 1, 1).toordinal()
 _FIRST_YEAR, _LAST_YEAR = 1970, 2261  # times are 64-bit numbers of ns
 _CENTURY_BREAK = 80  # years of two digits from here on are of the 20th century: GPS began in 1980
 
 
-def utc_of(formatter: str, fields: list[str]) -> Utc | None:
+def utc_of(formatter: str, fields: Fields) -> Utc | None:
     """Return the time in a sentence; None without a valid one.
 
     A time without a fix may be that of a receiver's unset clock, and is not used.
@@ -25,7 +25,7 @@ def utc_of(formatter: str, fields: list[str]) -> Utc | None:
 
     Examples
     --------
-    >>> utc_of("ZDA", "000000.17,01,08,2014,,".split(","))
+    >>> utc_of("ZDA", (b"000000.17", b"01", b"08", b"2014"))
     Utc(clock_ns=170000000, day=16283)
     """
     reader = _READERS.get(formatter)
@@ -56,7 +56,7 @@ def _only_clock(text: str, *, valid: bool) -> Utc | None:
     return Utc(clock_ns, None) if valid and clock_ns is not None else None
 
 
-def _rmc(fields: list[str]) -> Utc | None:
+def _rmc(fields: Fields) -> Utc | None:
     clock_ns, text = _clock(text_at(fields, 0)), text_at(fields, 8)
     if clock_ns is None or not has_valid_rmc(fields):
         return None
@@ -69,7 +69,7 @@ def _rmc(fields: list[str]) -> Utc | None:
     return Utc(clock_ns, _days(century + year, int(text[2:4]), int(text[:2])))
 
 
-def _zda(fields: list[str]) -> Utc | None:
+def _zda(fields: Fields) -> Utc | None:
     clock_ns, parts = _clock(text_at(fields, 0)), [text_at(fields, i) for i in (1, 2, 3)]
     if clock_ns is None:
         return None
@@ -79,7 +79,7 @@ def _zda(fields: list[str]) -> Utc | None:
     return Utc(clock_ns, _days(year, month, day))
 
 
-_READERS: dict[str, Callable[[list[str]], Utc | None]] = {
+_READERS: dict[str, Callable[[Fields], Utc | None]] = {
     "RMC": _rmc,
     "ZDA": _zda,
     "GGA": lambda f: _only_clock(text_at(f, 0), valid=has_fix(f[5:])),

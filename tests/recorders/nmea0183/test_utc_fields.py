@@ -11,6 +11,11 @@ HOUR_NS = 3600 * 10**9
 DAY_NS = 24 * HOUR_NS
 
 
+def _utc_of(body: str) -> Utc | None:
+    formatter, *fields = body.encode().split(b",")
+    return utc_of(formatter.decode(), tuple(fields))
+
+
 @pytest.mark.parametrize(
     ("body", "when"),
     [
@@ -22,8 +27,7 @@ DAY_NS = 24 * HOUR_NS
     ],
 )
 def test_a_date_and_a_time_are_read(body: str, when: datetime) -> None:
-    formatter, *fields = body.split(",")
-    utc = utc_of(formatter, fields)
+    utc = _utc_of(body)
     assert utc is not None
     assert utc.day is not None
     ns = int(when.replace(microsecond=0).timestamp()) * 10**9 + when.microsecond * 1000
@@ -42,8 +46,7 @@ def test_a_date_and_a_time_are_read(body: str, when: datetime) -> None:
     ],
 )
 def test_a_time_without_a_date_is_a_time_of_day(body: str, clock_ns: int) -> None:
-    formatter, *fields = body.split(",")
-    assert utc_of(formatter, fields) == Utc(clock_ns, None)
+    assert _utc_of(body) == Utc(clock_ns, None)
 
 
 @pytest.mark.parametrize(
@@ -60,8 +63,7 @@ def test_a_time_without_a_date_is_a_time_of_day(body: str, clock_ns: int) -> Non
     ],
 )
 def test_a_time_without_a_fix_is_not_used(body: str) -> None:
-    formatter, *fields = body.split(",")
-    assert utc_of(formatter, fields) is None
+    assert _utc_of(body) is None
 
 
 @pytest.mark.parametrize(
@@ -82,9 +84,8 @@ def test_a_time_without_a_fix_is_not_used(body: str) -> None:
     ],
 )
 def test_a_malformed_time_is_an_error(body: str) -> None:
-    formatter, *fields = body.split(",")
     with pytest.raises(ValueError, match=r".*"):
-        utc_of(formatter, fields)
+        _utc_of(body)
 
 
 @pytest.mark.parametrize(
