@@ -104,15 +104,16 @@ def _read_stamps(
     counts: StreamCounts,
 ) -> tuple[list[Packet], Batches]:
     """Return the first lines and all lines with the times of their stamps."""
-    trial = StampReader(form, day)
-    head = [Packet(read[1], read[0]) for p in head if (read := trial.read(p.data)) is not None]
     if form.name == "clock" and day is None:
-        day = first_day(head)
+        unstamped = read_stamps(iter([[*head]]), StampReader(form), StreamCounts())
+        day = first_day([packet for batch in unstamped for packet in batch])
         since = f"counted from {day or '1970-01-01'}"
         counts.warn(f"the time stamps have no date: {since}; state it with --date")
-    if trial.zone_is_assumed:
+    reader = StampReader(form, day)
+    head, batches = peek(read_stamps(batches, reader, counts), HEAD_LINES)
+    if reader.zone_is_assumed:
         counts.warn("the time stamps have no time zone, read as UTC")
-    return head, read_stamps(batches, StampReader(form, day), counts)
+    return head, batches
 
 
 def _derive_times(
@@ -140,8 +141,10 @@ def _derive_times(
 
 def _has_no_checksum(head: Sequence[Packet]) -> bool:
     """Whether there are sentences, and none has a checksum."""
+    if any(b"*" in packet.data for packet in head):
+        return False
     lines = [line for packet in head for line in split_packet(packet.data)]
-    return any(map(_is_sentence, lines)) and not any(b"*" in line for line in lines)
+    return any(map(_is_sentence, lines))
 
 
 def _is_sentence(line: bytes) -> bool:

@@ -3,6 +3,7 @@
 import argparse
 import re
 from calendar import timegm
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta
@@ -80,6 +81,10 @@ FORMS = {
 }
 """The known forms of time stamps by name."""
 
+_ANY_FORM = re.compile(
+    b"|".join(b"(?P<%b>%b)" % (f.name.encode(), f.pattern.pattern) for f in FORMS.values())
+)  # its last group is that of a form: no two forms match one line
+
 OPTION_VALUES = (_AUTO, _NONE, *FORMS)
 """The values of an option that states the form of the stamps."""
 
@@ -107,17 +112,15 @@ def find_stamp_form(head: Sequence[Packet], option: str = _AUTO) -> StampForm | 
     """
     if option == _NONE or not head:
         return None
-    shares = {
-        form.name: sum(form.pattern.match(packet.data) is not None for packet in head) / len(head)
-        for form in FORMS.values()
-    }
+    matches = Counter(str(m.lastgroup) for p in head if (m := _ANY_FORM.match(p.data)))
     if option != _AUTO:
-        if shares[option] == 0:
+        if option not in matches:
             raise LogError(
                 f"no line begins with a time stamp such as {FORMS[option].example}; "
                 f"state another form with --stamp ({', '.join(OPTION_VALUES)})"
             )
         return FORMS[option]
+    shares = {name: count / len(head) for name, count in matches.items()}
     found = {name: share for name, share in shares.items() if share > _FEW}
     if not found:
         return None
