@@ -1,7 +1,7 @@
 """Sentences of wind, depth and water temperature."""
 
-from .sentence_values import Fields, is_valid, measured, number_at, signed, text_at
-from .steering_sentences import DEG, KMH, KNOT, Values
+from .sentence_values import Fields, Values, is_valid, measured, number_at, signed, text_at
+from .steering_sentences import DEG, KMH, KNOT
 
 _SPEED_UNITS = {"N": KNOT, "K": KMH, "M": 1.0, "S": 0.44704}  # S: statute miles/h
 _FOOT, _FATHOM = 0.3048, 1.8288

@@ -2,8 +2,8 @@
 
 from math import nan
 
-from .sentence_values import Fields, Fix, Value, is_valid, measured, number_at, signed, text_at
-from .steering_sentences import DEG, KMH, KNOT, Values
+from .sentence_values import Fields, Fix, Values, is_valid, measured, number_at, signed, text_at
+from .steering_sentences import DEG, KMH, KNOT
 
 FIX_MODES = "ADFPR"  # autonomous, differential, float, precise, real-time kinematic
 _FIX_QUALITIES = ("1", "2", "3", "4", "5", "9")  # not 0 none, 6 estimated, 7 manual, 8 simulated
@@ -12,7 +12,7 @@ _FIX_QUALITIES = ("1", "2", "3", "4", "5", "9")  # not 0 none, 6 estimated, 7 ma
 def fix_data(fields: Fields) -> Values:
     """``GGA,time,lat,N,lon,E,quality,satellites,hdop,altitude,M,...``."""
     quality = number_at(fields, 5)
-    valid = has_fix(fields[5:])
+    valid = has_fix(fields)
     return (
         *_position(fields[1:5], number_at(fields, 8), valid=valid),
         *measured("fix_quality", quality),
@@ -22,8 +22,8 @@ def fix_data(fields: Fields) -> Values:
 
 
 def has_fix(fields: Fields) -> bool:
-    """Whether the quality of ``GGA``, the first of these fields, is that of a measured position."""
-    return text_at(fields, 0) in _FIX_QUALITIES
+    """Whether the quality of ``GGA`` is that of a measured position."""
+    return text_at(fields, 5) in _FIX_QUALITIES
 
 
 def geographic_position(fields: Fields) -> Values:
@@ -90,7 +90,7 @@ def _position(
     if latitude is None or longitude is None:
         return ()
     fix: Fix = (latitude, longitude, nan if altitude is None else altitude)
-    return (Value("position", fix if valid else (nan, nan, nan), suffix),)
+    return (("position", fix if valid else (nan, nan, nan), suffix),)
 
 
 def _angle(fields: Fields, index: int, highest: float) -> float | None:

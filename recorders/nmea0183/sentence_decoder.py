@@ -1,11 +1,12 @@
 """Decoder of NMEA 0183: from lines and datagrams to samples of channels."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from math import isnan
+from typing import NamedTuple
 
-from recorders.streams.counts import StreamCounts
+from recorders.streams.counts import MAX_KINDS, StreamCounts
 from recorders.streams.gnss_clock import GnssClock
 from recorders.streams.packets import Packet
 from recorders.streams.sample_buffer import MAX_TOPICS, SampleBuffer
@@ -13,11 +14,13 @@ from recorders.streams.sample_buffer import MAX_TOPICS, SampleBuffer
 from .environment_sentences import ENVIRONMENT
 from .framing import FramingError, Sentence, TagBlock, parse_sentence, split_packet, tag_of
 from .navigation_sentences import NAVIGATION
-from .steering_sentences import STEERING, Values
+from .sentence_values import Fields, Values
+from .steering_sentences import STEERING
 from .transducer_sentences import TRANSDUCERS, MotionUnit
 from .twin_devices import CHECKED, TwinDevices
 from .utc_fields import TIMED, utc_of
 
+FieldDecoder = Callable[[Fields], Values]
 _USUAL_TIME = "ZDA"  # other sentences' times of a talker have a source of their own
 _LINES = 999  # a TAG block counts them from 1 to here, then from 1 again
 
@@ -40,6 +43,24 @@ class DecodingOptions:
     require_checksum: bool = True
     gnss_time: bool = False
     received_is_known: bool = True
+
+
+class _Kind(NamedTuple):
+    """How the sentences of one talker and formatter are decoded.
+
+    Attributes
+    ----------
+    name
+        The name under which they are counted.
+    decode
+        Decodes their fields; None where they are not decoded.
+    is_timed
+        Whether they bear a time.
+    """
+
+    name: str
+    decode: FieldDecoder | None
+    is_timed: bool
 
 
 class SentenceDecoder:
@@ -70,9 +91,10 @@ class SentenceDecoder:
     ) -> None:
         self.counts = StreamCounts() if counts is None else counts
         self._options = options or DecodingOptions()
-        self._decoders = (
+        self._decoders: Mapping[str, FieldDecoder] = (
             STEERING | NAVIGATION | ENVIRONMENT | TRANSDUCERS | {"PSXN": MotionUnit().decode}
         )
+        self._kind = lru_cache(maxsize=MAX_KINDS)(self._find_kind)
         self._clock = GnssClock(
             self.counts.warn,
             is_applied=self._options.gnss_time,
@@ -85,9 +107,9 @@ class SentenceDecoder:
 
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
         """Decode a batch of lines or datagrams."""
-        for packet in batch:
-            for line in split_packet(packet.data) or [b""]:  # an empty datagram is counted
-                self._decode_line(line, packet.received_ns, samples)
+        for data, received_ns, _ in batch:
+            for line in split_packet(data) or [b""]:  # an empty datagram is counted
+                self._decode_line(line, received_ns, samples)
 
     def finish(self, samples: SampleBuffer) -> None:  # noqa: ARG002 - of the protocol
         """Report the latencies of the receivers."""
@@ -105,35 +127,44 @@ class SentenceDecoder:
             self._count_lost_lines(tag_of(line))
             return
         talker, formatter, fields, tag = sentence
-        kind = talker if talker == formatter else talker + formatter
-        self._count_lost_lines(tag)
-        decode = self._decoders.get(kind) or self._decoders.get(formatter)
-        if decode is None and formatter not in TIMED:
-            self.counts.skip(kind)
+        kind = self._kind(talker, formatter)
+        if tag.line is not None:
+            self._count_lost_lines(tag)
+        if kind.decode is None and not kind.is_timed:
+            self.counts.skip(kind.name)
             return
         source = f"{tag.source}.{talker}" if tag.source else talker
+        time_ns = None
         try:
-            values = decode(fields) if decode else ()
-            time_ns = self._gnss_time_ns(source, sentence, received_ns, samples)
+            values = kind.decode(fields) if kind.decode else ()
+            if kind.is_timed:
+                time_ns = self._gnss_time_ns(source, sentence, received_ns, samples)
         except ValueError:
             self.counts.reject(f"malformed field of {formatter}")
             return
         if not values and time_ns is None:
-            self.counts.skip(f"{kind} without a value")
+            self.counts.skip(f"{kind.name} without a value")
             return
-        self.counts.accept(kind)
-        add = partial(self._add, samples, (source, kind), values, received_ns)
+        self.counts.accept(kind.name)
         if self._options.gnss_time:
+            add = partial(self._add, samples, (source, kind.name), values, received_ns)
             self._clock.write_measured(source, formatter, (received_ns, time_ns), add)
         else:
-            add(received_ns)
+            self._add(samples, (source, kind.name), values, received_ns, received_ns)
+
+    def _find_kind(self, talker: str, formatter: str) -> _Kind:
+        """Return how sentences with this address are decoded."""
+        name = talker if talker == formatter else talker + formatter
+        decode = self._decoders.get(name) or self._decoders.get(formatter)
+        return _Kind(name, decode, formatter in TIMED)
 
     def _gnss_time_ns(
         self, source: str, sentence: Sentence, received_ns: int, samples: SampleBuffer
     ) -> int | None:
         """Return the time in a sentence, ns; one with a date is a sample of ``gnss_time``."""
         formatter = sentence.formatter
-        if formatter not in TIMED or (utc := utc_of(formatter, sentence.fields)) is None:
+        utc = utc_of(formatter, sentence.fields)
+        if utc is None:
             return None
         time_ns = self._clock.set_time(source, formatter, utc, received_ns)
         if time_ns is not None and utc.day is not None:

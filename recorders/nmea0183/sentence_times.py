@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
 from recorders.streams.gnss_clock import ROLLOVER_NS, Utc, Warn, nearest_ns, rollovers
-from recorders.streams.packets import NO_TIME, Batches, Packet
+from recorders.streams.packets import END_NS, NO_TIME, Batches, Packet
 from shiplog.errors import LogError, UsageError
 from shiplog.tables.printed_times import DAY_NS
 
@@ -196,8 +196,7 @@ class SentenceTimes:
         for batch in batches:
             done: list[Packet] = []
             for packet in batch:
-                time_ns = self._time_of(packet)
-                if time_ns is not None:
+                if self._mark in packet.data and (time_ns := self._time_of(packet)) is not None:
                     done += self._advance(time_ns)
                 self._held.append(packet)
                 if len(self._held) >= MAX_HELD:
@@ -207,8 +206,6 @@ class SentenceTimes:
 
     def _time_of(self, packet: Packet) -> int | None:
         """Return the time of a line of the reference, ns, if it is a new one."""
-        if self._mark not in packet.data:
-            return None
         for sentence in sentences_of([packet]):
             is_reference = sentence[:2] == (self._reference.talker, self._reference.formatter)
             if is_reference and (utc := _utc(sentence)) is not None:
@@ -252,13 +249,12 @@ class SentenceTimes:
         """Return the held lines with times; that of the line `first` is known."""
         start_ns, line_ns = self._time_ns or self._near_ns, self._line_ns
         held, self._held = self._held, []
-        done = []
-        for number, packet in enumerate(held, -first):
-            time_ns = start_ns + round(number * line_ns)
-            if limit_ns is not None and limit_ns > start_ns:
-                time_ns = min(time_ns, limit_ns)
-            done.append(Packet(packet.data, time_ns, packet.origin))
-        return done
+        if limit_ns is None or limit_ns <= start_ns:
+            limit_ns = END_NS
+        return [
+            Packet(packet.data, min(start_ns + round(number * line_ns), limit_ns), packet.origin)
+            for number, packet in enumerate(held, -first)
+        ]
 
     def _continue(self) -> list[Packet]:
         """Return the held lines where the next time is overdue, and go on at the usual rate."""

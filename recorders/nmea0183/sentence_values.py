@@ -1,7 +1,6 @@
 """Values in the fields of a sentence: numbers, validity and hemispheres."""
 
 from math import isfinite, nan
-from typing import NamedTuple
 
 Fields = tuple[bytes, ...]
 """The fields of a sentence, in printable ASCII."""
@@ -10,23 +9,16 @@ Fix = tuple[float, float, float]
 """Latitude and longitude in deg, altitude in m; NaN where not known."""
 
 
-class Value(NamedTuple):
-    """A measured value of a sentence.
+Value = tuple[str, float | Fix, str]
+"""A measured value of a sentence: channel, value and suffix.
 
-    Attributes
-    ----------
-    channel
-        The channel, of `shiplog.units.CATALOGUE`.
-    value
-        The value in the unit of the catalogue, or a fix; NaN where the sender marks it as invalid.
-    suffix
-        What distinguishes it from other values of this channel by the same talker: ``port`` of two
-        rudders, or the sentence where another one is the usual one of the channel; else empty.
-    """
+The channel is one of `shiplog.units.CATALOGUE`. The value is in its unit, or a fix; NaN where the
+sender marks it as invalid. The suffix distinguishes it from other values of this channel by the same
+talker: ``port`` of two rudders, or the sentence where another one is the usual one; else it is empty.
+"""
 
-    channel: str
-    value: float | Fix
-    suffix: str = ""
+Values = tuple[Value, ...]
+"""The measured values of a sentence."""
 
 
 def text_at(fields: Fields, index: int) -> str:
@@ -56,8 +48,7 @@ def is_valid(fields: Fields, index: int, valid: str = "A") -> bool:
 
     Sentences of old devices end before the status; a sentence without it is taken as valid.
     """
-    status = text_at(fields, index)
-    return not status or status in valid
+    return index >= len(fields) or fields[index].strip().decode() in valid
 
 
 def measured(
@@ -67,7 +58,7 @@ def measured(
     *,
     valid: bool = True,
     suffix: str = "",
-) -> tuple[Value, ...]:
+) -> Values:
     """Return a value in the unit of its channel; nothing where it was not measured.
 
     Parameters
@@ -93,7 +84,7 @@ def measured(
     value = number * factor
     if not isfinite(value):
         raise ValueError(number)
-    return (Value(channel, value if valid else nan, suffix),)
+    return ((channel, value if valid else nan, suffix),)
 
 
 def signed(number: float | None, letter: str, positive: str, negative: str) -> float | None:

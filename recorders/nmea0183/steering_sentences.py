@@ -4,14 +4,13 @@ from math import radians
 
 from shiplog.units import conversion_factor
 
-from .sentence_values import Fields, Value, is_valid, measured, number_at, signed, text_at
+from .sentence_values import Fields, Values, is_valid, measured, number_at, signed, text_at
 
 DEG = radians(1)
 DEG_PER_MIN = conversion_factor("deg/min", "rad/s")
 KNOT = conversion_factor("kn", "m/s")
 KMH = conversion_factor("km/h", "m/s")
 PERCENT = 0.01
-Values = tuple[Value, ...]
 
 
 def rate_of_turn(fields: Fields) -> Values:

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from .sentence_values import Fields, Value, measured, number_at, text_at
-from .steering_sentences import DEG, PERCENT, Values
+from .sentence_values import Fields, Value, Values, measured, number_at, text_at
+from .steering_sentences import DEG, PERCENT
 
 _ANGLES = {"roll": "roll", "pitch": "pitch", "ptch": "pitch", "heel": "heel"}
 _AIR, _WATER = ("air", "outside", "ambient"), ("water", "sea")

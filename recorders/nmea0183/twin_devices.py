@@ -1,13 +1,18 @@
 """Detection of two devices that send one quantity under one talker, and so alternate."""
 
 from collections.abc import Iterator
-from math import pi, remainder
+from dataclasses import dataclass, field
+from math import pi
 
+import numpy as np
+
+from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE, conversion_factor
 
 CHECKED = frozenset(("yaw_rate", "speed", "rudder", "rpm", "heading", "magnetic_heading"))
-_MIN_SAMPLES = 50
+_MIN_CHANGES = 50
 _MIN_RATIO = 4.0  # of the changes to the next value and to the one after it
+_BLOCK = 1024  # values that are summed up at once
 
 
 class TwinDevices:
@@ -25,26 +30,66 @@ class TwinDevices:
     """
 
     def __init__(self) -> None:
-        # by topic: the last value and the one before, sums of the changes, and their number
-        self._changes: dict[tuple[str, str], tuple[float, float, float, float, int]] = {}
+        self._changes: dict[tuple[str, str], _Changes] = {}  # by topic
 
     def add(self, channel: str, source: str, value: float) -> None:
         """Add a valid value of a channel of `CHECKED`."""
-        topic = channel, source
-        last, before, step, double_step, count = self._changes.get(topic, (value, value, 0, 0, 0))
-        change, double_change = value - last, value - before
-        if CATALOGUE[channel].circular:
-            change, double_change = remainder(change, 2 * pi), remainder(double_change, 2 * pi)
-        sums = step + abs(change), double_step + abs(double_change)
-        self._changes[topic] = (value, last, *sums, count + 1)
+        changes = self._changes.get((channel, source))
+        if changes is None:
+            changes = self._changes[channel, source] = _Changes(CATALOGUE[channel].circular)
+        changes.values.append(value)
+        if len(changes.values) >= _BLOCK:
+            changes.sum_up()
 
     def findings(self) -> Iterator[str]:
         """Yield a warning for each topic that alternates."""
-        for (channel, source), (_, _, step, double_step, count) in self._changes.items():
-            if count >= _MIN_SAMPLES and step > _MIN_RATIO * double_step:
+        for (channel, source), changes in self._changes.items():
+            changes.sum_up()
+            if changes.count >= _MIN_CHANGES and changes.step > _MIN_RATIO * changes.double_step:
                 kind = CATALOGUE[channel]
-                size = step / (count - 1) / conversion_factor(kind.display_unit, kind.unit)
+                size = (
+                    changes.step / changes.count / conversion_factor(kind.display_unit, kind.unit)
+                )
                 yield (
                     f"{channel} of {source} alternates by {size:.2g} {kind.display_unit}: two "
                     "devices send it under one talker; give one another"
                 )
+
+
+@dataclass
+class _Changes:
+    """The values of a topic that are not yet summed up, and sums of the changes between the others.
+
+    Attributes
+    ----------
+    circular
+        Whether the values are angles all around.
+    values
+        The last two values that were summed up, and those since.
+    step, double_step
+        Sums of the changes to the next value, and to the one after it.
+    count
+        The number of changes to the next value.
+    """
+
+    circular: bool
+    values: list[float] = field(default_factory=list)
+    step: float = 0.0
+    double_step: float = 0.0
+    count: int = 0
+
+    def sum_up(self) -> None:
+        """Add the changes up to the last value to the sums."""
+        values = np.array(self.values)
+        new = values[1:] if self.count else values  # the change before it is in the sum
+        self.step += self._size(np.diff(new))
+        self.double_step += self._size(values[2:] - values[:-2])
+        self.count += max(len(new) - 1, 0)
+        self.values = self.values[-2:]
+
+    def _size(self, changes: FloatArray) -> float:
+        """Return the sum of the sizes of changes."""
+        if self.circular:
+            changes = (changes + pi) % (2 * pi) - pi
+        with np.errstate(over="ignore"):  # numbers from the wire may be of any size
+            return float(np.abs(changes).sum())

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from datetime import date
+from functools import lru_cache
 
 from recorders.streams.gnss_clock import Utc
 
@@ -10,7 +11,7 @@ from .sentence_values import Fields, is_valid, text_at
 
 _EPOCH = date(1970, 1, 1).toordinal()
 _FIRST_YEAR, _LAST_YEAR = 1970, 2261  # times are 64-bit numbers of ns
-_CENTURY_BREAK = 80  # years of two digits from here on are of the 20th century: GPS began in 1980
+_CENTURY_BREAK = "80"  # years of two digits from here on are of the 20th century: GPS began in 1980
 
 
 def utc_of(formatter: str, fields: Fields) -> Utc | None:
@@ -32,6 +33,7 @@ def utc_of(formatter: str, fields: Fields) -> Utc | None:
     return None if reader is None else reader(fields)
 
 
+@lru_cache(maxsize=64)  # the sentences of a burst share their time
 def _clock(text: str) -> int | None:
     """Return the time of day of ``hhmmss.ss``, ns; None where it is empty."""
     if not text:
@@ -45,10 +47,13 @@ def _clock(text: str) -> int | None:
     return (hour * 3600 + minute * 60 + second) * 10**9 + int(fraction[:9].ljust(9, "0"))
 
 
-def _days(year: int, month: int, day: int) -> int:
-    if not _FIRST_YEAR <= year <= _LAST_YEAR:
+@lru_cache(maxsize=64)
+def _days(day: str, month: str, year: str) -> int:
+    if not all(part.isdecimal() and len(part) <= 4 for part in (day, month, year)):
+        raise ValueError(day, month, year)
+    if not _FIRST_YEAR <= int(year) <= _LAST_YEAR:
         raise ValueError(year)
-    return date(year, month, day).toordinal() - _EPOCH
+    return date(int(year), int(month), int(day)).toordinal() - _EPOCH
 
 
 def _only_clock(text: str, *, valid: bool) -> Utc | None:
@@ -64,25 +69,22 @@ def _rmc(fields: Fields) -> Utc | None:
         return Utc(clock_ns, None)
     if len(text) != 6 or not text.isdecimal():
         raise ValueError(text)
-    year = int(text[4:])
-    century = 1900 if year >= _CENTURY_BREAK else 2000
-    return Utc(clock_ns, _days(century + year, int(text[2:4]), int(text[:2])))
+    century = "19" if text[4:] >= _CENTURY_BREAK else "20"
+    return Utc(clock_ns, _days(text[:2], text[2:4], century + text[4:]))
 
 
 def _zda(fields: Fields) -> Utc | None:
-    clock_ns, parts = _clock(text_at(fields, 0)), [text_at(fields, i) for i in (1, 2, 3)]
+    clock_ns = _clock(text_at(fields, 0))
     if clock_ns is None:
         return None
-    if not all(parts):
-        return Utc(clock_ns, None)
-    day, month, year = (int(part) if part.isdecimal() and len(part) <= 4 else 0 for part in parts)
-    return Utc(clock_ns, _days(year, month, day))
+    day, month, year = text_at(fields, 1), text_at(fields, 2), text_at(fields, 3)
+    return Utc(clock_ns, _days(day, month, year) if day and month and year else None)
 
 
 _READERS: dict[str, Callable[[Fields], Utc | None]] = {
     "RMC": _rmc,
     "ZDA": _zda,
-    "GGA": lambda f: _only_clock(text_at(f, 0), valid=has_fix(f[5:])),
+    "GGA": lambda f: _only_clock(text_at(f, 0), valid=has_fix(f)),
     "GNS": lambda f: _only_clock(text_at(f, 0), valid=has_mode(f)),
     "GLL": lambda f: _only_clock(text_at(f, 4), valid=is_valid(f, 5) and is_valid(f, 6, FIX_MODES)),
 }

@@ -62,7 +62,10 @@ class StreamCounts:
 
     def accept(self, kind: str) -> None:
         """Count a packet from which samples were decoded."""
-        _count(self._accepted, kind)
+        if kind in self._accepted:
+            self._accepted[kind] += 1
+        else:
+            _count(self._accepted, kind)
 
     def reject(self, reason: str, packets: int = 1) -> None:
         """Count packets that are not what they should be."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from shiplog.tables.printed_times import DAY_NS, HALF_DAY_NS
 
 from .gnss_receiver import MAX_WAIT_NS, GnssReceiver, HeldMessage, WriteSamples
-from .receiver_times import Latency, ReceiverTimes, TimeSteps
+from .receiver_times import ReceiverTimes
 
 ROLLOVER_NS = 1024 * 7 * DAY_NS  # the GPS week of ten bits begins again at 0
 MAX_ROLLOVERS = 2
@@ -213,14 +213,13 @@ class GnssClock:
     ) -> None:
         """Compare a time in a message with that of its reception, and warn of a jump or slip."""
         utc_ns, received_ns = times
-        latency = receiver.latencies.setdefault(kind, Latency())
-        if (jump := latency.add((received_ns - utc_ns) * 1e-9)) is not None:
+        if (jump := receiver.latencies[kind].add((received_ns - utc_ns) * 1e-9)) is not None:
             self._warn(
                 f"{source}{kind}: reception against GNSS time jumps by {jump:+.2f} s: "
                 "the recorder's clock or the receiver was set",
                 received_ns,
             )
-        slip = receiver.steps.setdefault(kind, TimeSteps()).slip(utc_ns, received_ns)
+        slip = receiver.steps[kind].slip(utc_ns, received_ns)
         is_unused = kind in self._clock_kinds and kind != receiver.times.reference
         if slip is None or receiver.slips or is_unused:
             return
@@ -239,6 +238,9 @@ class GnssClock:
         if utc.day is None:
             return nearest_ns(utc.clock_ns, received_ns)
         utc_ns = utc.day * DAY_NS + utc.clock_ns
+        if abs(received_ns - utc_ns) < _MAX_DATE_ERROR_NS:
+            receiver.rollovers = 0
+            return utc_ns
         count = rollovers(utc_ns, received_ns)
         corrected_ns = utc_ns + count * ROLLOVER_NS
         if count and not receiver.rollovers:

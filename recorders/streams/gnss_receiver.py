@@ -1,5 +1,6 @@
 """One GNSS receiver: its times, and its messages that wait until these are known."""
 
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -68,8 +69,8 @@ class GnssReceiver:
     contradicts: bool = False
     slips: bool = False
     is_offset: bool = False
-    latencies: dict[str, Latency] = field(default_factory=dict)
-    steps: dict[str, TimeSteps] = field(default_factory=dict)
+    latencies: defaultdict[str, Latency] = field(default_factory=lambda: defaultdict(Latency))
+    steps: defaultdict[str, TimeSteps] = field(default_factory=lambda: defaultdict(TimeSteps))
     _held: list[HeldMessage] = field(default_factory=list)
 
     def add(self, message: HeldMessage) -> None:

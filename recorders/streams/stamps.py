@@ -160,6 +160,8 @@ class StampReader:
 
     def __init__(self, form: StampForm, first_day: date | None = None) -> None:
         self._form = form
+        self._unit_ns = form.unit_ns or _SECOND_NS
+        self._has_zone = form.name == "iso"
         first = first_day or date(1970, 1, 1)
         self._day_ns = timegm(first.timetuple()) * _SECOND_NS
         self._clock_ns = -1  # of the last time of day
@@ -173,7 +175,7 @@ class StampReader:
         if match is None:
             return None
         whole, fraction = match[1], match[2]
-        zone = match[3] if self._form.name == "iso" else None
+        zone = match[3] if self._has_zone else None
         if (whole, zone) != self._last:
             try:
                 self._last_ns = self._whole_ns(whole.decode(), zone)
@@ -182,8 +184,7 @@ class StampReader:
             self._last = whole, zone
         time_ns = self._last_ns
         if fraction:
-            unit_ns = self._form.unit_ns or _SECOND_NS
-            time_ns += int(fraction[:9].ljust(9, b"0")) * unit_ns // _SECOND_NS
+            time_ns += int(fraction[:9].ljust(9, b"0")) * self._unit_ns // _SECOND_NS
         return (time_ns, line[match.end() :]) if 0 <= time_ns < END_NS else None
 
     def _whole_ns(self, whole: str, zone: bytes | None) -> int:
