@@ -25,6 +25,7 @@ _TAG_PARAMETER = re.compile(r"([a-z]):([ -~]+)")
 _SOURCE = re.compile(r"[A-Za-z0-9_-]{1,15}")
 _HEX_BYTE = re.compile(rb"[0-9A-Fa-f]{2}")
 _MAX_TAG_NUMBER = 10**15
+_PRINTABLE = bytes(range(0x20, 0x7F))
 _REASONS = {
     "missing_checksum_delimiter": "no checksum",
     "invalid_checksum_digits": "malformed checksum",
@@ -133,11 +134,10 @@ def parse_sentence(line: bytes, *, require_checksum: bool = True) -> Sentence:
         parsed = parse(line)
     except EnvelopeError as error:
         raise FramingError(_REASONS.get(error.variant, "malformed address")) from error
-    text = line.decode("latin-1")
-    if not (text.isascii() and text.isprintable()):
+    if line.translate(None, _PRINTABLE):  # what is left without them
         raise FramingError("characters that are not printable")
-    address = _address(parsed.start_delimiter, parsed.talker, parsed.sentence_type)
-    return Sentence(*address, parsed.fields, tag)
+    talker, formatter = _address(line[:1], parsed.talker, parsed.sentence_type)
+    return Sentence(talker, formatter, parsed.fields, tag)
 
 
 def tag_of(line: bytes) -> TagBlock:

@@ -14,7 +14,7 @@ def fix_data(fields: Fields) -> Values:
     quality = number_at(fields, 5)
     valid = has_fix(fields)
     return (
-        *_position(fields[1:5], number_at(fields, 8), valid=valid),
+        *_position(fields, 1, number_at(fields, 8), valid=valid),
         *measured("fix_quality", quality),
         *measured("satellites", number_at(fields, 6)),
         *measured("hdop", number_at(fields, 7), valid=valid),
@@ -29,14 +29,14 @@ def has_fix(fields: Fields) -> bool:
 def geographic_position(fields: Fields) -> Values:
     """``GLL,lat,N,lon,E,time,A,mode``: position, time, status."""
     valid = is_valid(fields, 5) and is_valid(fields, 6, FIX_MODES)
-    return _position(fields[:4], valid=valid, suffix="GLL")
+    return _position(fields, 0, valid=valid, suffix="GLL")
 
 
 def gnss_fix(fields: Fields) -> Values:
     """``GNS,time,lat,N,lon,E,modes,satellites,hdop,altitude,...``; a mode for each system."""
     valid = has_mode(fields)
     return (
-        *_position(fields[1:5], number_at(fields, 8), valid=valid, suffix="GNS"),
+        *_position(fields, 1, number_at(fields, 8), valid=valid, suffix="GNS"),
         *measured("satellites", number_at(fields, 6), suffix="GNS"),
         *measured("hdop", number_at(fields, 7), valid=valid, suffix="GNS"),
     )
@@ -52,7 +52,7 @@ def minimum_navigation(fields: Fields) -> Values:
     valid = has_valid_rmc(fields)
     variation = signed(number_at(fields, 9), text_at(fields, 10) or "E", "E", "W")
     return (
-        *_position(fields[2:6], valid=valid, suffix="RMC"),
+        *_position(fields, 2, valid=valid, suffix="RMC"),
         *measured("speed_over_ground", number_at(fields, 6), KNOT, valid=valid, suffix="RMC"),
         *measured("course_over_ground", number_at(fields, 7), DEG, valid=valid, suffix="RMC"),
         *measured("magnetic_variation", variation, DEG, suffix="RMC"),
@@ -76,7 +76,7 @@ def course_and_speed(fields: Fields) -> Values:
 
 
 def _position(
-    fields: Fields, altitude: float | None = None, *, valid: bool, suffix: str = ""
+    fields: Fields, first: int, altitude: float | None = None, *, valid: bool, suffix: str = ""
 ) -> Values:
     """Return the fix in the fields ``lat,N,lon,E``; nothing where one of them is empty.
 
@@ -85,16 +85,18 @@ def _position(
     ValueError
         A number or a hemisphere is malformed, or out of range.
     """
-    latitude = signed(_angle(fields, 0, 90), text_at(fields, 1), "N", "S")
-    longitude = signed(_angle(fields, 2, 180), text_at(fields, 3), "E", "W")
+    latitude = _angle(fields, first, 90, "N", "S")
+    longitude = _angle(fields, first + 2, 180, "E", "W")
     if latitude is None or longitude is None:
         return ()
     fix: Fix = (latitude, longitude, nan if altitude is None else altitude)
     return (("position", fix if valid else (nan, nan, nan), suffix),)
 
 
-def _angle(fields: Fields, index: int, highest: float) -> float | None:
-    """Return an angle printed as ``dddmm.mmm``, deg."""
+def _angle(
+    fields: Fields, index: int, highest: float, positive: str, negative: str
+) -> float | None:
+    """Return an angle printed as ``dddmm.mmm``, deg, with the sign of its hemisphere."""
     number = number_at(fields, index)
     if number is None:
         return None
@@ -102,7 +104,7 @@ def _angle(fields: Fields, index: int, highest: float) -> float | None:
     angle = degrees + minutes / 60
     if minutes >= 60 or not 0 <= angle <= highest:
         raise ValueError(fields[index])
-    return angle
+    return signed(angle, text_at(fields, index + 1), positive, negative)
 
 
 NAVIGATION = {

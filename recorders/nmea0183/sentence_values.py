@@ -13,8 +13,8 @@ Value = tuple[str, float | Fix, str]
 """A measured value of a sentence: channel, value and suffix.
 
 The channel is one of `shiplog.units.CATALOGUE`. The value is in its unit, or a fix; NaN where the
-sender marks it as invalid. The suffix distinguishes it from other values of this channel by the same
-talker: ``port`` of two rudders, or the sentence where another one is the usual one; else it is empty.
+sender marks it as invalid. The suffix distinguishes it from other values of this channel by the
+same talker: ``port`` of two rudders, or the sentence where another one is usual; else it is empty.
 """
 
 Values = tuple[Value, ...]

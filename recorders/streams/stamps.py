@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta
-from functools import partial
 
 from shiplog.errors import LogError
 from shiplog.tables.printed_times import DAY_NS, HALF_DAY_NS
@@ -211,14 +210,8 @@ class StampReader:
 
 def read_stamps(batches: Batches, reader: StampReader, counts: StreamCounts) -> Batches:
     """Move the stamps of lines to their times of reception; lines without one are rejected."""
-    read = partial(_stamped, reader, counts)
     for batch in batches:
-        yield [packet for packet in map(read, batch) if packet is not None]
-
-
-def _stamped(reader: StampReader, counts: StreamCounts, packet: Packet) -> Packet | None:
-    stamp = reader.read(packet.data)
-    if stamp is None:
-        counts.reject("no valid time stamp")
-        return None
-    return Packet(stamp[1], stamp[0], packet.origin)
+        read = [(reader.read(packet.data), packet.origin) for packet in batch]
+        stamped = [Packet(stamp[1], stamp[0], origin) for stamp, origin in read if stamp]
+        counts.reject("no valid time stamp", len(batch) - len(stamped))
+        yield stamped

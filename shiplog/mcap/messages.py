@@ -243,12 +243,11 @@ def _encodable(text: str) -> str:
 
 
 def _encode_location_fixes(channel: Channel) -> list[bytes]:
-    message_type = _message_type(schema_for(GEOGRAPHIC))
+    fix: Any = _message_type(schema_for(GEOGRAPHIC))()  # one for all: its making takes longest
+    timestamp = fix.timestamp
     messages = []
-    for stamp, (latitude, longitude, altitude) in zip(
-        channel.measured_ns.tolist(), channel.values.tolist(), strict=True
-    ):
-        fix = message_type(latitude=latitude, longitude=longitude, altitude=altitude)
-        fix.timestamp.FromNanoseconds(stamp)  # type: ignore[attr-defined]
+    for stamp, values in zip(channel.measured_ns.tolist(), channel.values.tolist(), strict=True):
+        fix.latitude, fix.longitude, fix.altitude = values
+        timestamp.seconds, timestamp.nanos = divmod(stamp, 10**9)
         messages.append(fix.SerializeToString(deterministic=True))
     return messages
