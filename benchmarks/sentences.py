@@ -1,8 +1,8 @@
 """NMEA 0183 from a file to a log, beside the parsers: `python -m benchmarks.sentences [FILE]`.
 
-Sentences a second of processor time, the best of several rounds: of pynmea2 and pynmeagps, which
-parse lines that were read before, and of shiplog's whole way from the file to the MCAP log. Without
-a file, the sample recording is repeated.
+Sentences a second of processor time, the best of several rounds: of marlin, pynmea2 and pynmeagps,
+which parse lines that were read before, and of shiplog's whole way from the file to the MCAP log,
+which marlin is a part of. Without a file, the sample recording is repeated.
 """
 
 import argparse
@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import marlin.envelope
 import pynmea2
 import pynmeagps
 
@@ -40,6 +41,7 @@ def main() -> int:
         parsed = lines[:MAX_PARSED]
         log = Path(folder) / "sentences.mcap"
         rates = {
+            "marlin, parsing only": _rate(len(parsed), lambda: _parse_by_marlin(parsed)),
             "pynmea2, parsing only": _rate(len(parsed), lambda: _parse_by_pynmea2(parsed)),
             "pynmeagps, parsing only": _rate(len(parsed), lambda: _parse_by_pynmeagps(parsed)),
             "shiplog, file to log": _rate(len(lines), lambda: _record(path, log)),
@@ -57,6 +59,15 @@ def _rate(sentences: int, work: Callable[[], None]) -> float:
         work()
         best = min(best, time.process_time() - start)
     return sentences / best
+
+
+def _parse_by_marlin(lines: list[str]) -> None:
+    for line in lines:
+        try:
+            sentence = marlin.envelope.parse(line.encode("latin-1"))
+        except marlin.envelope.EnvelopeError:  # no sentence, or a wrong checksum
+            continue
+        _ = sentence.talker, sentence.sentence_type, sentence.fields  # made when they are read
 
 
 def _parse_by_pynmea2(lines: list[str]) -> None:

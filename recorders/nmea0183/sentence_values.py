@@ -34,8 +34,7 @@ def number_at(fields: Fields, index: int) -> float | None:
     ValueError
         The field is not a finite number.
     """
-    text = fields[index] if index < len(fields) else b""
-    if not text or text.isspace():
+    if index >= len(fields) or not (text := fields[index]) or text.isspace():
         return None
     value = float(text)
     if not isfinite(value) or b"_" in text:

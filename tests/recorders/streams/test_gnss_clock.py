@@ -5,7 +5,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from recorders.streams.gnss_clock import ROLLOVER_NS, GnssClock, Latency, Utc, rollovers
+from recorders.streams.gnss_clock import ROLLOVER_NS, GnssClock, Utc, rollovers
+from recorders.streams.receiver_times import Latency
 
 SECOND_NS = 10**9
 DAY_NS = 86_400 * SECOND_NS
