@@ -94,6 +94,7 @@ def _channel(channel: ChannelStats) -> JsonObject:
         "rate_hz": 1 / channel.interval_secs if channel.interval_secs else None,
         "gaps": len(channel.gaps),
         "longest_gap_secs": max((length for _, length in channel.gaps), default=0.0),
+        "spikes": len(channel.spikes) if channel.spikes else 0,
     }
 
 

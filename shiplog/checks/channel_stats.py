@@ -13,6 +13,7 @@ from shiplog.units import CATALOGUE
 
 from .fixes import FixScreening
 from .on_change import HoldStats, is_order
+from .spikes import SpikeStats
 from .stuck import StuckStats
 
 GAP_PERIODS = 5.0  # an interval longer than this many typical ones is a gap,
@@ -91,6 +92,9 @@ class ChannelStats:
     sentinels
         Values that stand for "not available", each with its number of samples; with `strict`, these
         are not valid.
+    spikes
+        Single samples that leave the course of the channel, which with `strict` are not valid;
+        None where there is none, and without `strict`.
     limits
         The physically possible range of the channel; values outside it are impossible.
     stuck
@@ -135,6 +139,7 @@ class ChannelStats:
     impossible: Occurrences
     impossible_value: tuple[float, int]
     sentinels: tuple[tuple[float, int], ...]
+    spikes: SpikeStats | None
     limits: tuple[float, float]
     stuck: StuckStats | None
     valid: int
@@ -173,7 +178,8 @@ class ChannelStats:
             return self.fixes.apply(channel)
         if not self.strict:
             return channel
-        return without_unusable(channel, self.limits, tuple(value for value, _ in self.sentinels))
+        sentinels = tuple(value for value, _ in self.sentinels)
+        return without_unusable(channel, self.limits, sentinels, self.spikes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,9 +253,12 @@ def possible_range(name: str) -> tuple[float, float]:
 
 
 def without_unusable(
-    channel: Channel, limits: tuple[float, float], sentinels: Collection[float] = ()
+    channel: Channel,
+    limits: tuple[float, float],
+    sentinels: Collection[float] = (),
+    spikes: SpikeStats | None = None,
 ) -> Channel:
-    """Return the channel with NaN in place of impossible values and of sentinels.
+    """Return the channel with NaN in place of impossible values, of sentinels and of spikes.
 
     A channel with `fields` is returned unchanged.
 
@@ -261,11 +270,15 @@ def without_unusable(
         The lowest and the highest possible value.
     sentinels
         Values that stand for "not available", from `shiplog.checks.sentinels`.
+    spikes
+        The spikes, from `shiplog.checks.spikes`.
     """
-    if channel.fields or (limits == (-np.inf, np.inf) and not sentinels):
+    if channel.fields or (limits == (-np.inf, np.inf) and not (sentinels or spikes)):
         return channel
     values = channel.values
     usable = (values >= limits[0]) & (values <= limits[1])
     if sentinels:
         usable &= ~np.isin(values, list(sentinels))
+    if spikes:
+        usable &= ~spikes.among(channel)
     return channel if usable.all() else replace(channel, values=np.where(usable, values, np.nan))

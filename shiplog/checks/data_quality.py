@@ -211,6 +211,14 @@ def _value_warnings(channel: ChannelStats) -> Iterator[str]:
             'channel jumps and from which it returns: it stands for "not available" and is not '
             "used; check the sensor, and write nan instead where the log is made"
         )
+    if channel.spikes:
+        number, first_ns = len(channel.spikes), channel.spikes.times_ns[0]
+        yield (
+            f"{_count(number, 'spike')} ({100 * number / channel.samples:.2g} %), up to "
+            f"{_displayed(channel, channel.spikes.largest)} away from the samples around, the "
+            f"first {(first_ns - channel.span_ns[0]) * 1e-9:.1f} s after its start: not used; "
+            "check the sensor and its connection"
+        )
     if channel.fixes:
         yield from channel.fixes.warnings()
 

@@ -23,6 +23,7 @@ from .fixes import MAX_IMPOSSIBLE_VALUES, FixScreen
 from .on_change import HoldStats, is_order, is_written_on_change, stated_interpolation
 from .quantiles import Quantiles
 from .sentinels import MAX_WRAPPED, sentinel_values, unwrapped_limit
+from .spikes import SMOOTH_QUANTITIES, SpikeSearch, SpikeStats
 from .stuck import StuckCheck
 from .time_stats import ChannelTimeStats, Mask
 
@@ -41,8 +42,8 @@ def compute_log_stats(
     log
         The log; its chunks are read once.
     strict
-        Treat impossible values and sentinels as not measured: they are then not valid. Where there
-        are sentinels, the log is read a second time.
+        Treat impossible values, sentinels and spikes as not measured: they are then not valid.
+        Where there are sentinels, the log is read once more, and where there are spikes, too.
     sources
         The source in use, by the name of a quantity: fixes are not judged by another speed.
 
@@ -53,10 +54,14 @@ def compute_log_stats(
     >>> stats["yaw_rate"].samples, round(stats["yaw_rate"].interval_secs, 3)
     (6001, 0.1)
     """
-    collectors = _collect(log, {}, strict=strict)
-    if strict:
-        cleanings = {key: found for key, each in collectors.items() if (found := each.cleaning())}
-        collectors = _collect(log, cleanings, strict=True) if cleanings else collectors
+    cleanings: dict[ChannelKey, _Cleaning] = {}
+    collectors = _collect(log, cleanings, strict=strict)
+    # a sentinel is no spike: spikes are known once sentinels are omitted
+    for find in (_ChannelStatsCollector.cleaning, _ChannelStatsCollector.despiking):
+        found = {key: new for key, each in collectors.items() if strict and (new := find(each))}
+        if found:
+            cleanings |= found
+            collectors = _collect(log, cleanings, strict=True)
     used = (sources or {}).get("speed")
     speeds = [c for c in collectors.values() if c.name == "speed" and used in (None, c.source)]
     max_speed = max((c.max_value for c in speeds), default=0.0)
@@ -64,10 +69,11 @@ def compute_log_stats(
 
 
 class _Cleaning(NamedTuple):
-    """Which values of a channel cannot be used: those outside the limits, and its sentinels."""
+    """Values of a channel that cannot be used: those outside the limits, sentinels and spikes."""
 
     limits: tuple[float, float]
     sentinels: tuple[float, ...] = ()
+    spikes: SpikeStats | None = None
 
 
 def _collect(
@@ -90,13 +96,17 @@ class _ChannelStatsCollector:
 
     def __init__(self, channel: Channel, cleaning: _Cleaning, *, strict: bool) -> None:
         self._channel, self._strict = channel, strict  # the channel for its name, unit and fields
-        self._limits = cleaning.limits
+        self._cleaning, self._limits = cleaning, cleaning.limits
         self._sentinels = dict.fromkeys(cleaning.sentinels, 0)  # with the number of samples of each
         kind = CATALOGUE.get(channel.name)
         circular = kind is not None and kind.circular
         commanded = kind is not None and kind.commanded
         self._times = ChannelTimeStats(commanded=commanded)
         self._stuck = None if commanded else StuckCheck(circular=circular)
+        smooth = channel.name in SMOOTH_QUANTITIES and not is_order(channel.source)
+        search = strict and smooth and not (channel.fields or cleaning.spikes)
+        self._spikes = SpikeSearch(circular=circular) if search else None
+        self._removed = 0  # sentinels and spikes
         self._fixes = (
             FixScreen() if channel.name == "position" and len(channel.fields) > 1 else None
         )
@@ -126,10 +136,14 @@ class _ChannelStatsCollector:
         """Add the next samples of the channel."""
         if not len(channel):
             return
-        if self._sentinels:
+        if self._cleaning.sentinels or self._cleaning.spikes:
             for value in self._sentinels:
                 self._sentinels[value] += int(np.count_nonzero(channel.values == value))
-            channel = without_unusable(channel, (-np.inf, np.inf), self._sentinels)
+            missing = _missing(channel)
+            channel = without_unusable(
+                channel, (-np.inf, np.inf), self._sentinels, self._cleaning.spikes
+            )
+            self._removed += _missing(channel) - missing
         rows = channel.values.reshape(len(channel), -1)
         if self._fixes:
             self._fixes.add(channel)
@@ -140,6 +154,8 @@ class _ChannelStatsCollector:
         if self._stuck and valid.any():
             secs = (channel.measured_ns - self._times.start_ns) * 1e-9
             self._stuck.add(*((secs, rows) if valid.all() else (secs[valid], rows[valid])))
+        if self._spikes:
+            self._spikes.add(channel.measured_ns[valid], channel.values[valid])
 
     def _usable(self, channel: Channel, rows: FloatArray) -> Mask:
         """Which samples are finite and, with `strict`, possible, (n,)."""
@@ -188,9 +204,8 @@ class _ChannelStatsCollector:
 
         A value that was removed was sent in time: where no row is empty, the rows are judged.
         """
-        sentinels = sum(self._sentinels.values())
-        removed = self._impossible.count + sentinels
-        return self._times.regularity(rows=bool(removed) and self._missing == sentinels)
+        removed = self._impossible.count + self._removed
+        return self._times.regularity(rows=bool(removed) and self._missing == self._removed)
 
     def cleaning(self) -> _Cleaning | None:
         """Return what the samples show to be unusable; None where a second pass is needless."""
@@ -205,6 +220,14 @@ class _ChannelStatsCollector:
         sentinels = sentinel_values(values, self._channel.unit)
         needless = (low, high) == self._limits and not sentinels
         return None if needless else _Cleaning((low, high), sentinels)
+
+    def despiking(self) -> _Cleaning | None:
+        """Return the cleaning with the spikes of the samples; None where there are none."""
+        interval = self._times.median_interval_secs()
+        if self._spikes is None or self._hold(interval):
+            return None
+        spikes = self._spikes.result(interval, rudder=self.name == "rudder")
+        return self._cleaning._replace(spikes=spikes) if spikes else None
 
     def result(self, max_speed: float) -> ChannelStats:
         """Return the statistics of all samples added; `max_speed` of the log, m/s."""
@@ -229,11 +252,12 @@ class _ChannelStatsCollector:
             backward_steps=times.backward_steps,
             received_early=times.received_early,
             max_delay_ns=times.max_delay_ns,
-            missing=self._missing - sum(self._sentinels.values()),
+            missing=self._missing - self._removed,
             infinite=self._infinite,
             impossible=self._impossible,
             impossible_value=next(iter(self._impossible_values.most_common(1)), (np.nan, 0)),
             sentinels=tuple(self._sentinels.items()),
+            spikes=self._cleaning.spikes,
             limits=self._limits,
             stuck=self._stuck.result(interval) if self._stuck else None,
             valid=fixes.usable if fixes else times.valid,
