@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from analysis.replay.passes import resampled_chunks
 from analysis.replay.reading_options import DEFAULT_OPTIONS, ReadingOptions
@@ -18,6 +19,7 @@ from shiplog.types import FloatArray, Log, Signals
 
 from .estimate_plan import EstimatePlan, plan_estimate
 from .estimator import Estimator
+from .feedback import CostMeter, CostSummary
 from .linear_loop import combine
 from .system import LinearSystem
 from .system_file import load_system
@@ -42,6 +44,8 @@ class EstimateChunk:
         (k, m): measured minus predicted, and the expected standard deviation.
     inputs
         (k, inputs): the inputs, held where they were not measured.
+    commanded
+        (k, inputs): the inputs that the regulator commands; (k, 0) without one.
     """
 
     first: int
@@ -52,6 +56,7 @@ class EstimateChunk:
     innovations: FloatArray
     innovation_stds: FloatArray
     inputs: FloatArray
+    commanded: FloatArray
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,8 @@ class EstimateFindings:
         Test of the innovations of each output.
     summaries
         Each reported quantity over the log.
+    costs
+        Costs of the recorded and the commanded inputs; None without a regulator.
     warnings
         Problems of the data, each in a sentence.
     """
@@ -98,6 +105,7 @@ class EstimateFindings:
     plan: EstimatePlan
     residuals: tuple[ResidualSummary, ...]
     summaries: tuple[QuantitySummary, ...]
+    costs: CostSummary | None
     warnings: tuple[str, ...]
 
 
@@ -164,7 +172,8 @@ def estimate(
     system = system if isinstance(system, LinearSystem) else load_system(system)
     plan = plan_estimate(log, system, options, on_progress, smooth=smooth)
     run = EstimateRun(log, plan, on_progress=on_progress)
-    chunks = list(run.chunks())
+    with threadpool_limits(limits=1, user_api="blas"):  # on small matrices threads only wait
+        chunks = list(run.chunks())
     whole = {
         name: np.concatenate([getattr(chunk, name) for chunk in chunks])
         for name in EstimateChunk.__dataclass_fields__
@@ -213,21 +222,24 @@ class EstimateRun:
         estimator = Estimator(plan)
         inputs, schedule = self._held()
         tests = _Tests(plan)
+        meter = CostMeter(plan.feedback) if plan.feedback else None
         for signals in self._resampled("estimate"):
             measured = self._measured(signals)
             u, at = inputs.step(signals), schedule.step(signals)
             run = estimator.step(measured, u, at)
             values, stds = combine(self._rows, run.states, run.covariances)
+            plant = run.states[:, : plan.model.size]
+            commanded = meter.add(plant, u) if meter else np.zeros((len(u), 0))
             chunk = EstimateChunk(
                 signals.first, values, stds, measured, run.predicted, run.innovations,
-                np.sqrt(run.variances), u,
+                np.sqrt(run.variances), u, commanded,
             )  # fmt: skip
             _require_finite(plan, chunk, run.first)
             tests.add(chunk)
             yield chunk
         held = (*inputs.warnings(), *schedule.warnings())
         warnings = (*self._log.warnings, *held, *estimator.warnings())
-        self._findings = tests.findings(warnings)
+        self._findings = tests.findings(meter.result() if meter else None, warnings)
 
     def _held(self) -> tuple[HeldSignals, HeldSignals]:
         clock = self.plan.clock
@@ -269,7 +281,7 @@ class _Tests:
             moments.add(chunk.values[:, k])
         self._end = np.array([chunk.values[-1], chunk.stds[-1]])
 
-    def findings(self, warnings: tuple[str, ...]) -> EstimateFindings:
+    def findings(self, costs: CostSummary | None, warnings: tuple[str, ...]) -> EstimateFindings:
         """Return the findings of all chunks."""
         summaries = (
             QuantitySummary(
@@ -279,7 +291,7 @@ class _Tests:
             for q, m, end, std in zip(self._plan.quantities, self._moments, *self._end, strict=True)
         )  # fmt: skip
         residuals = tuple(test.result() for test in self._tests)
-        return EstimateFindings(self._plan, residuals, tuple(summaries), warnings)
+        return EstimateFindings(self._plan, residuals, tuple(summaries), costs, warnings)
 
 
 def _require_finite(plan: EstimatePlan, chunk: EstimateChunk, first: int) -> None:

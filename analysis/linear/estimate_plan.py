@@ -13,6 +13,7 @@ from shiplog.screening import ScreenedLog, Screening, screen_log
 from shiplog.types import FloatArray, Log
 
 from .estimator_model import EstimatorModel
+from .feedback import FeedbackDesign, design_feedback
 from .initial_estimate import StartSignals
 from .joined_system import (
     OutputSampling,
@@ -54,6 +55,8 @@ class EstimatePlan:
         First values and rms values of the outputs.
     model, design
         The joined system and the gain; of a varying plant those of the start.
+    feedback
+        The regulator; None where the system has none.
     quantities
         What is reported of the estimate.
     states
@@ -76,6 +79,7 @@ class EstimatePlan:
     start: StartSignals
     model: EstimatorModel
     design: EstimatorDesign
+    feedback: FeedbackDesign | None
     quantities: tuple[Quantity, ...]
     states: tuple[str, ...]
     smooth: bool
@@ -130,6 +134,7 @@ def plan_estimate(
     model = estimator_model(system, OutputSampling(stds**2, intervals, clock.dt_secs))
     require_distinguishable(system, model)
     _require_method(system, smooth=smooth)
+    design = system.method.design(model)
     return EstimatePlan(
         name=log.name,
         system=system,
@@ -145,7 +150,8 @@ def plan_estimate(
             np.sqrt([each.moments.mean_square for each in collected]),
         ),
         model=model,
-        design=system.method.design(model),
+        design=design,
+        feedback=design_feedback(system, model, design),
         quantities=quantities(system, model),
         states=state_names(system),
         smooth=smooth,

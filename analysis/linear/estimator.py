@@ -97,7 +97,9 @@ class Estimator:
 
     def _start(self, u: FloatArray, at: FloatArray) -> None:
         plan = self._plan
-        self._x, self._P = initial_estimate(plan.system, plan.model, plan.start, u)
+        self._x, self._P = initial_estimate(
+            plan.system, plan.model, plan.start, u, plan.design.poles
+        )
         self._before = u.copy()
         self._stages = [self._x.copy() for _ in range(plan.design.stages - 1)]
         if self._tick:

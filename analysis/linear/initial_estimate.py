@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
+from analysis.design.observability import ComplexArray
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
@@ -26,13 +27,18 @@ class StartSignals:
 
 
 def initial_estimate(
-    system: LinearSystem, model: EstimatorModel, signals: StartSignals, u: FloatArray
+    system: LinearSystem,
+    model: EstimatorModel,
+    signals: StartSignals,
+    u: FloatArray,
+    poles: ComplexArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the state before the first sample, (N,), and its covariance, (N, N).
 
     Shaping filters start with their stationary covariance. The standard deviation of another state
-    is that with which a few samples, each uncertain by the rms value of its output, determine it:
-    large against all that the state can be. The state is the smallest one, in these standard
+    is that with which outputs, uncertain by their rms values, determine it in a short time: a
+    few samples, or the time constant of the estimator's fastest pole. It is large against all that
+    the state can be. The state is the smallest one, in these standard
     deviations, that gives the first measured values. What the system states precedes both.
 
     Parameters
@@ -43,6 +49,8 @@ def initial_estimate(
         First values and rms values of the outputs.
     u
         (inputs,): the inputs at the first instant.
+    poles
+        1/s: of the estimator, where it has constant ones.
 
     Raises
     ------
@@ -51,7 +59,7 @@ def initial_estimate(
     """
     N, names = len(model.A), state_names(system)
     stated = {_first_state(name, names): std for name, std in system.initial_std.items()}
-    P = np.diag(_shown_variances(model, signals, names, frozenset(stated)))
+    P = np.diag(_shown_variances(model, signals, names, frozenset(stated), poles))
     shaped = np.ix_(model.shaped, model.shaped)
     P[shaped] = solve_continuous_lyapunov(model.A[shaped], -model.W[shaped])
     x = np.zeros(N)
@@ -67,12 +75,18 @@ def initial_estimate(
 
 
 def _shown_variances(
-    model: EstimatorModel, signals: StartSignals, names: tuple[str, ...], stated: frozenset[int]
+    model: EstimatorModel,
+    signals: StartSignals,
+    names: tuple[str, ...],
+    stated: frozenset[int],
+    poles: ComplexArray | None,
 ) -> FloatArray:
-    """Return the variances (N,) with which a few samples of the outputs determine the states."""
+    """Return the variances (N,) with which the outputs determine the states in a short time."""
     N = len(model.A)
     sizes = np.maximum(np.nan_to_num(signals.rms), np.sqrt(model.r))
     length = SAMPLES_PER_STATE * N * float(model.intervals.max())
+    if poles is not None and np.abs(poles).max() > 0:
+        length = max(length, 1 / float(np.abs(poles).max()))
     F, rows = expm(model.A * length / POINTS), model.C / sizes[:, None]
     information = np.zeros((N, N))
     for _ in range(POINTS):

@@ -20,7 +20,7 @@ def estimate_json(findings: EstimateFindings) -> JsonObject:
     -------
     dict
         ``log``, ``system``, ``estimator`` (poles as pairs of real and imaginary part, gains as
-        matrices), ``outputs``, ``estimates`` (by name) and ``warnings``.
+        matrices), ``outputs``, ``regulator``, ``estimates`` (by name) and ``warnings``.
     """
     plan = findings.plan
     result = {
@@ -41,10 +41,31 @@ def estimate_json(findings: EstimateFindings) -> JsonObject:
                 findings.residuals, plan.stds, plan.measured, strict=True
             )
         },
+        "regulator": _regulator(findings),
         "estimates": {each.name: asdict(each) for each in findings.summaries},
         "warnings": list(findings.warnings),
     }
     return without_nan(result)  # type: ignore[no-any-return]
+
+
+def _regulator(findings: EstimateFindings) -> dict[str, Any] | None:
+    feedback, costs = findings.plan.feedback, findings.costs
+    if feedback is None or costs is None:
+        return None
+    return {
+        "gain": feedback.regulator.gain.tolist(),
+        "poles": poles_as_pairs(feedback.regulator.poles),
+        "costs": {
+            name: asdict(cost) | {"total": cost.total}
+            for name, cost in (
+                ("recorded", costs.recorded),
+                ("feedback", costs.feedback),
+                ("predicted", costs.predicted),
+            )
+        },
+        "recorded_rms": list(costs.recorded_rms),
+        "feedback_rms": list(costs.feedback_rms),
+    }
 
 
 def _estimator(findings: EstimateFindings) -> dict[str, Any]:

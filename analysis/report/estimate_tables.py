@@ -17,7 +17,11 @@ from .replay_tables import residual_remark, whiteness_cells
 
 INNOVATION_REMARK = (
     "Innovation: measured minus predicted. NIS: its square over the variance that the estimator "
-    "expects. ρ: the largest correlation of the innovations with those before, and its lag."
+    "expects. ρ: the largest correlation of the innovations with those before."
+)
+FEEDBACK_REMARK = (
+    "The feedback is computed beside the recorded motion and did not act on it; the predicted "
+    "cost is that of the loop it would close, from the stated noise alone."
 )
 ROUNDING = 1e-9  # relative: a smaller imaginary part is rounding
 
@@ -28,10 +32,12 @@ def estimate_tables(findings: EstimateFindings) -> tuple[TextTable, ...]:
     Returns
     -------
     tuple of TextTable
-        Poles and gain of the estimator, the residuals of the outputs, the estimated quantities.
+        Poles and gain of the estimator, regulator and costs, the residuals of the outputs, the
+        estimated quantities.
     """
     return (
         *_design_tables(findings),
+        *_feedback_tables(findings),
         _residual_table(findings),
         _quantity_table(findings),
     )
@@ -66,6 +72,36 @@ def _design_tables(findings: EstimateFindings) -> Iterator[TextTable]:
     yield TextTable(table.title, table.columns, table.rows, (remark,))
 
 
+def _feedback_tables(findings: EstimateFindings) -> Iterator[TextTable]:
+    feedback, costs, system = findings.plan.feedback, findings.costs, findings.plan.system
+    if feedback is None or costs is None:
+        return
+    poles = ", ".join(map(_complex, np.sort_complex(feedback.regulator.poles)))
+    inputs = [binding.name for binding in system.inputs]
+    gain = _gain_table("Regulator u = L x̂", inputs, system.plant.states, feedback.regulator.gain)
+    remark = f"Poles of A + B L: {poles} 1/s."
+    yield TextTable(gain.title, ("input", *gain.columns[1:]), gain.rows, (remark,))
+    rows = [
+        (name, *(f"{value:.4g}" for value in (cost.state, cost.input, cost.total)), *rms)
+        for name, cost, rms in (
+            ("recorded inputs", costs.recorded, _cells(costs.recorded_rms)),
+            ("feedback on the estimate", costs.feedback, _cells(costs.feedback_rms)),
+            ("closed loop, predicted", costs.predicted, [""] * len(inputs)),
+        )
+    ]
+    units = (f"rms of {s.binding.name}\n[{s.unit}]" for s in findings.plan.inputs)
+    columns = ("mean cost of", "states", "inputs", "both", *units)
+    remarks = (
+        "States: mean of x'P x of the estimate; inputs: of u'R u; in the units of the weights.",
+        FEEDBACK_REMARK,
+    )
+    yield TextTable("Costs", columns, tuple(rows), remarks)
+
+
+def _cells(values: Iterable[float]) -> list[str]:
+    return [f"{value:.4g}" for value in values]
+
+
 def _method_remarks(findings: EstimateFindings) -> Iterator[str]:
     plan = findings.plan
     smoothed = ", smoothed backwards from the end" if plan.smooth else ""
@@ -73,7 +109,7 @@ def _method_remarks(findings: EstimateFindings) -> Iterator[str]:
     if plan.design.correction is None:
         kind += " with the optimal gain of each instant"
     size, dt = len(plan.states), plan.clock.dt_secs
-    yield f"Method: {kind}{smoothed}; {size} states, a step of {dt:g} s."
+    yield f"Method: {kind}{smoothed}, of order {size}; a step of {dt:g} s."
     if plan.system.linearise is not None:
         along = ", ".join(signal.binding.channel for signal in plan.schedule) or "the estimate"
         yield f"The plant is linearised along {along}; poles and gain are those of the start."
@@ -94,16 +130,15 @@ def _residual_table(findings: EstimateFindings) -> TextTable:
         low, high = residuals.nis_band
         cells = (
             f"{residuals.name} [{residuals.unit}]",
-            f"{std:.3g}",
-            f"{residuals.rms:.3g}",
+            f"{std:.2g}",
+            f"{residuals.rms:.2g}",
             f"{residuals.mean_nis:.3f}" if residuals.judged else "not judged",
             f"{max(low, 0.0):.2f}–{high:.2f}" if residuals.judged else "",
-            *whiteness_cells(residuals),
+            *whiteness_cells(residuals)[:2],
         )
         rows.append(cells)
     columns = (
         "output", "noise\nstd", "rms", "mean\nNIS", "expected\n(99 %)", "white\np", "ρ",
-        "lag\n[s]",
     )  # fmt: skip
     origins = (
         f"{residuals.name} {'from the log' if measured else 'stated'}"
