@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from analysis.filters.smoother import Adjoint, SmoothingPass, smooth
 from analysis.replay.passes import resampled_chunks
 from analysis.replay.reading_options import DEFAULT_OPTIONS, ReadingOptions
 from analysis.replay.residuals import ResidualSummary, ResidualTest
@@ -18,7 +19,7 @@ from shiplog.screening import ScreenedLog
 from shiplog.types import FloatArray, Log, Signals
 
 from .estimate_plan import EstimatePlan, plan_estimate
-from .estimator import Estimator
+from .estimator import Estimator, smoother_outputs
 from .feedback import CostMeter, CostSummary
 from .linear_loop import combine
 from .system import LinearSystem
@@ -141,7 +142,7 @@ def estimate(
     system: LinearSystem | str | os.PathLike[str],
     options: ReadingOptions = DEFAULT_OPTIONS,
     *,
-    smooth: bool = False,
+    smoothed: bool = False,
     on_progress: ProgressCallback = no_progress,
 ) -> SystemEstimate:
     """Estimate the states of a linear system from a log.
@@ -154,7 +155,7 @@ def estimate(
         The system, or the path of a system file.
     options
         Of these the sources of channels, and the channels to derive.
-    smooth
+    smoothed
         Smooth the states backwards from the end; for the Kalman filter of time-varying gain.
     on_progress
         Called with each step and its share done.
@@ -170,7 +171,7 @@ def estimate(
     """
     log = open_log(log) if isinstance(log, str | os.PathLike) else log
     system = system if isinstance(system, LinearSystem) else load_system(system)
-    plan = plan_estimate(log, system, options, on_progress, smooth=smooth)
+    plan = plan_estimate(log, system, options, on_progress, smooth=smoothed)
     run = EstimateRun(log, plan, on_progress=on_progress)
     with threadpool_limits(limits=1, user_api="blas"):  # on small matrices threads only wait
         chunks = list(run.chunks())
@@ -219,6 +220,7 @@ class EstimateRun:
             The estimates diverge.
         """
         plan = self.plan
+        adjoints = self._adjoints() if plan.smooth else None
         estimator = Estimator(plan)
         inputs, schedule = self._held()
         tests = _Tests(plan)
@@ -227,6 +229,10 @@ class EstimateRun:
             measured = self._measured(signals)
             u, at = inputs.step(signals), schedule.step(signals)
             run = estimator.step(measured, u, at)
+            if adjoints is not None and run.trace is not None:
+                run.states[run.first :], run.covariances[run.first :] = smooth(
+                    run.trace, smoother_outputs(plan.model), next(adjoints)
+                )
             values, stds = combine(self._rows, run.states, run.covariances)
             plant = run.states[:, : plan.model.size]
             commanded = meter.add(plant, u) if meter else np.zeros((len(u), 0))
@@ -240,6 +246,18 @@ class EstimateRun:
         held = (*inputs.warnings(), *schedule.warnings())
         warnings = (*self._log.warnings, *held, *estimator.warnings())
         self._findings = tests.findings(meter.result() if meter else None, warnings)
+
+    def _adjoints(self) -> Iterator[Adjoint]:
+        """Return for each chunk, in order, what the measurements after it add: one more pass."""
+        estimator = Estimator(self.plan)
+        inputs, schedule = self._held()
+        backward = SmoothingPass(smoother_outputs(self.plan.model))
+        for signals in self._resampled("smooth"):
+            u, at = inputs.step(signals), schedule.step(signals)
+            trace = estimator.step(self._measured(signals), u, at).trace
+            assert trace is not None  # noqa: S101 - the plan asks for it
+            backward.add(trace)
+        return iter(backward.result())
 
     def _held(self) -> tuple[HeldSignals, HeldSignals]:
         clock = self.plan.clock

@@ -28,6 +28,7 @@ from .system import LinearSystem
 from .system_signals import BoundSignal, OutputStats, bind_signals, is_interpolated
 
 MIN_MEASUREMENTS = 4  # the noise is estimated from third differences
+SMOOTHED_OUTPUTS = 2  # at most, of the fixed-interval smoother
 MIN_STRIDE = 1.5  # steps between samples from which an interpolated output is thinned
 
 
@@ -236,4 +237,9 @@ def _require_method(system: LinearSystem, *, smooth: bool) -> None:
         raise UsageError(
             f"the method {method.name!r} cannot be smoothed: the smoother assumes the optimal gain;"
             " use kalman with a time-varying gain"
+        )
+    if smooth and len(system.outputs) > SMOOTHED_OUTPUTS:
+        raise UsageError(
+            f"the system has {len(system.outputs)} outputs, and the smoother takes at most"
+            f" {SMOOTHED_OUTPUTS}; estimate without smoothing, or omit outputs"
         )

@@ -4,10 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.filters.base import Trace
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .estimate_plan import EstimatePlan
+from .estimate_plan import SMOOTHED_OUTPUTS, EstimatePlan
+from .estimator_model import EstimatorModel
 from .initial_estimate import initial_estimate
 from .joined_system import OutputSampling, estimator_model
 from .linear_loop import StretchModel, StretchResult, run_stretch, stretch_model
@@ -28,6 +30,8 @@ class EstimatorRun:
         (k, N) and (k, N, N).
     predicted, innovations, variances
         (k, m): as in `StretchResult`.
+    trace
+        What the smoother needs of the instants from `first` on; None where it was not asked for.
     """
 
     first: int
@@ -36,6 +40,7 @@ class EstimatorRun:
     predicted: FloatArray
     innovations: FloatArray
     variances: FloatArray
+    trace: Trace | None = None
 
 
 class Estimator:
@@ -79,14 +84,35 @@ class Estimator:
             if known.any():
                 self._start(u[first], at[first])
         results, k = [_no_estimate(first, self._model)], first
+        transitions: list[FloatArray] = []
         while k < len(y):
             end = min(k + self._length(), len(y))
+            transitions += [self._model.F] * (end - k)
             results.append(self._run(y[k:end], u[k:end]))
             if self._tick and self._count % self._tick == 0:
                 self._linearise(at[end - 1])
             k = end
-        arrays = [np.concatenate([getattr(r, name) for r in results]) for name in _KEPT]
-        return EstimatorRun(first, *arrays)
+        arrays = {name: np.concatenate([getattr(r, name) for r in results]) for name in _KEPT}
+        return EstimatorRun(first, **arrays, trace=self._trace(results[1:], transitions))
+
+    def _trace(self, results: list[StretchResult], transitions: list[FloatArray]) -> Trace | None:
+        """Return what the smoother needs; `transitions` are those into each instant."""
+        if not self._plan.smooth:
+            return None
+        following = [*transitions[1:], self._model.F][: len(transitions)]
+        results = results or [_no_estimate(0, self._model)]
+        names = ("states", "covariances", "gains", "sequential", "sequential_variances")
+        arrays = [np.concatenate([getattr(r, name) for r in results]) for name in names]
+        states, covariances, gains, innovations, variances = arrays
+        F = np.reshape(following, (len(following), *covariances.shape[1:]))
+        return Trace(
+            states,
+            covariances,
+            np.ascontiguousarray(F),
+            _padded(gains, 0.0),
+            _padded(innovations, 0.0),
+            _padded(variances, 1.0),
+        )
 
     def warnings(self) -> tuple[str, ...]:
         """Return a warning where the estimate began late."""
@@ -145,6 +171,19 @@ class Estimator:
             model, x, np.zeros((N, N)), before, measured, np.ascontiguousarray(u), not self._started
         )
         return result.states
+
+
+def smoother_outputs(model: EstimatorModel) -> FloatArray:
+    """Return the output matrix C (2, N) for the smoother; a single output has a zero row beside."""
+    return _padded(model.C[None], 0.0)[0]
+
+
+def _padded(values: FloatArray, fill: float) -> FloatArray:
+    """Fill up the outputs, the second axis, to the two that the smoother has."""
+    missing = max(0, SMOOTHED_OUTPUTS - values.shape[1])
+    width = [(0, 0), (0, missing), *[(0, 0)] * (values.ndim - 2)]
+    padded: FloatArray = np.pad(values, width, constant_values=fill)
+    return padded
 
 
 _KEPT = ("states", "covariances", "predicted", "innovations", "variances")

@@ -59,14 +59,16 @@ class Method(Protocol):
 
     Attributes
     ----------
-    name
-        Its name in a system file.
     per_tick
         Whether the gain is designed anew at each tick of a plant that varies.
     """
 
-    name: ClassVar[str]
     per_tick: ClassVar[bool]
+
+    @property
+    def name(self) -> str:
+        """Its name in a system file."""
+        ...
 
     def design(self, model: EstimatorModel) -> EstimatorDesign:
         """Design the gain; raise `UsageError` where there is none, naming the cause."""
@@ -77,9 +79,13 @@ class Method(Protocol):
 class KalmanMethod:
     """The Kalman filter: the optimal gain of each instant, or that of the steady state."""
 
-    name: ClassVar[str] = "kalman"
     per_tick: ClassVar[bool] = True
     steady_state: bool = False
+
+    @property
+    def name(self) -> str:
+        """Its name in a system file."""
+        return "kalman"
 
     def design(self, model: EstimatorModel) -> EstimatorDesign:
         """Design the filter; its steady-state gain is computed for information in any case."""
@@ -110,12 +116,16 @@ class QualityMethod:
         Number of designs one after the other, each for the loop closed by those before.
     """
 
-    name: ClassVar[str] = "quality"
     per_tick: ClassVar[bool] = False
     shift: Shift
     G: FloatArray
     border: float | None = None
     cycles: int = 1
+
+    @property
+    def name(self) -> str:
+        """Its name in a system file."""
+        return "quality" if self.cycles == 1 else "cycles"
 
     def design(self, model: EstimatorModel) -> EstimatorDesign:
         """Design the filter, by duality where there are several cycles."""
@@ -150,11 +160,15 @@ class CascadeMethod:
         Factor on the measurement noise for which the first filter is designed.
     """
 
-    name: ClassVar[str] = "cascade"
     per_tick: ClassVar[bool] = False
     stages: int
     correlation_secs: float
     noise_factor: float = 1.0
+
+    @property
+    def name(self) -> str:
+        """Its name in a system file."""
+        return "cascade"
 
     def design(self, model: EstimatorModel) -> EstimatorDesign:
         """Design all stages; the remark states which one is the best."""
@@ -187,10 +201,14 @@ class PlacedMethod:
         rad/s: one, or one for each channel; None where the poles are given.
     """
 
-    name: ClassVar[str] = "placed"
     per_tick: ClassVar[bool] = False
     spectrum: ArrayLike
     frequency: float | Sequence[float] | None = None
+
+    @property
+    def name(self) -> str:
+        """Its name in a system file."""
+        return "luenberger" if isinstance(self.spectrum, str) else "multi-level"
 
     def design(self, model: EstimatorModel) -> EstimatorDesign:
         """Place the poles of the continuous observer, and exp(s dt) of the sampled one."""
@@ -223,10 +241,14 @@ class TickMethod:
         whenever N changes.
     """
 
-    name: ClassVar[str] = "per-tick"
     per_tick: ClassVar[bool] = True
     poles: ComplexArray
     reduced: bool = False
+
+    @property
+    def name(self) -> str:
+        """Its name in a system file."""
+        return "reduced-order" if self.reduced else "per-tick"
 
     def design(self, model: EstimatorModel) -> EstimatorDesign:
         """Place the poles for the plant of this tick."""

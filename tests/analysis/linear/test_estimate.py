@@ -152,3 +152,23 @@ def test_a_disturbance_that_no_output_can_separate_is_refused_with_its_remedy() 
         UsageError, match="'moment' and 'gyro bias' cannot be distinguished; measure"
     ):
         estimate(trial(u, measured), parse_system(text, "yaw.toml"))
+
+
+def test_smoothed_states_are_the_conditional_mean_of_the_whole_record() -> None:
+    u, _, measured = record()
+    log, system = trial(u, measured), parse_system(SYSTEM, "roll.toml")
+    F, Q = held(A, np.diag([1e-3, 0.0]), DT)
+    run = LinearRun(response(A, B, u, X0), F, Q, P0, np.eye(2), np.array([0.02, 0.01]) ** 2)
+    states, covariances = run.given(measured)
+    for source in (log, InChunks(log, [1.05, 4.4])):
+        found = estimate(source, system, smoothed=True)
+        assert found.chunk.values == pytest.approx(states, rel=1e-8, abs=1e-9)
+        stds = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+        assert found.chunk.stds == pytest.approx(stds, rel=1e-7)
+
+
+def test_smoothing_a_constant_gain_is_refused() -> None:
+    u, _, measured = record()
+    text = SYSTEM + '[method]\nname = "luenberger"\nfrequency = 1.0\n'
+    with pytest.raises(UsageError, match="'luenberger' cannot be smoothed"):
+        estimate(trial(u, measured), parse_system(text, "roll.toml"), smoothed=True)
