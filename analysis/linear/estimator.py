@@ -160,7 +160,11 @@ class Estimator:
             states = self._run_stage(stage, before.copy(), states, u)
         self._started = True
         self._count += len(y)
-        return result._replace(states=states)
+        covariance = self._design.stage_covariance
+        if covariance is None:
+            return result
+        covariances = np.broadcast_to(covariance, result.covariances.shape)
+        return result._replace(states=states, covariances=covariances)
 
     def _run_stage(
         self, x: FloatArray, before: FloatArray, measured: FloatArray, u: FloatArray
@@ -175,15 +179,15 @@ class Estimator:
 
 def smoother_outputs(model: EstimatorModel) -> FloatArray:
     """Return the output matrix C (2, N) for the smoother; a single output has a zero row beside."""
-    return _padded(model.C[None], 0.0)[0]
+    C: FloatArray = _padded(model.C[None], 0.0)[0]
+    return C
 
 
 def _padded(values: FloatArray, fill: float) -> FloatArray:
     """Fill up the outputs, the second axis, to the two that the smoother has."""
     missing = max(0, SMOOTHED_OUTPUTS - values.shape[1])
     width = [(0, 0), (0, missing), *[(0, 0)] * (values.ndim - 2)]
-    padded: FloatArray = np.pad(values, width, constant_values=fill)
-    return padded
+    return np.asarray(np.pad(values, width, constant_values=fill))
 
 
 _KEPT = ("states", "covariances", "predicted", "innovations", "variances")

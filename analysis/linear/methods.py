@@ -6,6 +6,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import solve_discrete_lyapunov
 
 from analysis.design.augmentation import Plant
 from analysis.design.cascade import cascade
@@ -42,6 +43,8 @@ class EstimatorDesign:
         Number of stages of a cascade; 1 otherwise.
     stage_correction
         (N, N): correction of every stage after the first by the estimate of the one before.
+    stage_covariance
+        (N, N): stationary covariance of the last stage's error; None without stages.
     remarks
         What the design found, each in a sentence.
     """
@@ -51,6 +54,7 @@ class EstimatorDesign:
     poles: ComplexArray | None = None
     stages: int = 1
     stage_correction: FloatArray | None = None
+    stage_covariance: FloatArray | None = None
     remarks: tuple[str, ...] = ()
 
 
@@ -175,16 +179,18 @@ class CascadeMethod:
         N, A, C = len(model.A), model.A, model.C
         tuned = replace(model, r=model.r * self.noise_factor)
         first = KalmanMethod(steady_state=True).design(tuned)
-        assert first.gain is not None  # noqa: S101 - of a steady-state design
+        assert first.gain is not None and first.correction is not None  # noqa: S101, PT018
         found = cascade(
             A, C, model.W, model.R, first.gain,
             stages=self.stages, correlation_secs=self.correlation_secs,
         )  # fmt: skip
+        K = matched_correction(A, np.eye(N), found.gain, model.dt)
         remarks = (found.summary, "more than one stage after the first improves no filter")
         return replace(
             first,
             stages=self.stages,
-            stage_correction=matched_correction(A, np.eye(N), found.gain, model.dt),
+            stage_correction=K,
+            stage_covariance=_stage_covariance(model, first.correction, K, self.stages),
             remarks=remarks,
         )
 
@@ -215,7 +221,10 @@ class PlacedMethod:
         N, m = len(model.A), len(model.C)
         names = tuple(map(str, range(N))), tuple(map(str, range(m)))
         observer = disturbance_observer(
-            Plant(model.A, model.B, model.C, *names), (), self.spectrum, frequency=self.frequency
+            Plant(model.A, np.zeros((N, 1)), model.C, *names),
+            (),
+            self.spectrum,
+            frequency=self.frequency,
         )
         M, first = np.zeros((N, m)), 0
         for states in map(np.array, observer.channels):
@@ -279,6 +288,27 @@ class TickMethod:
             F[np.ix_(others, others)], F[np.ix_(measured, others)], np.exp(self.poles * model.dt)
         )
         return EstimatorDesign(L, M, self.poles)
+
+
+def _stage_covariance(
+    model: EstimatorModel, M: FloatArray, K: FloatArray, stages: int
+) -> FloatArray:
+    """Compute the stationary covariance (N, N) of the error of the last stage of a cascade.
+
+    The errors of all stages form one linear system: the noise of the plant drives each, that of the
+    measurements the first, and each corrected error the next.
+    """
+    N, step = len(model.A), model.step
+    T, noise = np.zeros((stages * N, stages * N)), np.zeros((stages * N, len(model.C)))
+    T[:N, :N], noise[:N] = np.eye(N) - M @ model.C, -M
+    for k in range(N, stages * N, N):
+        own, before = slice(k, k + N), slice(k - N, k)
+        T[own], noise[own] = K @ T[before], K @ noise[before]
+        T[own, own] += np.eye(N) - K
+    Q = np.kron(np.ones((stages, stages)), step.Q)
+    driven = T @ Q @ T.T + noise @ np.diag(model.r) @ noise.T
+    P = solve_discrete_lyapunov(T @ np.kron(np.eye(stages), step.F), driven)
+    return np.asarray(P[-N:, -N:])
 
 
 def _sampled(F: FloatArray, C: FloatArray, poles: ComplexArray, dt: float) -> FloatArray:
