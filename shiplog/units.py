@@ -157,6 +157,15 @@ CATALOGUE: dict[str, ChannelKind] = {
             circular=True,
         ),
         ChannelKind(
+            "true_wind_angle",
+            "rad",
+            "true wind blows from, from ahead to starboard",
+            "deg",
+            -7.0,
+            7.0,
+            circular=True,
+        ),
+        ChannelKind(
             "magnetic_heading",
             "rad",
             "clockwise from magnetic north",

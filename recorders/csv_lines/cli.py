@@ -1,13 +1,18 @@
 """Lines of separated values as a format of streams: its options, and the times of a file."""
 
 import argparse
-from datetime import date
 from pathlib import Path
 
 from recorders.streams.format import OpenedFile, StreamFormat
 from recorders.streams.line_files import peek
 from recorders.streams.packets import Batches
-from recorders.streams.stamps import StampReader, add_stamp_option, find_stamp_form, read_stamps
+from recorders.streams.stamps import (
+    StampReader,
+    add_date_option,
+    add_stamp_option,
+    find_stamp_form,
+    read_stamps,
+)
 from shiplog.errors import LogError, UsageError
 
 from .csv_decoder import CsvDecoder
@@ -25,12 +30,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         help="description of the lines (docs/stream_formats.md)",
     )
     add_stamp_option(parser)
-    parser.add_argument(
-        "--date",
-        type=date.fromisoformat,
-        metavar="YYYY-MM-DD",
-        help="day (UTC) of the first line of a file whose stamps have no date",
-    )
+    add_date_option(parser)
 
 
 def _make_decoder(options: argparse.Namespace) -> CsvDecoder:

@@ -4,13 +4,14 @@ from .sentence_values import Fields, Values, is_valid, measured, number_at, sign
 from .steering_sentences import DEG, KMH, KNOT
 
 _SPEED_UNITS = {"N": KNOT, "K": KMH, "M": 1.0, "S": 0.44704}  # S: statute miles/h
+_VWR_SPEEDS = ((2, KNOT), (4, 1.0), (6, KMH))  # fields and units
 _FOOT, _FATHOM = 0.3048, 1.8288
 
 
 def wind_angle_and_speed(fields: Fields) -> Values:
-    """``MWV,x.x,R,x.x,N,A``: angle from the bow in deg, relative or true, speed, unit, status.
+    """``MWV,x.x,R,x.x,N,A``: angle from the bow in deg, speed, unit, status.
 
-    The direction of the true wind needs a heading, so that of a true wind only the speed is used.
+    With R it is the apparent wind, with T the true one; the angle is from the bow in both.
     """
     reference, valid = text_at(fields, 1), is_valid(fields, 4)
     angle, speed = number_at(fields, 0), number_at(fields, 2)
@@ -18,7 +19,10 @@ def wind_angle_and_speed(fields: Fields) -> Values:
     if reference == "R":
         return _apparent(angle, speed, factor, valid=valid)
     if reference == "T":
-        return measured("wind_speed", speed, factor, valid=valid, suffix="MWV")
+        return (
+            *measured("true_wind_angle", angle, DEG, valid=valid),
+            *measured("wind_speed", speed, factor, valid=valid, suffix="MWV"),
+        )
     if angle is None and speed is None:
         return ()
     raise ValueError(reference)
@@ -27,13 +31,17 @@ def wind_angle_and_speed(fields: Fields) -> Values:
 def relative_wind(fields: Fields) -> Values:
     """``VWR,x.x,L,x.x,N,x.x,M,x.x,K``: angle to the left or right of the bow in deg, speed."""
     angle = signed(number_at(fields, 0), text_at(fields, 1), "R", "L")
-    speed, factor = _speed(fields, ((2, KNOT), (4, 1.0), (6, KMH)))
+    speed, factor = _speed(fields, _VWR_SPEEDS)
     return _apparent(angle, speed, factor, valid=True, suffix="VWR")
 
 
 def true_relative_wind(fields: Fields) -> Values:
-    """``VWT,x.x,L,x.x,N,x.x,M,x.x,K``: as ``VWR``, of the true wind; only its speed is used."""
-    return measured("wind_speed", *_speed(fields, ((2, KNOT), (4, 1.0), (6, KMH))), suffix="VWT")
+    """``VWT,x.x,L,x.x,N,x.x,M,x.x,K``: as ``VWR``, of the true wind."""
+    angle = signed(number_at(fields, 0), text_at(fields, 1), "R", "L")
+    return (
+        *measured("true_wind_angle", angle, DEG, suffix="VWT"),
+        *measured("wind_speed", *_speed(fields, _VWR_SPEEDS), suffix="VWT"),
+    )
 
 
 def wind_direction(fields: Fields) -> Values:

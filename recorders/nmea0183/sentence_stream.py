@@ -12,6 +12,7 @@ from recorders.streams.packets import Batches, Packet
 from recorders.streams.stamps import (
     StampForm,
     StampReader,
+    add_date_option,
     add_stamp_option,
     find_stamp_form,
     read_stamps,
@@ -38,12 +39,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options of NMEA 0183."""
     add_time_option(parser)
     add_stamp_option(parser)
-    parser.add_argument(
-        "--date",
-        type=_date,
-        metavar="YYYY-MM-DD",
-        help="day (UTC) of the first line of a file whose times have no date",
-    )
+    add_date_option(parser)
     parser.add_argument(
         "--interval",
         type=_interval,
@@ -153,16 +149,6 @@ def _is_sentence(line: bytes) -> bool:
     except FramingError:
         return False
     return True
-
-
-def _date(text: str) -> date:
-    try:
-        day = date.fromisoformat(text)
-    except ValueError:
-        day = date.min
-    if not 1970 <= day.year < 2262:
-        raise UsageError(f"--date takes YYYY-MM-DD, such as 2026-05-01, not {text!r}")
-    return day
 
 
 def _interval(text: str) -> float:

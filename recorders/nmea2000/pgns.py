@@ -99,14 +99,25 @@ def _course(f: Fields) -> list[Reading]:
 
 
 def _wind(f: Fields) -> list[Reading]:
-    """Wind over ground from north, or apparent; a true wind relative to the bow has no channel."""
-    channels = {
-        0: ("wind_speed", "wind_direction"),
-        2: ("apparent_wind_speed", "apparent_wind_angle"),
+    """Wind from north, apparent, or true relative to the bow: over ground or through the water."""
+    known = {
+        0: ("wind_speed", "wind_direction", ""),
+        2: ("apparent_wind_speed", "apparent_wind_angle", ""),
+        3: ("wind_speed", "true_wind_angle", "ground"),
+        4: ("wind_speed", "true_wind_angle", "water"),
     }.get(_code(f["reference"]))
-    if channels is None:
+    if known is None:
         return []
-    return [Reading(channels[0], f["windSpeed"]), Reading(channels[1], f["windAngle"])]
+    speed, angle, part = known
+    return [Reading(speed, f["windSpeed"], part), Reading(angle, f["windAngle"], part)]
+
+
+def _depth(f: Fields) -> list[Reading]:
+    """Depth below the transducer; with an offset, below the surface (positive) or the keel."""
+    depth, offset = f["depth"], f["offset"]
+    if depth is None or not offset:
+        return [Reading("depth", depth)]
+    return [Reading("depth", depth + offset, "surface" if offset > 0 else "keel")]
 
 
 def _system_time(f: Fields) -> list[Reading]:
@@ -191,7 +202,7 @@ READINGS: Mapping[int, Callable[[Fields], list[Reading]]] = {
     127258: lambda f: [Reading("magnetic_variation", f["variation"])],
     127488: _engine,
     128259: _speed,
-    128267: lambda f: [Reading("depth", f["depth"])],
+    128267: _depth,
     129025: lambda f: [Reading("position", _fix(f))],
     129026: _course,
     129029: _gnss,

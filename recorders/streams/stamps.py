@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta
 
-from shiplog.errors import LogError
+from shiplog.errors import LogError, UsageError
 from shiplog.tables.printed_times import DAY_NS, HALF_DAY_NS
 
 from .counts import StreamCounts
@@ -54,6 +54,28 @@ def add_stamp_option(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="time stamps before the lines of a file (default: auto, detected)",
     )
+
+
+def add_date_option(parser: argparse.ArgumentParser) -> None:
+    """Add the option ``--date``, which states the day of times without a date."""
+    parser.add_argument(
+        "--date",
+        type=_date,
+        metavar="YYYY-MM-DD",
+        help="day (UTC) of the first line of a file whose times have no date",
+    )
+
+
+def _date(text: str) -> date:
+    try:
+        day = date.fromisoformat(text)
+    except ValueError:
+        day = date.min
+    if not 1970 <= day.year < 2262:  # times are 64-bit numbers of ns
+        raise UsageError(
+            f"--date takes YYYY-MM-DD, such as 2026-05-01, from 1970 to 2261, not {text!r}"
+        )
+    return day
 
 
 def _form(name: str, example: str, begin: bytes, *, end: bytes = b"", unit: int = 0) -> StampForm:

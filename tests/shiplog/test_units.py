@@ -79,6 +79,7 @@ def test_rudder_and_rpm_are_commanded_and_compass_angles_are_circular() -> None:
         "heading_order",
         "wind_direction",
         "apparent_wind_angle",
+        "true_wind_angle",
         "course_over_ground",
     }
 

@@ -19,14 +19,20 @@ KN = 1852 / 3600
             "02MWV,327.6,R,36,K",
             {"/apparent_wind_angle/02": radians(327.6), "/apparent_wind_speed/02": 10.0},
         ),
-        ("IIMWV,313,T,08.16,M,A", {"/wind_speed/II.MWV": 8.16}),
-        ("IIMWV,313,T,100,S,A", {"/wind_speed/II.MWV": 44.704}),  # statute miles per hour
+        (
+            "IIMWV,313,T,08.16,M,A",
+            {"/true_wind_angle/II": radians(313), "/wind_speed/II.MWV": 8.16},
+        ),
+        ("IIMWV,,T,100,S,A", {"/wind_speed/II.MWV": 44.704}),  # statute miles per hour
         ("IIMWV,,,,,V", {}),
         (
             "IIVWR,039,L,08.10,N,04.17,M,,",
             {"/apparent_wind_angle/II.VWR": radians(-39), "/apparent_wind_speed/II.VWR": 8.1 * KN},
         ),
-        ("IIVWT,039,L,08.10,N,04.17,M,,", {"/wind_speed/II.VWT": 8.1 * KN}),
+        (
+            "IIVWT,039,L,08.10,N,04.17,M,,",
+            {"/true_wind_angle/II.VWT": radians(-39), "/wind_speed/II.VWT": 8.1 * KN},
+        ),
         (
             "WIMWD,302.0,T,290.0,M,,N,7.5,M",
             {"/wind_direction/WI": radians(302), "/wind_speed/WI": 7.5},

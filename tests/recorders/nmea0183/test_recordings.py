@@ -95,6 +95,8 @@ def test_plaka_yields_speeds_wind_depth_and_positions_and_asks_for_its_date(tmp_
         "/course_over_ground/II": 7250,
         "/speed_over_ground/II": 7250,
         "/apparent_wind_angle/II": 3617,
+        "/true_wind_angle/II": 3618,
+        "/true_wind_angle/II.VWT": 7235,
         "/apparent_wind_speed/II": 3617,
         "/wind_speed/II.MWV": 3618,
         "/wind_speed/II.VWT": 7235,

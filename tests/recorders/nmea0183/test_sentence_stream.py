@@ -113,7 +113,7 @@ def test_an_empty_file_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--date", "01.05.2026"), r"--date takes YYYY-MM-DD, such as 2026-05-01, not '01\.05"),
+        (("--date", "01.05.2026"), r"--date takes YYYY-MM-DD, such as 2026-05-01, from 1970"),
         (("--interval", "0"), "--interval takes a time in s, such as 0.1, not '0'"),
         (("--interval", "nan"), "--interval takes a time in s"),
         (("--interval", "x"), "--interval takes a time in s"),

@@ -122,18 +122,30 @@ def test_a_course_relative_to_magnetic_north_is_no_course() -> None:
 
 
 @pytest.mark.parametrize(
-    ("reference", "channels"),
+    ("reference", "channels", "part"),
     [
-        (0, {"wind_speed", "wind_direction"}),
-        (1, set()),  # from magnetic north
-        (2, {"apparent_wind_speed", "apparent_wind_angle"}),
-        (3, set()),  # true, relative to the bow
-        (4, set()),  # through the water
+        (0, ("wind_speed", "wind_direction"), ""),
+        (1, (), ""),  # from magnetic north
+        (2, ("apparent_wind_speed", "apparent_wind_angle"), ""),
+        (3, ("wind_speed", "true_wind_angle"), "ground"),
+        (4, ("wind_speed", "true_wind_angle"), "water"),
     ],
 )
-def test_wind_is_true_or_apparent_by_its_reference(reference: int, channels: set[str]) -> None:
+def test_wind_is_true_or_apparent_by_its_reference(
+    reference: int, channels: tuple[str, ...], part: str
+) -> None:
     read = _read(130306, "BHHB2B", NA, 750, 7854, 0xF8 | reference, NA, NA)
-    assert {channel for channel, _ in read} == channels
+    values = zip(channels, (7.5, 0.7854), strict=False)
+    assert read == {(channel, part): pytest.approx(value) for channel, value in values}
+
+
+@pytest.mark.parametrize(
+    ("offset_mm", "part", "depth"),
+    [(0, "", 12.34), (1500, "surface", 13.84), (-2000, "keel", 10.34)],
+)
+def test_the_offset_of_a_depth_is_added(offset_mm: int, part: str, depth: float) -> None:
+    read = _read(128267, "BIhB", NA, 1234, offset_mm, NA)
+    assert read == {("depth", part): pytest.approx(depth)}
 
 
 def test_time_of_a_local_clock_is_no_gnss_time() -> None:

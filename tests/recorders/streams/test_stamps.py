@@ -1,13 +1,20 @@
 """Tests of recorders.streams.stamps; the expected times are those of datetime or of `date -u`."""
 
+import argparse
 from datetime import UTC, date, datetime
 
 import pytest
 
 from recorders.streams.counts import StreamCounts
 from recorders.streams.packets import NO_TIME, Packet
-from recorders.streams.stamps import FORMS, StampReader, find_stamp_form, read_stamps
-from shiplog.errors import LogError
+from recorders.streams.stamps import (
+    FORMS,
+    StampReader,
+    add_date_option,
+    find_stamp_form,
+    read_stamps,
+)
+from shiplog.errors import LogError, UsageError
 
 PAYLOAD = b"$HEHDT,218.53,T*12"
 INSTANT_NS = 1_406_851_200_124_000_000  # 2014-08-01 00:00:00.124 UTC
@@ -138,3 +145,18 @@ def test_lines_without_a_valid_stamp_are_rejected_and_counted(line: bytes) -> No
     batches = read_stamps(iter([_packets(line, good)]), StampReader(FORMS["iso"]), counts)
     assert list(batches) == [[Packet(PAYLOAD, INSTANT_NS)]]
     assert counts.rejected == {"no valid time stamp": 1}
+
+
+@pytest.mark.parametrize("text", ["01.05.2026", "1969-12-31", "2262-01-01", "", "2026-02-30"])
+def test_a_day_that_no_log_can_hold_is_a_usage_error(text: str) -> None:
+    parser = argparse.ArgumentParser()
+    add_date_option(parser)
+    with pytest.raises(UsageError, match="--date takes YYYY-MM-DD"):
+        parser.parse_args([f"--date={text}"])
+
+
+@pytest.mark.parametrize("day", [date(1970, 1, 1), date(2261, 12, 31)])
+def test_the_first_and_the_last_day_that_a_log_can_hold_are_read(day: date) -> None:
+    parser = argparse.ArgumentParser()
+    add_date_option(parser)
+    assert parser.parse_args(["--date", str(day)]).date == day
