@@ -1,9 +1,9 @@
 """Pole placement for observers of several outputs, and Hautus's test of observability.
 
 Source: N. E. Zubov, E. A. Mikrin, A. S. Oleinik, V. N. Ryabchenko, "Algorithms for the synthesis
-of linear observers for nonlinear dynamic systems", eqs (2.2) to (2.12). Three misprints are
-corrected: (2.10) places A + L C instead of A - L C, (2.7) starts from A instead of its transpose,
-and the last Φ is printed as m × m.
+of linear observers for nonlinear dynamic systems", eqs (2.2) to (2.12). Three formulas are
+corrected: (2.10) places A + L C instead of A - L C, (2.7) starts from A instead of its transpose
+(in our copy, a scan), and the last Φ is printed as m × m.
 """
 
 from collections.abc import Iterator

@@ -188,8 +188,9 @@ def cycle_regulator(
     """Repeat the regulator design, each time for the loop that the previous designs closed.
 
     With G = 0 and c = 0, j cycles equal one design with j P: the increments of the gain fall as
-    1/√j, and their sum grows without bound. With G > 0 and one input they fall as R / (R + B'GB),
-    and j cycles equal one design with a smaller R.
+    1/√j, and their sum grows without bound. With B'GB > 0 they fall geometrically in the end, with
+    the largest eigenvalue ρ of (R + B'GB)⁻¹ R as their ratio; with one input, j cycles equal one
+    design with ρʲ B'GB / (1 - ρʲ) in place of R.
 
     Parameters
     ----------

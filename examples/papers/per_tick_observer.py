@@ -181,7 +181,7 @@ def misprints() -> Iterator[Row]:
         "(2.10) places the poles of this matrix",
     )
     untransposed = printed_gain(A, C.T, [Phi0, Phi1], 1)
-    remark = "misprint: A_0 must be the transpose, as in (2.2)"
+    remark = "A_0 must be the transpose, as in (2.2); our copy is a scan and may lack its sign"
     yield Row("(2.7), A_0 = A_L: poles of A − L C", wanted, poles(A - untransposed @ C), remark)
     A = np.array([[0, 1, 0], [0, 0, 0], [0, 1.0, 0]])
     m_by_m = printed_gain(A.T, C.T, [Phi0, np.diag([-0.3, -0.6])], 1)

@@ -235,7 +235,9 @@ def test_cycles_without_rate_weight_equal_one_design_with_j_times_p(seed: int, c
 
 @FEW
 @given(SEEDS, st.integers(1, 6))
-def test_cycles_with_rate_weight_equal_one_design_with_a_smaller_r(seed: int, cycles: int) -> None:
+def test_cycles_of_one_input_with_rate_weight_equal_one_design_with_a_smaller_r(
+    seed: int, cycles: int
+) -> None:
     A, B, P, R, G = random_regulator(seed)
     B, R = B[:, :1], R[:1, :1]
     weight = (B.T @ G @ B).item()
@@ -386,11 +388,35 @@ def test_gain_grows_without_bound_over_cycles_without_rate_weight() -> None:
     assert increments[-1] == pytest.approx([0.5, 0.5], abs=0.05)
 
 
-def test_gain_increments_fall_geometrically_with_rate_weight() -> None:
-    R, weight = 1.0, 0.25
-    done = cycle_regulator([[0.5]], [[1]], 1, R, 40, G=weight)
-    increments = np.diff([step.gain.item() for step in done])
-    assert (increments[1:] / increments[:-1])[-1] == pytest.approx(R / (R + weight), abs=1e-4)
+@pytest.mark.parametrize(
+    "rates", [np.diag([0.5, 2, 1.0]), np.diag([0, 0.3, 0.3]), np.diag([0, 0.5, 3])]
+)
+def test_gain_increments_of_several_inputs_fall_geometrically_with_rate_weight(
+    rates: FloatArray,
+) -> None:
+    """The oracle solves each cycle with scipy; ρ is the largest eigenvalue of (R + B'GB)⁻¹ R."""
+    A, B = np.array([[0, 1, 0], [0.2, -0.1, 0.5], [0, 0.3, -0.4]]), np.eye(3)[:, 1:]
+    R = np.array([[1, 0.2], [0.2, 0.7]])
+    ratio = np.linalg.eigvals(np.linalg.solve(R + B.T @ rates @ B, R)).real.max()
+    total, gains = np.zeros((2, 3)), []
+    for _ in range(40):
+        total = total + equation_of(A + B @ total, B, np.eye(3), R, rates, 0.0)[1]
+        gains.append(total)
+    done = cycle_regulator(A, B, np.eye(3), R, 40, G=rates)
+    assert_allclose([step.gain for step in done], gains, rtol=1e-7, atol=1e-9)
+    increments = np.linalg.norm(np.diff(gains, axis=0), axis=(1, 2))
+    last = int(np.searchsorted(-increments, -1e-6 * increments[0])) - 1  # above rounding
+    assert increments[last] < 1e-4 * increments[0]
+    assert increments[last] / increments[last - 1] == pytest.approx(ratio, rel=1e-3)
+
+
+def test_an_input_without_rate_weight_does_not_converge_beside_one_that_has() -> None:
+    """Two equal integrators with an input each; only the first has a weight on its rate."""
+    done = cycle_regulator(np.zeros((2, 2)), np.eye(2), np.eye(2), np.eye(2), 40, G=np.diag([1, 0]))
+    gains = -np.array([np.diag(step.gain) for step in done])
+    increments = np.diff(gains, axis=0)
+    assert increments[20, 0] / increments[19, 0] == pytest.approx(0.5, abs=1e-4)
+    assert gains[:, 1] == pytest.approx(np.sqrt(np.arange(1, 41)), rel=1e-9)
 
 
 def test_cascade_does_not_improve_a_first_stage_that_is_too_slow() -> None:
