@@ -229,7 +229,7 @@ class GnssClock:
             "reception: it is not the time of measurement"
         )
         if receiver.is_applied:
-            text += "; record it without --time gnss"
+            text += "; record or decode it without --time gnss"
         elif self._is_applied:
             text += ", which is that of reception"
         self._warn(text, received_ns)

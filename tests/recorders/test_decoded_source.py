@@ -15,6 +15,8 @@ from recorders.streams.reception_clock import ReceptionClock
 from recorders.streams.stream_options import parse_options
 from recorders.trial.open_source import StreamRequest, open_streams
 from shiplog import Channel, LogError, LogWriter, ShiplogError, TrialLog, read
+from shiplog.errors import UsageError
+from shiplog.mcap.stream import LogFile
 from shiplog.types import Event, RawPackets
 
 
@@ -96,3 +98,52 @@ def test_packets_of_a_format_that_is_not_installed_are_refused(tmp_path: Path) -
         writer.write(RawPackets("gyro", "runes", np.array([0]), (b"x",)))
     with pytest.raises(ShiplogError, match="no format 'runes'"):
         open_raw(tmp_path / "old.mcap")
+
+
+def test_a_log_longer_than_memory_is_decoded_in_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    times = np.arange(6000) * 10**7
+    with LogWriter(tmp_path / "old.mcap") as writer:
+        for first in range(0, 6000, 100):
+            part = times[first : first + 100]
+            packets = tuple(b"heading %d" % n for n in range(first, first + 100))
+            speed = Channel("speed", "log", "m/s", part, part, part * 1e-9)
+            stale = Channel("heading", "N", "rad", part, part, part * 0.0, (), {"stream": "gyro"})
+            writer.write(speed, stale, RawPackets("gyro", "numbers", part, packets))
+            writer.write(Event(int(part[50]), f"mark {first}"))
+    in_memory = _decoded(tmp_path / "old.mcap")
+    monkeypatch.setattr("shiplog.mcap.stream.MAX_SAMPLES_IN_MEMORY", 1000)
+    monkeypatch.setattr("shiplog.mcap.stream.FILE_CHUNK_SAMPLES", 500)
+    assert isinstance(open_raw(tmp_path / "old.mcap").log, LogFile)
+    in_file = _decoded(tmp_path / "old.mcap")
+    assert in_memory["speed"].values.tolist() == (times * 1e-9).tolist()
+    for channel in in_memory:
+        again = in_file[f"{channel.name}/{channel.source}"]
+        assert again.values.tobytes() == channel.values.tobytes()
+        assert again.received_ns.tolist() == channel.received_ns.tolist()
+    assert in_file.events == in_memory.events
+    assert len(in_file.events) == 60
+
+
+def test_a_log_is_decoded_again_with_other_options(tmp_path: Path) -> None:
+    old = _recorded(tmp_path, "gyro", "compass")
+    record(open_raw(old, {"compass.step": "2"}), tmp_path / "new.mcap")
+    log = read(tmp_path / "new.mcap")
+    assert "gyro.options" not in log.metadata
+    assert log.metadata["compass.options"] == "--start=0.01 --step=2.0"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("gyro.stride", "unrecognized arguments: --stride=2"),
+        ("log.step", "log.step is no STREAM.OPTION of the log's streams: gyro"),
+        ("gyro", "gyro is no STREAM.OPTION"),
+    ],
+)
+def test_a_change_of_no_stream_or_option_is_refused(
+    tmp_path: Path, change: str, message: str
+) -> None:
+    with pytest.raises(UsageError, match=message):
+        open_raw(_recorded(tmp_path, "gyro"), {change: "2"})

@@ -249,7 +249,7 @@ def test_times_that_go_wrong_later_are_reported_with_the_remedy() -> None:
     for n in range(30):
         run.hear("fix", n + 0.1, n if n < 20 else n - 1)
     assert run.measured["fix"][:20] == list(range(20))
-    assert "record it without --time gnss" in run.warnings[0]
+    assert "record or decode it without --time gnss" in run.warnings[0]
 
 
 @pytest.mark.parametrize("offset", [-3600.0, -0.5, 2.5])
