@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 
-from shiplog.units import UNITS
+from shiplog.units import CATALOGUE, UNITS
 
 # words of a header, in lower case without their unit, and the quantity; the first match counts
 _QUANTITIES = (
@@ -25,7 +25,7 @@ _QUANTITIES = (
     (r"depth|water_depth", "depth"),
     (r"n_?s|lat_?(ns|n_s|dir|hemi(sphere)?)", "north_south"),
     (r"e_?w|lon_?(ew|e_w|dir|hemi(sphere)?)", "east_west"),
-    *((name, name) for name in ("heel", "roll", "pitch", "thrust", "wave_height", "sway")),
+    *((name, name) for name in CATALOGUE if name != "position"),
 )
 _SIDES = {"port": "port", "ps": "port", "starboard": "starboard", "stbd": "starboard",
           "sb": "starboard", "stb": "starboard", "bb": "port"}  # fmt: skip

@@ -1,7 +1,9 @@
+import re
 from itertools import product
 from math import pi
 
 import pytest
+from places import PROJECT
 
 from shiplog import UsageError
 from shiplog.units import (
@@ -68,6 +70,14 @@ def test_every_channel_except_rpm_is_in_si_and_has_a_display_unit() -> None:
         assert conversion_factor(kind.unit, kind.display_unit) > 0
         assert kind.lowest < kind.highest
         assert kind.positive
+
+
+def test_every_channel_has_its_row_in_the_page_of_the_format() -> None:
+    page = (PROJECT / "docs" / "format.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `(\w+)` \| (\S+) \| .* \|$", page, flags=re.MULTILINE))
+    assert {name: rows.get(name) for name in CATALOGUE} == {
+        name: kind.unit for name, kind in CATALOGUE.items()
+    }
 
 
 def test_rudder_and_rpm_are_commanded_and_compass_angles_are_circular() -> None:

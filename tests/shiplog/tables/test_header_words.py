@@ -3,6 +3,7 @@
 import pytest
 
 from shiplog.tables.header_words import is_units_row, recognise, split_header
+from shiplog.units import CATALOGUE
 
 
 @pytest.mark.parametrize(
@@ -23,6 +24,14 @@ def test_a_header_gives_quantity_side_and_unit(header: str, role: str | None, un
     words, stated = split_header(header)
     assert stated == unit
     assert list(recognise({header: words}, ())) == ([role] if role else [])
+
+
+@pytest.mark.parametrize("name", [name for name in CATALOGUE if name != "position"])
+def test_the_name_of_a_channel_is_recognised_as_a_header(name: str) -> None:
+    unit = CATALOGUE[name].display_unit
+    words, stated = split_header(f"{name} [{unit}]")
+    assert stated == unit
+    assert recognise({"x": words}, ()) == {name: "x"}
 
 
 @pytest.mark.parametrize(
