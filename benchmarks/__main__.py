@@ -109,7 +109,7 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> BenchmarkReport:
     sizes = _sizes(arguments)
     report = BenchmarkReport(machine(), sizes.hours, sizes.rounds, [])
     if "distortions" in arguments.only:
-        report.distortions = measure_distortions(*((20, 2) if arguments.short else ()))
+        report.distortions = measure_distortions(*((5, 1) if arguments.short else ()))
     if set(arguments.only) == {"distortions"}:
         return report
     log = day_of_trial(sizes.hours)
