@@ -1,27 +1,15 @@
 """Compilation beside the plan of a first replay."""
 
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from places import SAMPLE_DATA
 
 from analysis.filters.factory import filter_kind, filter_names
+from analysis.replay import precompile
 from analysis.replay.precompile import compile_estimators, compiling_beside
 from shiplog.vessel.settings import FilterSettings
-
-AFTERWARDS = """
-from shiplog.compiled import CACHE_FOLDER, is_compiled
-from analysis.replay.precompile import compiling_beside
-with compiling_beside("extended", smooth=False) as process:
-    if process:
-        assert process.wait() == 0
-loops = {path.name.split(".")[0] for path in CACHE_FOLDER.rglob("*.nbi")}
-print(is_compiled("analysis"), "three_state" in loops, "loop" in loops, "pseudo_input" in loops)
-"""
-
 
 A_REPLAY_AFTERWARDS = f"""
 from analysis.disturbance.loop import observe_chunk
@@ -61,16 +49,24 @@ def test_a_replay_compiles_no_loop_again_and_each_process_its_own() -> None:
     assert done.stdout == "True\n", done.stderr
 
 
-def test_a_second_process_compiles_the_estimators_on_a_first_run_only(tmp_path: Path) -> None:
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    done = subprocess.run(
-        [sys.executable, "-c", AFTERWARDS],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.split() == ["True", "True", "True", "False"]
+@pytest.mark.parametrize(("kind", "code"), [("extended", 0), ("no filter", 1)])
+def test_on_a_first_run_a_second_process_compiles_the_loops_of_the_given_filter(
+    monkeypatch: pytest.MonkeyPatch, kind: str, code: int
+) -> None:
+    monkeypatch.setattr(precompile, "is_compiled", lambda _: False)
+    with compiling_beside(kind, smooth=False) as process:
+        assert process is not None
+        assert process.wait() == code
+
+
+def test_a_second_process_is_ended_with_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(precompile, "is_compiled", lambda _: False)
+    with compiling_beside("extended", smooth=False) as process:
+        assert process is not None
+    assert process.poll() is not None
+
+
+def test_a_later_run_starts_no_second_process() -> None:
     compile_estimators(FilterSettings())
     with compiling_beside(None, smooth=False) as process:
         assert process is None
