@@ -1,24 +1,16 @@
 """The pages of the docs that scripts print are up to date."""
 
-import os
 import re
-import subprocess
 import sys
+import warnings
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
 from places import KVLCC2, PROJECT
 
-PAPERS = sorted(
-    path for path in (PROJECT / "examples" / "papers").glob("*.py") if path.stem != "markdown_page"
-)
-FEWER_METHODS = """
-from pathlib import Path
-import methods
-methods.SEEDS = range(2)
-methods.KVLCC2 = Path({runs!r})
-methods.main()
-"""
+EXAMPLES = PROJECT / "examples"
+PAPERS = sorted(path for path in (EXAMPLES / "papers").glob("*.py") if path.stem != "markdown_page")
 MODEL_TESTS = "## The KVLCC2"  # this section needs data that may be missing
 
 
@@ -32,39 +24,63 @@ def page_skeleton(page: str) -> list[str]:
     return [re.sub(r"[−+-]?\d[\d.,]*(e[−+-]?\d+)?", "#", line) for line in kept]
 
 
+class Printed:
+    """Scripts of the examples, run in this process, which has imported their libraries."""
+
+    def __init__(
+        self, figures: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        self.figures, self._monkeypatch, self._capsys = figures, monkeypatch, capsys
+        figures.mkdir()
+
+    def by(self, script: Path, **constants: object) -> str:
+        """Return what a script prints with other values of some of its constants."""
+        patch = self._monkeypatch
+        patch.chdir(EXAMPLES)
+        patch.syspath_prepend(script.parent)
+        patch.setattr(sys, "argv", [script.name, "--figures", str(self.figures)])
+        for name in ("markdown_page", "papers.markdown_page"):  # it reads the arguments once
+            patch.delitem(sys.modules, name, raising=False)
+        spec = spec_from_file_location(script.stem, script)
+        assert spec is not None
+        assert spec.loader is not None
+        module = module_from_spec(spec)
+        patch.setitem(sys.modules, script.stem, module)
+        spec.loader.exec_module(module)
+        for name, value in constants.items():
+            patch.setattr(module, name, value)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            module.main()
+        return self._capsys.readouterr().out
+
+
+@pytest.fixture
+def printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Printed:
+    pytest.importorskip("matplotlib", reason="the examples' pictures need matplotlib")
+    return Printed(tmp_path / "figures", monkeypatch, capsys)
+
+
 @pytest.mark.parametrize("script", PAPERS, ids=lambda script: script.stem)
-def test_a_page_of_a_paper_is_the_output_of_its_script(script: Path, tmp_path: Path) -> None:
-    printed = output([str(script)], tmp_path)
-    assert_same_page(printed, f"papers_{script.stem}.md", "papers", tmp_path)
+def test_a_page_of_a_paper_is_the_output_of_its_script(script: Path, printed: Printed) -> None:
+    page = printed.by(script)
+    assert_same_page(page, f"papers_{script.stem}.md", "papers", printed.figures)
 
 
-def test_the_page_of_all_methods_is_the_output_of_its_script(tmp_path: Path) -> None:
+def test_the_page_of_all_methods_is_the_output_of_its_script(
+    printed: Printed, tmp_path: Path
+) -> None:
     """Two simulated trials and two model tests print the same lines as all of them."""
-    runs, figures = tmp_path / "kvlcc2", tmp_path / "figures"
+    runs = tmp_path / "kvlcc2"
     for tank in KVLCC2.glob("*/"):
         first = min(tank.glob("*.dat"), default=None)
         if first:
             (runs / tank.name).mkdir(parents=True)
             (runs / tank.name / first.name).symlink_to(first)
-    printed = output(["-c", FEWER_METHODS.format(runs=str(runs))], figures)
-    assert_same_page(printed, "methods.md", "methods", figures)
-
-
-def output(script: list[str], figures: Path) -> str:
-    """Run a script of the examples in Python; return what it prints."""
-    pytest.importorskip("matplotlib", reason="the examples' pictures need matplotlib")
-    figures.mkdir(exist_ok=True)
-    result = subprocess.run(
-        [sys.executable, *script, "--figures", str(figures)],
-        cwd=PROJECT / "examples",
-        env=os.environ | {"OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        check=False,
-    )
-    assert result.returncode == 0, result.stderr
-    return result.stdout
+    page = printed.by(EXAMPLES / "methods.py", SEEDS=range(2), KVLCC2=runs)
+    assert_same_page(page, "methods.md", "methods", printed.figures)
 
 
 def assert_same_page(printed: str, name: str, kind: str, figures: Path) -> None:
