@@ -47,6 +47,15 @@ def recordings() -> Path:
     return RECORDINGS
 
 
+@pytest.fixture
+def fit_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let `identify` omit the histories by other methods, which take longer than the fit.
+
+    For tests of the fit and of what follows from it.
+    """
+    monkeypatch.setattr("analysis.identification.identify._histories", lambda *_: ())
+
+
 @pytest.fixture(scope="session")
 def vessel() -> Vessel:
     """Return the paper's ship, Table 1 in degrees."""

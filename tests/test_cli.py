@@ -543,6 +543,7 @@ def test_a_ship_is_identified_validated_written_simulated_and_replayed(
     assert "identified (given)" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("fit_alone")
 def test_a_ship_of_another_model_is_identified_written_simulated_and_replayed(
     two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -671,6 +672,7 @@ def test_info_fits_eighty_columns_without_breaking_its_table(
     assert max(map(len, out.splitlines())) <= 80
 
 
+@pytest.mark.usefixtures("fit_alone")
 def test_identify_skips_references_and_truths(
     two_runs: tuple[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:

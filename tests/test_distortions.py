@@ -55,6 +55,7 @@ def test_no_distortion_ends_in_a_traceback(outcomes: list[Outcome]) -> None:
     assert of_kind(outcomes, TRACEBACK) == []
 
 
+@pytest.mark.usefixtures("fit_alone")
 def test_an_identification_of_a_distorted_trial_is_right_or_names_the_cause() -> None:
     chosen = identified_cases()[::3]  # the benchmark runs all
     outcomes = list(run_matrix(chosen, judge_identification))

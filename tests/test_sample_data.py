@@ -56,6 +56,7 @@ def test_a_replay_of_the_table_finds_the_simulated_ship(bridge: TrialLog) -> Non
     assert all(found[name].determined for name in ESTIMATED)
 
 
+@pytest.mark.usefixtures("fit_alone")
 def test_an_identification_of_the_table_finds_the_simulated_ship(bridge: TrialLog) -> None:
     result = identify(bridge, options=ReadingOptions(vessel=VESSEL)).uncertainty
     assert result.names == ESTIMATED

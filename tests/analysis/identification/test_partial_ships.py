@@ -16,6 +16,7 @@ from shiplog import LogError, TrialLog, UsageError, load_vessel
 from shiplog.errors import VesselError
 from shiplog.vessel.vessel_parser import parse_vessel
 
+pytestmark = pytest.mark.usefixtures("fit_alone")
 MODEL, FIXED = "burylin-tied", {"T3": 0.5}  # the fastest fit
 LENGTH = "length = 120.0\n"
 GEAR = "[rudder]\nmax = 0.6\nrate = 0.04\n"

@@ -133,6 +133,7 @@ def test_the_verbs_derive_on_demand(
     assert "yaw_rate: derived from /heading/simulated" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("fit_alone")
 def test_an_identification_derives_on_demand(trial: tuple[TrialLog, TrialLog]) -> None:
     ship = identify([trial[0]], fixed={"T3": 0.5}, options=ReadingOptions(derive=("yaw_rate",)))
     assert any("yaw_rate: derived from" in warning for warning in ship.warnings)

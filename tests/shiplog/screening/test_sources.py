@@ -213,6 +213,7 @@ def _between(channel: Channel, start: int, end: int) -> Channel:
     return channel.part(*np.searchsorted(channel.received_ns, (start, end)).tolist())
 
 
+@pytest.mark.usefixtures("fit_alone")
 def test_replay_and_identification_choose_alike(trial: TrialLog) -> None:
     log = with_source(trial, "rudder", lambda x: 0.3 * x + np.radians(2.0))
     (of_replay,) = [w for w in analyse(log).findings.warnings if w.startswith("rudder: 2 sources")]

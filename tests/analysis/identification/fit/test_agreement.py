@@ -19,6 +19,7 @@ from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, Vessel, load_vessel
 from shiplog.ships import ship_model
 
+pytestmark = pytest.mark.usefixtures("fit_alone")
 SHIP = load_vessel("table1")[0]
 C = SHIP.coefficients
 OTHER = replace(SHIP, coefficients=C._replace(d=1.3 * C.d, e=1.3 * C.e))
