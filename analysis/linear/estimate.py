@@ -244,7 +244,7 @@ class EstimateRun:
             tests.add(chunk)
             yield chunk
         held = (*inputs.warnings(), *schedule.warnings())
-        warnings = (*self._log.warnings, *held, *estimator.warnings())
+        warnings = (*self._log.warnings, *plan.warnings, *held, *estimator.warnings())
         self._findings = tests.findings(meter.result() if meter else None, warnings)
 
     def _adjoints(self) -> Iterator[Adjoint]:

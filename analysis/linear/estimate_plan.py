@@ -24,8 +24,9 @@ from .joined_system import (
     state_names,
 )
 from .methods import EstimatorDesign, KalmanMethod
+from .spectrum_fit import MAX_FITTED, FitSignals, FittedParameter, fit_spectra
 from .system import LinearSystem
-from .system_signals import BoundSignal, OutputStats, bind_signals, is_interpolated
+from .system_signals import BoundSignal, HeldSignals, OutputStats, bind_signals, is_interpolated
 
 MIN_MEASUREMENTS = 4  # the noise is estimated from third differences
 SMOOTHED_OUTPUTS = 2  # at most, of the fixed-interval smoother
@@ -64,8 +65,10 @@ class EstimatePlan:
         Names of all N states.
     smooth
         Whether the states are smoothed backwards from the end.
+    fitted
+        Parameters of spectra that were fitted to the log.
     warnings
-        Problems of the data, each in a sentence.
+        What of the system does not act, each in a sentence.
     """
 
     name: str
@@ -84,6 +87,7 @@ class EstimatePlan:
     quantities: tuple[Quantity, ...]
     states: tuple[str, ...]
     smooth: bool
+    fitted: tuple[FittedParameter, ...]
     warnings: tuple[str, ...]
 
 
@@ -132,9 +136,18 @@ def plan_estimate(
     collected = _output_stats(screened, clock, outputs, on_progress)
     stds, measured = _noise(outputs, collected, clock)
     intervals = np.array([_interval(each, clock) for each in outputs])
-    model = estimator_model(system, OutputSampling(stds**2, intervals, clock.dt_secs))
-    require_distinguishable(system, model)
+    start = StartSignals(
+        np.array([each.first for each in collected]),
+        np.sqrt([each.moments.mean_square for each in collected]),
+    )
+    sampling = OutputSampling(stds**2, intervals, clock.dt_secs)
+    require_distinguishable(system, estimator_model(system, sampling))
     _require_method(system, smooth=smooth)
+    fitted: tuple[FittedParameter, ...] = ()
+    if any(noise.fit for noise in system.shaped):
+        signals = _fit_signals(screened, clock, outputs, bound[m : m + r], start, on_progress)
+        system, fitted = fit_spectra(system, sampling, signals, log.name)
+    model = estimator_model(system, sampling)
     design = system.method.design(model)
     return EstimatePlan(
         name=log.name,
@@ -146,17 +159,15 @@ def plan_estimate(
         schedule=bound[m + r :],
         stds=stds,
         measured=measured,
-        start=StartSignals(
-            np.array([each.first for each in collected]),
-            np.sqrt([each.moments.mean_square for each in collected]),
-        ),
+        start=start,
         model=model,
         design=design,
         feedback=design_feedback(system, model, design),
         quantities=quantities(system, model),
         states=state_names(system),
         smooth=smooth,
-        warnings=screened.screening.warnings,
+        fitted=fitted,
+        warnings=_warnings(system),
     )
 
 
@@ -179,6 +190,36 @@ def _with_stride(signal: BoundSignal, clock: Clock) -> BoundSignal:
     ratio = channel.interval_secs / clock.dt_secs
     thinned = is_interpolated(channel) and not channel.hold and ratio > MIN_STRIDE
     return replace(signal, stride=round(ratio)) if thinned else signal
+
+
+def _warnings(system: LinearSystem) -> tuple[str, ...]:
+    return tuple(
+        f"the input {name!r} of the plant has no channel and is taken as zero"
+        for name in system.zero_inputs
+    )
+
+
+def _fit_signals(
+    log: ScreenedLog,
+    clock: Clock,
+    outputs: tuple[BoundSignal, ...],
+    inputs: tuple[BoundSignal, ...],
+    start: StartSignals,
+    on_progress: ProgressCallback,
+) -> FitSignals:
+    """Return the first `MAX_FITTED` instants of the signals at which the inputs are known."""
+    held, y, u, count = HeldSignals(inputs, clock), [], [], 0
+    for signals in resampled_chunks(log, clock, on_progress, "fit"):
+        if count < MAX_FITTED:
+            part = signals.part(0, MAX_FITTED - count)
+            y.append(np.column_stack([output.measured(part) for output in outputs]))
+            u.append(held.step(part))
+            count += len(part)
+    measured, known = np.concatenate(y), np.concatenate(u)
+    first = int(np.argmax(np.isfinite(known).all(axis=1)))
+    return FitSignals(
+        np.ascontiguousarray(measured[first:]), np.ascontiguousarray(known[first:]), start
+    )
 
 
 def _interval(output: BoundSignal, clock: Clock) -> float:
@@ -231,6 +272,11 @@ def _require_method(system: LinearSystem, *, smooth: bool) -> None:
         raise UsageError(
             f"the method {method.name!r} has a constant gain, but the plant varies along its"
             " trajectory; use kalman, per-tick or reduced-order"
+        )
+    if system.linearise is not None and any(noise.fit for noise in system.shaped):
+        raise UsageError(
+            "spectra are fitted for a constant plant, and this one varies along its trajectory;"
+            " state their parameters"
         )
     is_optimal = isinstance(method, KalmanMethod) and not method.steady_state
     if smooth and not is_optimal:

@@ -14,7 +14,9 @@ from .initial_estimate import initial_estimate
 from .joined_system import OutputSampling, estimator_model
 from .linear_loop import StretchModel, StretchResult, run_stretch, stretch_model
 from .methods import EstimatorDesign
+from .system import Linearisation
 
+MAX_RATE_PER_STEP = 1e3  # of an entry of A: near a singular point they grow without bound
 MAX_STRETCH = 4096  # samples whose covariances are in memory at once
 
 
@@ -139,14 +141,16 @@ class Estimator:
         """Linearise the plant at the estimate and the scheduling signals, (s,), of this instant."""
         system = self._plan.system
         assert system.linearise is not None  # noqa: S101 - there is a tick only with it
-        there = system.linearise(self._x[: len(system.plant.A)], at)
-        model = estimator_model(system, self._sampling, there)
-        if self._design.correction is not None:
-            secs = self._count * self._plan.clock.dt_secs
-            try:
+        with np.errstate(all="ignore"):
+            there = system.linearise(self._x[: len(system.plant.A)], at)
+        try:
+            _require_regular(there, self._sampling.dt)
+            model = estimator_model(system, self._sampling, there)
+            if self._design.correction is not None:
                 self._design = system.method.design(model)
-            except UsageError as error:
-                raise UsageError(f"no gain at {secs:.1f} s: {error}") from None
+        except UsageError as error:
+            secs = self._count * self._plan.clock.dt_secs
+            raise UsageError(f"no gain at {secs:.1f} s: {error}") from None
         self._model = stretch_model(model, self._design)
 
     def _run(self, y: FloatArray, u: FloatArray) -> StretchResult:
@@ -188,6 +192,14 @@ def _padded(values: FloatArray, fill: float) -> FloatArray:
     missing = max(0, SMOOTHED_OUTPUTS - values.shape[1])
     width = [(0, 0), (0, missing), *[(0, 0)] * (values.ndim - 2)]
     return np.asarray(np.pad(values, width, constant_values=fill))
+
+
+def _require_regular(there: Linearisation, dt: float) -> None:
+    """Refuse a linearisation that is not finite or far faster than the samples."""
+    if not (np.isfinite(there.A).all() and np.abs(there.A).max() * dt < MAX_RATE_PER_STEP):
+        raise UsageError(
+            "the plant is singular there (Euler angles are where cos θ = 0); use other coordinates"
+        )
 
 
 _KEPT = ("states", "covariances", "predicted", "innovations", "variances")

@@ -87,7 +87,7 @@ def estimator_model(
         A, B, C = shaped.A, shaped.B, shaped.C
     b = np.concatenate((at.b, np.zeros(len(A) - n)))
     return EstimatorModel(
-        A, B, b, C, system.D, W, sampling.r, sampling.intervals, sampling.dt, n,
+        A, B[:, : at.B.shape[1]], b, C, system.D, W, sampling.r, sampling.intervals, sampling.dt, n,
         tuple(range(first, len(A))),
     )  # fmt: skip
 
@@ -160,10 +160,10 @@ def with_spectra(
 
 
 def _with_disturbances(system: LinearSystem, at: Linearisation) -> AugmentedPlant:
+    """Augment the plant by its disturbances; a plant without inputs has one of zeros."""
     plant = replace(system.plant, A=at.A, B=at.B if at.B.size else np.zeros((len(at.A), 1)))
     inputs = [_design_input(system, at, each) for each in system.disturbances]
-    augmented = augment_with_disturbances(plant, inputs)
-    return augmented if at.B.size else replace(augmented, B=np.zeros((len(augmented.A), 0)))
+    return augment_with_disturbances(plant, inputs)
 
 
 def _design_input(

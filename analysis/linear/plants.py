@@ -1,7 +1,6 @@
 """Plants by name: roll, yaw and surge, from their parameters or from a vessel's coefficients."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,41 +10,12 @@ from shiplog.errors import VesselError
 from shiplog.types import FloatArray
 
 from .file_section import FileSection
+from .plant_form import PlantForm
+from .rigid_body import rigid_body
 from .system import Linearisation, Linearise
 
 if TYPE_CHECKING:
     from shiplog.ships.paper import Coefficients
-
-
-@dataclass(frozen=True, eq=False)
-class PlantForm:
-    """A plant as a section ``[plant]`` gives it, before it is bound to channels.
-
-    Attributes
-    ----------
-    A, B
-        (n, n) and (n, inputs).
-    states, inputs
-        Units by name.
-    C, D
-        (m, n) and (m, inputs); None where each output is the state of its name.
-    G
-        (n, q): where the process noise enters; None for the rates of all states.
-    schedule
-        Scheduling signals by name, with their units.
-    linearise
-        Function of the estimate and the scheduling signals.
-    """
-
-    A: FloatArray
-    B: FloatArray
-    states: Mapping[str, str]
-    inputs: Mapping[str, str] | None = None
-    C: FloatArray | None = None
-    D: FloatArray | None = None
-    G: FloatArray | None = None
-    schedule: Mapping[str, str] = field(default_factory=dict)
-    linearise: Linearise | None = None
 
 
 def roll(section: FileSection, _: Path) -> PlantForm:
@@ -183,4 +153,5 @@ BUILT_IN: Mapping[str, Callable[[FileSection, Path], PlantForm]] = {
     "roll": roll,
     "yaw": yaw,
     "surge": surge,
+    "rigid-body": rigid_body,
 }

@@ -155,6 +155,8 @@ class LinearSystem:
         Step of the clock, s; None where it follows from the intervals of the outputs.
     regulator
         Weights of a regulator that is computed beside the recorded inputs.
+    zero_inputs
+        Names of inputs of the plant that have no channel and are taken as zero.
     """
 
     name: str
@@ -174,6 +176,7 @@ class LinearSystem:
     tick_secs: float | None = None
     step_secs: float | None = None
     regulator: RegulatorWeights | None = None
+    zero_inputs: tuple[str, ...] = ()
 
     @property
     def bindings(self) -> tuple[ChannelBinding, ...]:

@@ -16,9 +16,10 @@ from shiplog.units import UNITS, did_you_mean
 
 from .file_section import FileSection
 from .method_section import parse_method, parse_regulator
-from .plants import BUILT_IN, PlantForm
+from .plant_form import PlantForm
+from .plants import BUILT_IN
 from .spectra import RATIONAL, SPECTRA, ShapedNoise
-from .system import ChannelBinding, LinearSystem, SystemDisturbance
+from .system import ChannelBinding, Linearisation, Linearise, LinearSystem, SystemDisturbance
 
 KIND = "system file"
 DISTURBANCE_MODELS = ("constant", "ramp", "polynomial", "exponential", "harmonic")
@@ -119,6 +120,7 @@ def _system(top: FileSection, where: Path) -> LinearSystem:
         tick_secs=_optional(top, "tick_secs"),
         step_secs=_optional(top, "step_secs"),
         regulator=parse_regulator(top, states, names),
+        zero_inputs=tuple(name for name in form.inputs or () if name not in names),
     )
 
 
@@ -209,7 +211,7 @@ def _bound(
 ) -> PlantForm:
     """Return the plant with one row of C for each output and one column of B for each input."""
     states, n = list(form.states), len(form.A)
-    C, B, D = form.C, form.B, form.D
+    C, B, D, linearise = form.C, form.B, form.D, form.linearise
     if C is None:
         C = np.zeros((len(outputs) or 1, n))
         for row, output in zip(C, outputs, strict=False):
@@ -231,17 +233,28 @@ def _bound(
             for each in inputs
             if each.name not in known
         ]
-        if form.linearise is not None and len(inputs) != len(known):
-            errors.append(f"[inputs.NAME] is missing: this plant needs {', '.join(known)}")
-        B = B[:, [known.index(each.name) for each in inputs if each.name in known]]
+        chosen = [known.index(each.name) for each in inputs if each.name in known]
+        B, linearise = B[:, chosen], _with_inputs(linearise, chosen)
     elif B.shape[1] != len(inputs):
         errors.append(f"B has {B.shape[1]} columns, but there are {len(inputs)} [inputs.NAME]")
         B = np.zeros((n, len(inputs)))
     fits = D is not None and D.shape == (len(C), B.shape[1])
     return PlantForm(
         form.A, B, form.states, form.inputs, C, D if fits else np.zeros((len(C), B.shape[1])),
-        form.G, form.schedule, form.linearise,
+        form.G, form.schedule, linearise,
     )  # fmt: skip
+
+
+def _with_inputs(linearise: Linearise | None, chosen: list[int]) -> Linearise | None:
+    """Return the linearisation of a plant with some of its inputs."""
+    if linearise is None:
+        return None
+
+    def chosen_inputs(x: FloatArray, at: FloatArray) -> Linearisation:
+        found = linearise(x, at)
+        return found._replace(B=found.B[:, chosen])
+
+    return chosen_inputs
 
 
 def _process_noise(section: FileSection, form: PlantForm) -> FloatArray:

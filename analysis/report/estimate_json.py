@@ -20,7 +20,8 @@ def estimate_json(findings: EstimateFindings) -> JsonObject:
     -------
     dict
         ``log``, ``system``, ``estimator`` (poles as pairs of real and imaginary part, gains as
-        matrices), ``outputs``, ``regulator``, ``estimates`` (by name) and ``warnings``.
+        matrices), ``outputs``, ``fitted``, ``regulator``, ``estimates`` (by name) and
+        ``warnings``.
     """
     plan = findings.plan
     result = {
@@ -41,6 +42,7 @@ def estimate_json(findings: EstimateFindings) -> JsonObject:
                 findings.residuals, plan.stds, plan.measured, strict=True
             )
         },
+        "fitted": [asdict(each) for each in plan.fitted],
         "regulator": _regulator(findings),
         "estimates": {each.name: asdict(each) for each in findings.summaries},
         "warnings": list(findings.warnings),

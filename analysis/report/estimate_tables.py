@@ -37,6 +37,7 @@ def estimate_tables(findings: EstimateFindings) -> tuple[TextTable, ...]:
     """
     return (
         *_design_tables(findings),
+        *_spectrum_tables(findings),
         *_feedback_tables(findings),
         _residual_table(findings),
         _quantity_table(findings),
@@ -70,6 +71,19 @@ def _design_tables(findings: EstimateFindings) -> Iterator[TextTable]:
         "Correction M at each sample", plan.states, system.plant.sensors, design.correction
     )
     yield TextTable(table.title, table.columns, table.rows, (remark,))
+
+
+def _spectrum_tables(findings: EstimateFindings) -> Iterator[TextTable]:
+    if not findings.plan.fitted:
+        return
+    rows = [
+        (each.noise, each.name, f"{each.value:.4g}", f"± {BAND_STDS * each.std:.2g}")
+        for each in findings.plan.fitted
+    ]
+    remark = "Maximum likelihood of the innovations of the Kalman filter."
+    yield TextTable(
+        "Fitted spectra", ("coloured noise", "parameter", "value", "2σ"), tuple(rows), (remark,)
+    )
 
 
 def _feedback_tables(findings: EstimateFindings) -> Iterator[TextTable]:
