@@ -55,7 +55,8 @@ def _design_tables(findings: EstimateFindings) -> Iterator[TextTable]:
     design, system = plan.design, plan.system
     remarks = (*_method_remarks(findings), *design.remarks)
     if design.poles is None or design.gain is None:
-        yield TextTable(f"Estimator of {system.name!r}", (), (), remarks)
+        states = tuple((name,) for name in plan.states)
+        yield TextTable(f"Estimator of {system.name!r}", ("state",), states, remarks)
         return
     poles = np.sort_complex(design.poles)
     rows = [(_complex(pole), *_time_cells(pole)) for pole in poles]

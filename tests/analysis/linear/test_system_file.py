@@ -34,7 +34,7 @@ def test_all_errors_of_a_file_are_reported_at_once_with_the_nearest_name() -> No
     for expected in (
         "unknown key 'nam', did you mean 'name'?",
         "step_secs must be positive, got -1",
-        "plant.model must be one of roll, yaw, surge, got 'rol', did you mean 'roll'?",
+        "plant.model must be one of roll, yaw, surge, rigid-body, got 'rol', did you mean 'roll'?",
         "outputs.roll_rate.unit = 'deg/sec' is not known, did you mean 'deg/s'?",
         "outputs.roll_rate.std must be positive",
         "unknown key 'inputs.moment.chanel', did you mean 'channel'?",

@@ -1,0 +1,57 @@
+"""The example of a user's own plants runs, and its estimates are more accurate than its sensors."""
+
+import importlib.util
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from places import PROJECT
+
+from analysis.linear.estimate import estimate
+from analysis.linear.system_file import load_system
+from shiplog import write
+from shiplog.cli.main import main
+from shiplog.cli.verb import ExitCode
+
+SYSTEMS = PROJECT / "examples" / "systems"
+
+
+@cache
+def example() -> ModuleType:
+    spec = importlib.util.spec_from_file_location(
+        "own_systems", PROJECT / "examples/own_systems.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_system_file_of_the_examples_has_its_simulation() -> None:
+    names = {path.stem for path in SYSTEMS.glob("*.toml")}
+    assert names == {simulate.__name__ for simulate in example().SIMULATIONS}
+
+
+@pytest.mark.parametrize("name", [path.stem for path in sorted(SYSTEMS.glob("*.toml"))])
+def test_estimates_are_more_accurate_than_the_sensors_and_their_bands_hold(name: str) -> None:
+    simulated = getattr(example(), name)(np.random.default_rng(1))
+    found = estimate(simulated.log, load_system(SYSTEMS / f"{name}.toml"))
+    accuracies = list(example().accuracies(simulated, found))
+    assert all(each.error < 0.7 * each.sensor for each in accuracies if each.sensor > 0)
+    assert all(each.within > 0.8 for each in accuracies)
+    if found.findings.costs is not None:
+        assert found.findings.costs.predicted.total < found.findings.costs.recorded.total
+
+
+def test_an_example_runs_from_the_command_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(example().heading_loop(np.random.default_rng(1)).log, "loop.mcap")
+    arguments = ["estimate", "loop.mcap", "--system", str(SYSTEMS / "heading_loop.toml")]
+    assert main([*arguments, "-o", "loop.rrd"]) == ExitCode.OK
+    assert "gyro bias" in capsys.readouterr().out
+    assert Path("loop.rrd").stat().st_size > 10_000
