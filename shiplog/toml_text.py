@@ -1,14 +1,47 @@
 """Text of settings files in TOML: parsed safely, and their errors in one message."""
 
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 from .errors import ShiplogError
 from .units import did_you_mean
 
 MAX_CHARACTERS = 100_000  # the TOML parser needs memory by the square of a hostile text
+
+
+def read_toml_text(
+    path: str | os.PathLike[str], kind: str, error: type[ShiplogError], missing: str = ""
+) -> str:
+    """Read the text of a settings file, at most as much as `parse_toml` accepts and a character.
+
+    Parameters
+    ----------
+    path
+        The file.
+    kind
+        The kind of file, such as ``layout file``.
+    error
+        The class of the errors.
+    missing
+        What to report where there is no such file; by default that it cannot be read.
+
+    Raises
+    ------
+    error
+        The file cannot be read.
+    """
+    try:
+        with Path(path).open(encoding="utf-8") as file:
+            return file.read(MAX_CHARACTERS + 1)
+    except (OSError, UnicodeDecodeError) as cause:
+        if missing and isinstance(cause, FileNotFoundError):
+            raise error(f"{missing}: {path}") from None
+        reason = getattr(cause, "strerror", None) or cause
+        raise error(f"cannot read the {kind} ({reason}); name another: {path}") from cause
 
 
 def parse_toml(text: str, where: str, kind: str, error: type[ShiplogError]) -> dict[str, Any]:

@@ -3,13 +3,12 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from shiplog.errors import LayoutError
 from shiplog.tables.layout import DELIMITERS, HEMISPHERES, VELOCITIES, Column
 from shiplog.tables.layout_parser import KIND, parse_columns
-from shiplog.toml_text import list_errors, parse_toml, unknown_key
+from shiplog.toml_text import list_errors, parse_toml, read_toml_text, unknown_key
 from shiplog.units import CATALOGUE, GEOGRAPHIC
 
 _TOP_KEYS = ("delimiter", "line")
@@ -81,12 +80,7 @@ def load_device(path: str | os.PathLike[str]) -> Device:
     >>> load_device("sample_data/layouts/weather_lines.toml").kinds["WIND"].source
     'anemometer'
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise LayoutError(f"no such layout file: {path}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise LayoutError(f"cannot read the layout file ({error}); name another: {path}") from error
+    text = read_toml_text(path, KIND, LayoutError, f"no such {KIND}")
     return parse_device(text, os.fspath(path))
 
 

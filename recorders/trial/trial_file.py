@@ -3,7 +3,6 @@
 import argparse
 import os
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,12 +14,13 @@ from recorders.streams.stream_options import parse_options
 from recorders.transports.address import is_live, open_transport
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import load_extension
+from shiplog.toml_text import list_errors, parse_toml, read_toml_text
 from shiplog.types import ReadOnlyMapping
 from shiplog.units import did_you_mean
 
 from .conditions import CONDITIONS, trim_contradiction
 
-MAX_TRIAL_FILE_BYTES = 100_000
+_KIND = "trial file"
 MAX_SOURCES = 64
 _SECTIONS = ("output", "vessel", "conditions", "source")
 _OUTPUT_KEYS = ("file", "rotate_minutes", "rotate_megabytes")
@@ -99,20 +99,9 @@ def load_trial_file(path: str | os.PathLike[str]) -> TrialFile:
     UsageError
         The file cannot be read or has errors; the message lists all of them.
     """
-    file = Path(path)
-    try:
-        with file.open("rb") as stream:
-            content = stream.read(MAX_TRIAL_FILE_BYTES + 1)
-        if len(content) > MAX_TRIAL_FILE_BYTES:
-            raise UsageError(f"too long for a trial file (over {MAX_TRIAL_FILE_BYTES} B): {file}")
-        table = tomllib.loads(content.decode())
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise UsageError(f"cannot read the trial file ({reason}); name another: {file}") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        reason = " ".join(str(error).split())
-        raise UsageError(f"not a TOML file ({reason}); correct that line: {file}") from error
-    return _Parser(table, file).parse()
+    file, name = Path(path), os.fspath(path)
+    text = read_toml_text(file, _KIND, UsageError)
+    return _Parser(parse_toml(text, name, _KIND, UsageError), file).parse()
 
 
 class _Parser:
@@ -134,9 +123,7 @@ class _Parser:
         minutes = self._positive(output, "rotate_minutes")
         megabytes = self._positive(output, "rotate_megabytes")
         if self._errors:
-            count = len(self._errors)
-            words = "one error" if count == 1 else f"{count} errors"
-            raise UsageError(f"{words} in the trial file: {'; '.join(self._errors)}: {self._path}")
+            raise UsageError(list_errors(self._errors, _KIND, os.fspath(self._path)))
         return TrialFile(
             self._path,
             tuple(sources),

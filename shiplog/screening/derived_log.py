@@ -9,9 +9,10 @@ from math import degrees
 
 from shiplog.checks.channel_stats import ChannelStats
 from shiplog.errors import LogError
-from shiplog.types import Channel, Event, Log
+from shiplog.types import Channel, Log
 
 from .heading_rate import HeadingDifferentiator, HeadingRate
+from .log_view import LogView
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Derivation:
         return f"{option} computes it from {self.base.topic}, with a noise of {noise}"
 
 
-class DerivedLog:
+class DerivedLog(LogView):
     """A log with derived channels beside its own; a `shiplog.types.Log`.
 
     Parameters
@@ -88,38 +89,9 @@ class DerivedLog:
         derivations: Sequence[Derivation],
         selected: Mapping[str, str] | None = None,
     ) -> None:
-        self._log, self._derivations = log, tuple(derivations)
+        super().__init__(log)
+        self._derivations = tuple(derivations)
         self._selected = dict(selected or {})
-
-    @property
-    def name(self) -> str:
-        """The name of the file."""
-        return self._log.name
-
-    @property
-    def metadata(self) -> Mapping[str, str]:
-        """Text about the trial, by key."""
-        return self._log.metadata
-
-    @property
-    def vessel_toml(self) -> str | None:
-        """The attached vessel file."""
-        return self._log.vessel_toml
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Problems met in reading the file."""
-        return self._log.warnings
-
-    @property
-    def data_lost(self) -> bool:
-        """Whether a part of the file could not be read."""
-        return self._log.data_lost
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """What happened during the trial, in the order of time."""
-        return self._log.events
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """Iterate over the samples in chunks; the derived channels follow the recorded ones."""

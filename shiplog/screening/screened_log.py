@@ -4,9 +4,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from shiplog.checks.channel_stats import LogStats
-from shiplog.types import Channel, Event, Log
+from shiplog.types import Channel, Log
 
 from .derived_log import Derivation, DerivedLog
+from .log_view import LogView
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class Screening:
         return self.all_stats.select_sources(self.sources)
 
 
-class ScreenedLog:
+class ScreenedLog(LogView):
     """A log as its users take it; a `shiplog.types.ChunkedLog`.
 
     Impossible values and sentinels are NaN, and each quantity has one source.
@@ -52,39 +53,14 @@ class ScreenedLog:
 
     def __init__(self, log: Log, screening: Screening) -> None:
         whole = DerivedLog(log, screening.derivations) if screening.derivations else log
-        self._log = whole.select_sources(screening.sources) if screening.sources else whole
+        super().__init__(whole.select_sources(screening.sources) if screening.sources else whole)
         self.screening = screening
         self._stats = {(stats.topic, stats.fields): stats for stats in screening.stats}
-
-    @property
-    def name(self) -> str:
-        """The name of the file."""
-        return self._log.name
-
-    @property
-    def metadata(self) -> Mapping[str, str]:
-        """Text about the trial, by key."""
-        return self._log.metadata
-
-    @property
-    def vessel_toml(self) -> str | None:
-        """The attached vessel file."""
-        return self._log.vessel_toml
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Problems met in reading the file, and problems of the data."""
         return (*self._log.warnings, *self.screening.warnings)
-
-    @property
-    def data_lost(self) -> bool:
-        """Whether a part of the file could not be read."""
-        return self._log.data_lost
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """What happened during the trial, in the order of time."""
-        return self._log.events
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """Iterate over the screened samples in chunks, each topic in the order of reception."""

@@ -4,9 +4,9 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import tzinfo
-from pathlib import Path
 
 from shiplog.errors import LayoutError
+from shiplog.toml_text import read_toml_text
 from shiplog.units import CATALOGUE
 
 DELIMITERS = {"whitespace": None, ",": ",", ";": ";", "tab": "\t"}
@@ -139,12 +139,7 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
     >>> layout.columns["rudder"].place, layout.columns["rudder"].sign
     (10, -1)
     """
-    from .layout_parser import parse_layout  # noqa: PLC0415 - the parser makes layouts
+    from .layout_parser import KIND, parse_layout  # noqa: PLC0415 - the parser makes layouts
 
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise LayoutError(f"no such layout file: {path}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise LayoutError(f"cannot read the layout file ({error}); name another: {path}") from error
+    text = read_toml_text(path, KIND, LayoutError, f"no such {KIND}")
     return parse_layout(text, os.fspath(path))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shiplog.errors import VesselError
-from shiplog.toml_text import list_errors, parse_toml, unknown_key
+from shiplog.toml_text import list_errors, parse_toml, read_toml_text, unknown_key
 from shiplog.units import did_you_mean
 
 from .model_section import parse_model_section
@@ -76,19 +76,9 @@ def load_vessel(preset_or_path: str | os.PathLike[str]) -> tuple[Vessel, str]:
     name = os.fspath(preset_or_path)
     if name in PRESETS:
         return parse_vessel(PRESETS[name], name), PRESETS[name]
-    path = Path(name)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise VesselError(
-            f"no vessel file and no preset{did_you_mean(name, PRESETS)}; "
-            f"presets are {', '.join(PRESETS)}: {path}"
-        ) from None
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise VesselError(
-            f"cannot read the vessel file ({reason}); name another: {path}"
-        ) from error
+    hint = did_you_mean(name, PRESETS)
+    missing = f"no {KIND} and no preset{hint}; presets are {', '.join(PRESETS)}"
+    text = read_toml_text(name, KIND, VesselError, missing)
     return parse_vessel(text, name), text
 
 
