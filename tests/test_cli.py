@@ -336,6 +336,9 @@ def test_an_unwritable_output_is_rejected(
         "record simulate spiral --sensor yaw_rate.rate_hz=1e9 -o x.mcap",
         "record simulate zigzag-20-400 -o x.mcap",
         "replay x.mcap --source speed",
+        "replay x.mcap --sensor-delay heading",
+        "identify x.mcap --sensor-delay heading=late",
+        "replay x.mcap --sensor-delay heading=1.2,",
         "convert x.mcap x.xlsx",
     ],
 )

@@ -9,11 +9,13 @@ from shiplog.cli.options import (
     add_cut_options,
     add_derive_option,
     add_source_option,
+    assigned_numbers,
     assigned_sources,
 )
 
 if TYPE_CHECKING:
     from analysis.replay.reading_options import ReadingOptions
+    from shiplog.screening import StatedDelays
 
 
 def add_reading_options(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +32,12 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
     add_source_option(parser)
     add_derive_option(parser)
     parser.add_argument(
+        "--sensor-delay",
+        metavar="DELAYS",
+        help="correct the times of late sensors: auto, or seconds such as heading=1.2,speed=0.4; "
+        "auto estimates heading against yaw rate and speed against fixes",
+    )
+    parser.add_argument(
         "--strict", action="store_true", help="refuse a log with a contradiction in unit or sign"
     )
     add_cut_options(parser)
@@ -41,7 +49,7 @@ def reading_options(arguments: argparse.Namespace) -> "ReadingOptions":
     Raises
     ------
     UsageError
-        A source is not given as ``CHANNEL=SOURCE``.
+        A source is not given as ``CHANNEL=SOURCE``, or a delay not as ``CHANNEL=SECONDS``.
     VesselError
         The vessel file cannot be read or has errors.
     """
@@ -51,7 +59,16 @@ def reading_options(arguments: argparse.Namespace) -> "ReadingOptions":
     sources = assigned_sources(arguments.source)
     vessel = load_vessel(arguments.vessel)[0] if arguments.vessel else None
     derive = tuple(arguments.derive)
-    return ReadingOptions(vessel, arguments.length, sources, arguments.strict, derive)
+    delays = _sensor_delays(arguments.sensor_delay)
+    return ReadingOptions(vessel, arguments.length, sources, arguments.strict, derive, delays)
+
+
+def _sensor_delays(text: str | None) -> "StatedDelays":
+    if text is None:
+        return {}
+    if text == "auto":
+        return "auto"
+    return assigned_numbers(text.split(","), "--sensor-delay", "heading=1.2,speed=0.4, or auto")
 
 
 def show_review(path: str | Path, *, view: bool) -> None:

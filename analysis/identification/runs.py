@@ -24,7 +24,7 @@ from shiplog.checks.consistency.findings import (
 from shiplog.errors import LogError, UsageError
 from shiplog.progress import no_progress
 from shiplog.resampling import choose_clock, with_steering_gear
-from shiplog.screening import screen_log
+from shiplog.screening import ScreenedLog, screen_log, screen_without_delays
 from shiplog.types import (
     FloatArray,
     Log,
@@ -93,14 +93,18 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     LogError
         A channel is missing, or rudder and revolutions are not known together long enough.
     """
-    screened = screen_log(
-        log,
-        REQUIRED_CHANNELS,
-        (*OPTIONAL_CHANNELS, "position"),
-        purpose="an identification",
-        sources=options.sources,
-        derive=options.derive,
-    )
+
+    def screen(recorded: Log) -> ScreenedLog:
+        return screen_log(
+            recorded,
+            REQUIRED_CHANNELS,
+            (*OPTIONAL_CHANNELS, "position"),
+            purpose="an identification",
+            sources=options.sources,
+            derive=options.derive,
+        )
+
+    screened = screen_without_delays(log, options.sensor_delays, screen)
     stats = screened.screening.stats
     toml = log.vessel_toml
     vessel = parse_vessel(toml, f"vessel.toml in {log.name}") if toml is not None else None

@@ -9,7 +9,7 @@ from analysis.replay.reading_options import ReadingOptions
 from shiplog.errors import LogError, UsageError
 from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, choose_clock
-from shiplog.screening import ScreenedLog, Screening, screen_log
+from shiplog.screening import ScreenedLog, Screening, screen_log, screen_without_delays
 from shiplog.types import FloatArray, Log
 
 from .estimator_model import EstimatorModel
@@ -123,10 +123,14 @@ def plan_estimate(
     """
     on_progress("check the log", 0.0)
     names = tuple(dict.fromkeys(binding.channel for binding in system.bindings))
-    screened = screen_log(
-        log, names, purpose=f"the system {system.name!r}", sources=options.sources,
-        derive=options.derive,
-    )  # fmt: skip
+
+    def screen(recorded: Log) -> ScreenedLog:
+        return screen_log(
+            recorded, names, purpose=f"the system {system.name!r}", sources=options.sources,
+            derive=options.derive,
+        )  # fmt: skip
+
+    screened = screen_without_delays(log, options.sensor_delays, screen)
     stats = screened.screening.stats
     step = system.step_secs or _step_secs(system, screened)
     clock = choose_clock(screened, stats, step, channels=names)

@@ -21,7 +21,7 @@ from shiplog.checks.consistency.consistency_check import ConsistencyCheck
 from shiplog.checks.consistency.findings import CONTRADICTIONS, refuse_contradictions
 from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, choose_clock, resample_chunks, with_steering_gear
-from shiplog.screening import ScreenedLog, Screening, screen_log
+from shiplog.screening import ScreenedLog, Screening, screen_log, screen_without_delays
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
 from shiplog.types import ChunkedLog, FloatArray, Log
 from shiplog.vessel.settings import MIN_WINDOW_SECS
@@ -95,7 +95,7 @@ def first_pass(
     vessel
         The vessel, whose steering gear follows an order of the rudder.
     options
-        Of these the sources of channels, and the channels to derive.
+        Of these the sources of channels, the channels to derive, and the delays of sensors.
     on_progress
         Called with the step and its share done.
 
@@ -105,14 +105,18 @@ def first_pass(
         Where a required channel is missing or a channel cannot be used.
     """
     on_progress("check the log", 0.0)
-    screened = screen_log(
-        log,
-        REQUIRED_CHANNELS,
-        OPTIONAL_CHANNELS,
-        purpose="a replay",
-        sources=options.sources,
-        derive=options.derive,
-    )
+
+    def screen(recorded: Log) -> ScreenedLog:
+        return screen_log(
+            recorded,
+            REQUIRED_CHANNELS,
+            OPTIONAL_CHANNELS,
+            purpose="a replay",
+            sources=options.sources,
+            derive=options.derive,
+        )
+
+    screened = screen_without_delays(log, options.sensor_delays, screen)
     stats = screened.screening.stats
     clock = choose_clock(screened, stats, channels=REQUIRED_CHANNELS, optional=("heading",))
     return FirstPass(screened, with_steering_gear(clock, vessel.rudder_rate))

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from shiplog.screening import StatedDelays
 from shiplog.vessel.vessel import Vessel
 
 
@@ -26,6 +27,9 @@ class ReadingOptions:
     derive
         The channels that are derived where a log lacks them: ``yaw_rate`` from the heading,
         ``speed`` from the speed over ground. Warnings state their noise.
+    sensor_delays
+        By how much the times of a channel are late, s, by its name, such as ``{"heading": 1.2}``;
+        or ``"auto"``, which estimates the delays of heading and speed from the log.
 
     Examples
     --------
@@ -40,6 +44,7 @@ class ReadingOptions:
     sources: Mapping[str, str] = field(default_factory=dict)
     strict: bool = False
     derive: tuple[str, ...] = ()
+    sensor_delays: StatedDelays = field(default_factory=dict)
 
 
 DEFAULT_OPTIONS = ReadingOptions()

@@ -84,6 +84,14 @@ def _log(findings: Findings) -> JsonObject:
             f"/{each.name}/{each.source}": each.metadata
             for each in findings.plan.screening.derivations
         },
+        "sensor_delays": {
+            each.name: {
+                "secs": each.secs,
+                "error_secs": each.error_secs,
+                "reference": each.reference or None,
+            }
+            for each in findings.plan.screening.delays
+        },
     }
 
 

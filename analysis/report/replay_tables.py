@@ -190,7 +190,7 @@ def _coefficient_remarks(findings: Findings) -> Iterator[str]:
     )
     if any(residuals.rejected for residuals in findings.residuals):
         yield (
-            "Samples rejected by the filter are used in this fit all the same: spikes distort b1, "
+            "Samples rejected by the filter are used in this fit all the same: they distort b1, "
             "b2, b3 and e."
         )
     if findings.plan.model_is_fitted:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from shiplog.checks.channel_stats import LogStats
 from shiplog.types import Channel, Log
 
+from .delayed_log import DelayedLog, SensorDelay
 from .derived_log import Derivation, DerivedLog
 from .log_view import LogView
 
@@ -25,12 +26,15 @@ class Screening:
         Problems of the data, each in a sentence.
     derivations
         The channels that are derived from others.
+    delays
+        The delays by which times are corrected.
     """
 
     all_stats: LogStats
     sources: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     derivations: tuple[Derivation, ...] = ()
+    delays: tuple[SensorDelay, ...] = ()
 
     @property
     def stats(self) -> LogStats:
@@ -52,7 +56,8 @@ class ScreenedLog(LogView):
     """
 
     def __init__(self, log: Log, screening: Screening) -> None:
-        whole = DerivedLog(log, screening.derivations) if screening.derivations else log
+        timely = DelayedLog(log, screening.delays) if screening.delays else log
+        whole = DerivedLog(timely, screening.derivations) if screening.derivations else timely
         super().__init__(whole.select_sources(screening.sources) if screening.sources else whole)
         self.screening = screening
         self._stats = {(stats.topic, stats.fields): stats for stats in screening.stats}

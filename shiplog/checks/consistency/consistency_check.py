@@ -10,6 +10,7 @@ from .coarse_record import COMPARED_CHANNELS, CoarseRecord, CoarseSignals
 from .findings import Finding
 from .ground_velocity import ground_velocity
 from .gyro_bias import bias_findings
+from .lags import MAX_RATIO, MIN_RATIO, Lag, heading_lag, speed_lag
 from .rudder_effect import rudder_significance
 from .speed_findings import (
     heading_zero_findings,
@@ -115,10 +116,19 @@ class ConsistencyCheck:
             findings += heading_zero_findings(signals, sense, velocity)
         findings += speed_lag_findings(signals, velocity, self._stats)
         pair = ratios.get(("yaw_rate", "heading"))
-        if pair is None or 0.8 < pair.ratio < 1.25:
+        if pair is None or MIN_RATIO < pair.ratio < MAX_RATIO:
             findings += bias_findings(signals)
-            findings += _lag_findings(pair, self._stats)
+            findings += _lag_findings(heading_lag(pair), self._stats)
         return findings
+
+    def lags(self) -> tuple[Lag, ...]:
+        """Return the lags that the channels show, significant or not, in place of `result`."""
+        if self._record.dt_secs == 0:
+            return ()
+        signals = self._record.result()
+        pair = _correlated(_turning_ratios(signals)).get(("yaw_rate", "heading"))
+        found = heading_lag(pair), speed_lag(ground_velocity(signals))
+        return tuple(lag for lag in found if lag is not None)
 
 
 def _senses(signals: CoarseSignals, ratios: dict[Pair, TurningRatio]) -> dict[Pair, int]:
@@ -150,12 +160,12 @@ def _correlated(ratios: dict[Pair, TurningRatio]) -> dict[Pair, TurningRatio]:
     }
 
 
-def _lag_findings(pair: TurningRatio | None, stats: LogStats) -> list[Finding]:
+def _lag_findings(found: Lag | None, stats: LogStats) -> list[Finding]:
     """Report a heading and a yaw rate of which one lags the other."""
     gyro, compass = stats.get("yaw_rate"), stats.get("heading")
-    if pair is None or gyro is None or compass is None or abs(pair.correlation) < 0.98:
+    if found is None or gyro is None or compass is None:
         return []
-    lag, error = pair.lag_secs, pair.lag_error_secs
+    lag, error = found.secs, found.error_secs
     resolution = max(gyro.interval_secs, compass.interval_secs, MIN_LAG_SECS)
     if abs(lag) < max(resolution, LAG_ERRORS * error):
         return []
@@ -165,7 +175,8 @@ def _lag_findings(pair: TurningRatio | None, stats: LogStats) -> list[Finding]:
             "lag",
             late.name,
             f"{late.topic}: lags {early.topic} by {abs(lag):.2f} ± {2 * error:.2f} s; likely a "
-            "filter or a late time stamp in the recorder; correct its times by that delay",
+            "filter or a late time stamp in the recorder; correct its times by that delay "
+            "(--sensor-delay)",
         )
     ]
 

@@ -93,7 +93,8 @@ def speed_lag_findings(
         "lag",
         late,
         f"{signals.topics[late]}: lags {signals.topics[early]} by {abs(lag):.1f} ± {2 * error:.1f}"
-        " s; likely a filter or a late time stamp in the recorder; correct its times by that delay",
+        " s; likely a filter or a late time stamp in the recorder; correct its times by that delay "
+        "(--sensor-delay)",
     )
 
 
