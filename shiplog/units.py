@@ -7,10 +7,13 @@ where a number is shown to a person.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from difflib import get_close_matches
 from math import inf, pi
 
 from .errors import UsageError
+
+_YEAR_10000_SECS = 253_402_300_800  # since 1970
 
 UNITS: dict[str, tuple[str, float]] = {
     # name: (SI unit, factor to convert to it)
@@ -262,6 +265,21 @@ def display_conversion(name: str, unit: str) -> tuple[str, float]:
     else:
         shown = DISPLAY_UNITS.get(unit, unit)
     return shown, conversion_factor(unit, shown) if shown != unit else 1.0
+
+
+def utc_text(secs: float) -> str:
+    """Return a time in s since 1970-01-01 UTC as date and time of day.
+
+    A time after the year 9999, or before 1970, stays a number.
+
+    Examples
+    --------
+    >>> utc_text(1406851200.0)
+    '2014-08-01 00:00:00'
+    """
+    if not 0 <= secs < _YEAR_10000_SECS:
+        return f"{secs:.4g} s"
+    return f"{datetime.fromtimestamp(int(secs), UTC):%Y-%m-%d %H:%M:%S}"
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -15,6 +15,7 @@ from recorders.trial.open_source import (
 )
 from recorders.trial.stream_tables import stream_tables
 from recorders.trial.trial_file import load_trial_file
+from recorders.trial.undecoded import why_undecoded
 from shiplog.cli.console import print_tables
 from shiplog.cli.verb import ExitCode
 from shiplog.errors import UsageError
@@ -51,10 +52,10 @@ def _listen(requests: Sequence[StreamRequest], secs: float) -> ExitCode:
     channels = _channel_table(source)
     print_tables([_state_table(source), *([channels] if channels.rows else [])])
     print_tables(stream_tables(each.stream for each in source.inputs))
-    silent = [each.stream.name for each in source.inputs if not _heard(each)]
+    silent = [each.stream for each in source.inputs if not _heard(each)]
     missing = source.status.missing
-    if silent:
-        print(f"nothing decoded from: {', '.join(silent)}")
+    for stream in silent:
+        print(f"nothing decoded from {stream.name}: {why_undecoded(stream.decoder.counts)}")
     if missing:
         print(f"missing for a replay: {', '.join(missing)}")
     else:

@@ -16,7 +16,7 @@ from recorders.trial.live_source import LiveSource
 from recorders.trial.status import ChannelStatus
 from shiplog.cli.printable import printable
 from shiplog.types import Event
-from shiplog.units import CATALOGUE, conversion_factor
+from shiplog.units import CATALOGUE, conversion_factor, utc_text
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -141,6 +141,8 @@ def value_in_words(channel: ChannelStatus) -> str:
     (value,) = channel.last_value
     if isnan(value):
         return "no value"
+    if channel.name == "gnss_time":
+        return utc_text(value)
     if kind is None:
         return f"{value:.4g} {channel.unit}"
     shown = value * conversion_factor(kind.unit, kind.display_unit)

@@ -1,6 +1,7 @@
 """The verb `record`: a trial file, or one subcommand for each installed source of samples."""
 
 import argparse
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -23,17 +24,48 @@ DRY_RUN_SECS = 10.0
 
 
 def _expand(arguments: Sequence[str]) -> list[str]:
-    """Return the arguments with the source `TRIAL` before the name of a trial file.
+    """Return the arguments with the source before the name of a trial file, or before an address.
+
+    The source of an address is the format of what is received there.
 
     Examples
     --------
     >>> _expand(["--dry-run", "sea.toml"]), _expand(["nmea0183", "gyro.log"])
     (['--dry-run', 'trial', 'sea.toml'], ['nmea0183', 'gyro.log'])
     """
-    names = [number for number, text in enumerate(arguments) if not text.startswith("-")]
-    if not names or not arguments[names[0]].lower().endswith(".toml"):
+    at = next((i for i, text in enumerate(arguments) if not text.startswith("-")), None)
+    if at is None:
         return list(arguments)
-    return [*arguments[: names[0]], TRIAL, *arguments[names[0] :]]
+    if arguments[at].lower().endswith(".toml"):
+        source = TRIAL
+    elif set(arguments[:at]) <= {"--dry-run"} and _is_address(arguments[at]):
+        source = _detected(arguments[at])
+    else:
+        return list(arguments)
+    return [*arguments[:at], source, *arguments[at:]]
+
+
+def _is_address(text: str) -> bool:
+    """Whether a text is not the name of a source, but the address of one."""
+    names = (TRIAL, *extension_names(GROUP), *extension_names(FORMAT_GROUP))
+    return text not in names and (
+        "://" in text or Path(text).is_file() or re.fullmatch(r"v?can\d+", text) is not None
+    )
+
+
+def _detected(address: str) -> str:
+    """Return the format of what is received at an address, and report it."""
+    from recorders.trial.format_detection import LISTEN_SECS, detect_stream_format
+
+    if not Path(address).is_file():
+        print(
+            f"no format is stated: listening for up to {LISTEN_SECS:.0f} s to detect it",
+            file=sys.stderr,
+            flush=True,
+        )
+    name = detect_stream_format(address)
+    print(f"the format is {name}: shiplog record {name} {address}", file=sys.stderr, flush=True)
+    return name
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
@@ -187,6 +219,7 @@ RECORD = Verb(
         "shiplog record simulate zigzag-20-20 --seed 1 --duration 600 -o trial.mcap",
         "shiplog record nmea0183 udp://127.0.0.1:10110 -o trial.mcap",
         "shiplog record nmea0183 gyro.log -o gyro.mcap",
+        "shiplog record udp://0.0.0.0:10110 -o trial.mcap   (detects the format)",
         "shiplog record --dry-run trial.toml",
     ),
     expand=_expand,

@@ -24,6 +24,7 @@ from recorders.trial.open_source import (
 from recorders.trial.recorded_source import RecordedSource
 from recorders.trial.stream_tables import stream_tables
 from recorders.trial.trial_file import load_trial_file
+from recorders.trial.undecoded import why_undecoded
 from shiplog.cli.console import print_tables, print_warnings, progress
 from shiplog.cli.paths import require_outputs, require_suffix
 from shiplog.errors import UsageError
@@ -108,6 +109,14 @@ def _record(
     streams = _streams(source)
     print_tables(stream_tables(streams), to_stderr=is_device(log))
     print_warnings([text for stream in streams for text in stream.decoder.counts.warnings])
+    if isinstance(source, LiveSource):
+        print_warnings(
+            [
+                f"no sample could be decoded from {stream.name}: {why_undecoded(counts)}"
+                for stream in streams
+                if not (counts := stream.decoder.counts).accepted
+            ]
+        )
     return replace(recording, dropped=source.dropped if isinstance(source, LiveSource) else 0)
 
 

@@ -10,6 +10,7 @@ from recorders.streams.packets import Batches, Packet
 from recorders.streams.reception_clock import ReceptionClock
 from shiplog.types import Event, EventLevel
 
+from .fault_text import fault_text
 from .transport import Transport
 
 MAX_WAITING_PACKETS = 200_000  # some 20 s of the busiest ship
@@ -175,18 +176,10 @@ class LiveStream:
     def _set_lost(self, error: Exception) -> None:
         """Keep why there is no connection, and report a loss once."""
         self.state = StreamState.LOST
-        self.fault = _in_words(error)
+        self.fault = fault_text(error, self._transport.address)
         if self._lost_ns is None:
             self._lost_ns = self._clock.now_ns()
             self._report(f"no connection to {self._transport.address}: {self.fault}")
 
     def _report(self, text: str, level: EventLevel = EventLevel.WARNING) -> None:
         self._events.append(Event(self._clock.now_ns(), text, self._name, level))
-
-
-def _in_words(error: Exception) -> str:
-    """Return what went wrong; of an error that no transport should raise, its type too."""
-    text = " ".join(str(getattr(error, "strerror", None) or error).split())
-    if isinstance(error, OSError):
-        return text or type(error).__name__
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__

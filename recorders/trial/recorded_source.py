@@ -8,6 +8,8 @@ from recorders.streams.packets import Batches, Packet
 from recorders.streams.stream_source import StreamSource
 from shiplog.errors import LogError
 
+from .undecoded import why_undecoded
+
 
 class _Feed:
     """Packets of one stream, let through up to a time."""
@@ -98,10 +100,12 @@ class RecordedSource:
         if items:
             yield items
         silent = [stream for stream in self.streams if not stream.decoder.counts.accepted]
+        texts = [
+            f"no sample could be decoded from {stream.origin}: "
+            f"{why_undecoded(stream.decoder.counts)}"
+            for stream in silent
+        ]
         if len(silent) == len(self.streams):
-            names = ", ".join(stream.origin for stream in silent)
-            raise LogError(f"no sample could be decoded; check the format of: {names}")
-        for stream in silent:
-            stream.decoder.counts.warn(
-                f"no sample could be decoded from {stream.origin}; check its format"
-            )
+            raise LogError("; ".join(texts))
+        for stream, text in zip(silent, texts, strict=True):
+            stream.decoder.counts.warn(text)

@@ -91,8 +91,8 @@ def print_tables(tables: Sequence[TextTable], *, to_stderr: bool = False) -> Non
     """Print tables and their remarks, in the width of the console.
 
     No word and no number is broken: headings wrap between words, long names in the first column
-    are shortened in the middle, and a table that is still too wide is printed in parts. Sentences
-    in the last column wrap between words.
+    are shortened in the middle as far as they stay distinct, and a table that is still too wide is
+    printed in parts. Sentences in the last column wrap between words.
     """
     from rich.box import SIMPLE
     from rich.console import Console
@@ -108,7 +108,9 @@ def print_tables(tables: Sequence[TextTable], *, to_stderr: bool = False) -> Non
             title = table.title if number == 0 else f"{table.title} (continued)"
             shown = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE)
             for i, heading in enumerate(part[0]):
-                shown.add_column(heading, justify="left" if i == 0 else "right", no_wrap=True)
+                shown.add_column(
+                    heading, justify="left" if i == 0 else "right", no_wrap=i > 0, overflow="fold"
+                )
             prose = fixed if number == 0 else len(table.columns)  # where it begins in this part
             for heading in table.columns[prose:]:
                 shown.add_column(heading, overflow="fold")
@@ -127,7 +129,7 @@ def _fitted(
     room = width - EDGES
     sizes = _sizes(columns, rows, lambda heading: max(map(len, heading.split("\n"))))
     least = _sizes(columns, rows, lambda heading: max(map(len, heading.split()), default=0))
-    least[0] = min(least[0], MIN_NAME_WIDTH)  # its cells can be shortened
+    least[0] = min(least[0], _distinct_width([row[0] for row in rows]))
     while _total(sizes) > room and sizes != least:
         widest = max(range(len(sizes)), key=lambda i: (sizes[i] - least[i], -i))
         sizes[widest] -= 1
@@ -151,6 +153,15 @@ def _sizes(
     return [
         max(1, least(heading), *(len(row[i]) for row in rows)) for i, heading in enumerate(columns)
     ]
+
+
+def _distinct_width(names: Sequence[str]) -> int:
+    """Return the least width at which names can be shortened without two that look alike."""
+    distinct = len(set(names))
+    width = MIN_NAME_WIDTH
+    while len({shortened(name, width) for name in names}) < distinct:
+        width += 1
+    return width
 
 
 def _total(sizes: Sequence[int]) -> int:

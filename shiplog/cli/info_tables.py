@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from shiplog.checks.event_table import event_table
 from shiplog.checks.log_content import ChannelInfo, ForeignTopic, LogInfo, RawTopic, ValueRange
 from shiplog.text_table import TextTable
+from shiplog.units import utc_text
 
 
 def info_tables(info: LogInfo) -> list[TextTable]:
@@ -60,17 +61,26 @@ def _channel_rows(channel: ChannelInfo) -> list[tuple[str, ...]]:
     rate = "" if channel.rate_hz is None else f"{channel.rate_hz:.3g}"
     rate += " *" if channel.irregular else ""
     gaps = "" if channel.gaps is None else str(channel.gaps)
+    is_time = channel.topic.startswith("/gnss_time/")
     scalar = [each for each in channel.ranges if not each.component]
     values = _range_cells(scalar[0]) if scalar else ("", "", channel.unit)
-    if channel.ranges and not scalar:
+    if channel.ranges and (is_time or not scalar):
         values = ("", "", "")
     rows: list[tuple[str, ...]] = [(channel.topic, str(channel.samples), rate, *values, gaps)]
+    rows += [row for each in scalar if is_time for row in _time_rows(each)]
     rows += [
         (f"  {each.component}", "", "", *_range_cells(each), "")
         for each in channel.ranges
         if each.component
     ]
     return rows
+
+
+def _time_rows(values: ValueRange) -> list[tuple[str, ...]]:
+    """Return a row of the dates of a range of times, and one of their times of day."""
+    lowest, highest = (utc_text(each).split(" ") for each in (values.lowest, values.highest))
+    parts = zip(("  date", "  time of day"), lowest, highest, strict=True)
+    return [(part, "", "", first, last, "UTC", "") for part, first, last in parts]
 
 
 def _range_cells(values: ValueRange) -> tuple[str, str, str]:

@@ -201,7 +201,7 @@ def test_a_dry_run_reports_what_is_missing_and_writes_nothing(
         output, error = process.communicate(timeout=60)
     assert process.returncode == 1, error
     assert "missing for a replay: rpm" in output
-    assert "nothing decoded from: engine" in output
+    assert "nothing decoded from engine: nothing was received; check the address" in output
     assert "/yaw_rate/bridge.N" in output
     assert "Connection refused" in " ".join(output.split())
     assert list(tmp_path.glob("*.mcap*")) == []

@@ -52,6 +52,20 @@ def test_a_long_name_keeps_its_beginning_and_its_end() -> None:
         assert "zigzag_20_20.mcap".endswith(tail)
 
 
+@pytest.mark.parametrize("width", [60, 80])
+def test_two_different_names_never_look_alike(
+    width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quantities = ("apparent_wind_angle", "apparent_wind_speed", "air_temperature", "air_pressure")
+    names = [f"/{name}/weather_station_{n}.WI" for name in quantities for n in (1, 2)]
+    rows = tuple((name, *NUMBERS) for name in names)
+    columns = ("topic", *(f"column{i}" for i in range(len(NUMBERS))))
+    lines = printed(TextTable("Channels", columns, rows), width, capsys, monkeypatch)
+    shown = [line.split()[0] for line in lines if line.startswith("  /")]
+    assert len(set(shown)) == len(names)
+    assert all(shown.count(name) == len(shown) // len(names) for name in shown)
+
+
 def test_sentences_of_the_last_column_wrap_between_words_beside_whole_cells(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
