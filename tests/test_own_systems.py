@@ -1,12 +1,11 @@
 """The example of a user's own plants runs, and its estimates are more accurate than its sensors."""
 
-import importlib.util
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+from example_scripts import example_script
 from places import PROJECT
 
 from analysis.linear.estimate import estimate
@@ -18,16 +17,8 @@ from shiplog.cli.verb import ExitCode
 SYSTEMS = PROJECT / "examples" / "systems"
 
 
-@cache
 def example() -> ModuleType:
-    spec = importlib.util.spec_from_file_location(
-        "own_systems", PROJECT / "examples/own_systems.py"
-    )
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return example_script("own_systems")
 
 
 def test_every_system_file_of_the_examples_has_its_simulation() -> None:

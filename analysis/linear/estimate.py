@@ -230,14 +230,12 @@ class EstimateRun:
             u, at = inputs.step(signals), schedule.step(signals)
             run = estimator.step(measured, u, at)
             if adjoints is not None and run.trace is not None:
-                run.states[run.first :], run.covariances[run.first :] = smooth(
-                    run.trace, smoother_outputs(plan.model), next(adjoints)
-                )
-            values, stds = combine(self._rows, run.states, run.covariances)
-            plant = run.states[:, : plan.model.size]
+                smoothed = smooth(run.trace, smoother_outputs(plan.model), next(adjoints))
+                run.values[run.first :], run.stds[run.first :] = combine(self._rows, *smoothed)
+            plant = run.values[:, : plan.model.size]  # the states come first
             commanded = meter.add(plant, u) if meter else np.zeros((len(u), 0))
             chunk = EstimateChunk(
-                signals.first, values, stds, measured, run.predicted, run.innovations,
+                signals.first, run.values, run.stds, measured, run.predicted, run.innovations,
                 np.sqrt(run.variances), u, commanded,
             )  # fmt: skip
             _require_finite(plan, chunk, run.first)

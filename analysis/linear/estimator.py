@@ -12,7 +12,7 @@ from .estimate_plan import SMOOTHED_OUTPUTS, EstimatePlan
 from .estimator_model import EstimatorModel
 from .initial_estimate import initial_estimate
 from .joined_system import OutputSampling, estimator_model
-from .linear_loop import StretchModel, StretchResult, run_stretch, stretch_model
+from .linear_loop import StretchModel, StretchResult, combine, run_stretch, stretch_model
 from .methods import EstimatorDesign
 from .system import Linearisation
 
@@ -28,8 +28,8 @@ class EstimatorRun:
     ----------
     first
         Number of instants at its start without an estimate, for want of inputs; NaN there.
-    states, covariances
-        (k, N) and (k, N, N).
+    values, stds
+        (k, q): the reported quantities and their standard deviations.
     predicted, innovations, variances
         (k, m): as in `StretchResult`.
     trace
@@ -37,8 +37,8 @@ class EstimatorRun:
     """
 
     first: int
-    states: FloatArray
-    covariances: FloatArray
+    values: FloatArray
+    stds: FloatArray
     predicted: FloatArray
     innovations: FloatArray
     variances: FloatArray
@@ -65,6 +65,7 @@ class Estimator:
         self._P: FloatArray = np.zeros((0, 0))
         self._before: FloatArray = np.zeros(0)
         self._stages: list[FloatArray] = []
+        self._rows = np.array([quantity.row for quantity in plan.quantities])
 
     def step(self, y: FloatArray, u: FloatArray, at: FloatArray) -> EstimatorRun:
         """Run over the next chunk.
@@ -85,24 +86,30 @@ class Estimator:
             self._skipped += first
             if known.any():
                 self._start(u[first], at[first])
-        results, k = [_no_estimate(first, self._model)], first
+        parts, k = [_not_estimated(first, len(self._rows), len(self._model.r))], first
+        results: list[StretchResult] = []
         transitions: list[FloatArray] = []
         while k < len(y):
             end = min(k + self._length(), len(y))
             transitions += [self._model.F] * (end - k)
-            results.append(self._run(y[k:end], u[k:end]))
+            result = self._run(y[k:end], u[k:end])
+            reported = combine(self._rows, result.states, result.covariances)
+            parts.append((*reported, result.predicted, result.innovations, result.variances))
+            if self._plan.smooth:
+                results.append(result)
             if self._tick and self._count % self._tick == 0:
                 self._linearise(at[end - 1])
             k = end
-        arrays = {name: np.concatenate([getattr(r, name) for r in results]) for name in _KEPT}
-        return EstimatorRun(first, **arrays, trace=self._trace(results[1:], transitions))
+        values, stds, predicted, innovations, variances = (
+            np.concatenate(arrays) for arrays in zip(*parts, strict=True)
+        )
+        trace = self._trace(results, transitions) if self._plan.smooth else None
+        return EstimatorRun(first, values, stds, predicted, innovations, variances, trace)
 
-    def _trace(self, results: list[StretchResult], transitions: list[FloatArray]) -> Trace | None:
+    def _trace(self, results: list[StretchResult], transitions: list[FloatArray]) -> Trace:
         """Return what the smoother needs; `transitions` are those into each instant."""
-        if not self._plan.smooth:
-            return None
         following = [*transitions[1:], self._model.F][: len(transitions)]
-        results = results or [_no_estimate(0, self._model)]
+        results = results or [_no_result(self._model)]
         names = ("states", "covariances", "gains", "sequential", "sequential_variances")
         arrays = [np.concatenate([getattr(r, name) for r in results]) for name in names]
         states, covariances, gains, innovations, variances = arrays
@@ -202,9 +209,6 @@ def _require_regular(there: Linearisation, dt: float) -> None:
         )
 
 
-_KEPT = ("states", "covariances", "predicted", "innovations", "variances")
-
-
 def stage_model(model: StretchModel, design: EstimatorDesign) -> StretchModel:
     """Return the model of a stage of a cascade, whose output is the whole state."""
     N, inputs = model.G0.shape
@@ -218,11 +222,17 @@ def stage_model(model: StretchModel, design: EstimatorDesign) -> StretchModel:
     )
 
 
-def _no_estimate(count: int, model: StretchModel) -> StretchResult:
-    """Return the result of instants without an estimate: NaN throughout."""
+def _not_estimated(count: int, quantities: int, outputs: int) -> tuple[FloatArray, ...]:
+    """Return values, stds, predictions, innovations and variances where there is no estimate."""
+    values, predicted = np.full((count, quantities), np.nan), np.full((count, outputs), np.nan)
+    return values, values, predicted, predicted, predicted
+
+
+def _no_result(model: StretchModel) -> StretchResult:
+    """Return the result of no instant."""
     N, m = model.M.shape
-    vector, matrix = np.full((count, N), np.nan), np.full((count, N, N), np.nan)
-    outputs = np.full((count, m), np.nan)
+    outputs = np.zeros((0, m))
     return StretchResult(
-        vector, matrix, outputs, outputs, outputs, np.zeros((count, m, N)), outputs, outputs
-    )
+        np.zeros((0, N)), np.zeros((0, N, N)), outputs, outputs, outputs, np.zeros((0, m, N)),
+        outputs, outputs,
+    )  # fmt: skip

@@ -1,7 +1,10 @@
 """Every method of the papers on a log; gains against the reference values of the papers' pages."""
 
+from functools import cache
+
 import numpy as np
 import pytest
+from example_scripts import example_script, paper_system
 from linear_logs import DT, log_of, response
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm, solve_discrete_lyapunov
@@ -9,31 +12,10 @@ from scipy.linalg import expm, solve_discrete_lyapunov
 from analysis.design.discrete_correction import matched_correction, sampled_poles
 from analysis.linear.estimate import SystemEstimate, estimate
 from analysis.linear.system_file import parse_system
+from analysis.replay.residuals import assess_innovations
 from shiplog import UsageError
 from shiplog.types import FloatArray, TrialLog
 
-GUST = f"""
-[plant]
-A = [[-1.02, 0.91, -0.0022], [0.82, -1.08, -0.1756], [0, 0, -20.2]]
-B = [[0], [0], [20.2]]
-C = [[15.87, 1.4811, 0], [0, 1, 0]]
-states = {{ incidence = "rad", rate = "rad/s", actuator = "rad" }}
-[inputs.command]
-channel = "rudder"
-[outputs.acceleration]
-channel = "heave"
-std = {float(np.sqrt(1 / 20 / DT))}
-[outputs.rate]
-channel = "pitch_rate"
-std = {float(np.sqrt(1 / 60 / DT))}
-[[coloured]]
-name = "gust"
-spectrum = "dryden"
-std = {float(10 * np.sqrt(2))}
-length = 3.49
-speed = 1.0
-on_state = {{ incidence = 0.00203, rate = -0.00164 }}
-"""
 YAW = f"""
 [plant]
 model = "yaw"
@@ -45,22 +27,6 @@ std = {float(np.sqrt(2.5e-9 / DT))}
 [noise]
 process = {{ yaw_acceleration_rest = 1e-12 }}
 """
-ROLL = """
-[plant]
-model = "roll"
-inertia = 1000
-[inputs.moment]
-channel = "torque"
-[outputs.roll_rate]
-std = 1e-6
-[initial]
-state = { roll_rate = 0.0, moment_of_waves = 0.0 }
-[[disturbance]]
-name = "moment_of_waves"
-model = "ramp"
-unit = "Nm"
-on_input = { moment = 1.0 }
-"""
 
 
 def run(text: str, log: TrialLog) -> SystemEstimate:
@@ -71,10 +37,14 @@ def noise(count: int = 300, seed: int = 0) -> FloatArray:
     return np.random.default_rng(seed).standard_normal(count)
 
 
+@cache
+def gusty() -> tuple[SystemEstimate, FloatArray]:
+    log, gust = example_script("paper_logs").gust(np.random.default_rng(5))
+    return run(paper_system("gust"), log), gust
+
+
 def test_steady_state_filter_of_a_gust_has_the_gain_and_poles_of_the_paper() -> None:
-    text = GUST + '[method]\nname = "kalman"\ngain = "steady-state"\n'
-    log = log_of(rudder=np.zeros(300), heave=noise(), pitch_rate=noise(seed=1))
-    design = run(text, log).findings.plan.design
+    design = gusty()[0].findings.plan.design
     L = [
         [0.037291386349, -0.0040904051819],
         [-0.020228415532, 0.0028556367845],
@@ -88,29 +58,16 @@ def test_steady_state_filter_of_a_gust_has_the_gain_and_poles_of_the_paper() -> 
 
 
 def test_gust_estimated_from_a_simulated_log_is_within_its_standard_deviation() -> None:
-    """The shaping filter driven by white noise, the plant, and sensors with the paper's noise."""
-    rng, count = np.random.default_rng(5), 4000
-    T = 3.49
-    A = np.array([[-1.02, 0.91], [0.82, -1.08]])
-    Aw = np.array([[-2 / T, -1 / T**2], [1.0, 0.0]])
-    Cw = 10 * np.sqrt(6 / T) * np.array([[1.0, 1 / (T * np.sqrt(3))]])
-    whole = np.block([[A, np.array([[0.00203], [-0.00164]]) @ Cw], [np.zeros((2, 2)), Aw]])
-    F = expm(whole * DT / 10)
-    states, x = np.empty((count, 4)), np.zeros(4)
-    for k in range(count):
-        states[k] = x
-        for _ in range(10):  # small steps, so that the noise of each is nearly an impulse
-            x = F @ x
-            x[2] += np.sqrt(DT / 10) * rng.standard_normal()
-    gust = states[:, 2:] @ Cw[0]
-    heave = states[:, 0] * 15.87 + states[:, 1] * 1.4811
-    heave = heave + np.sqrt(1 / 20 / DT) * rng.standard_normal(count)
-    rate = states[:, 1] + np.sqrt(1 / 60 / DT) * rng.standard_normal(count)
-    found = run(GUST, log_of(rudder=np.zeros(count), heave=heave, pitch_rate=rate))
+    found, gust = gusty()
     error = (found["gust"] - gust)[300:]
     assert np.sqrt(np.mean(error**2)) == pytest.approx(found.std("gust")[-1], rel=0.1)
     assert np.sqrt(np.mean(error**2)) < 0.9 * np.std(gust)
-    assert all(residuals.consistent for residuals in found.findings.residuals)
+    chunk = found.chunk
+    for j, name in enumerate(found.findings.plan.system.plant.sensors):
+        innovations = chunk.innovations[300:, j], chunk.innovation_stds[300:, j]
+        residuals = assess_innovations(name, "1", *innovations, DT, noise_measured=False)
+        assert residuals.consistent
+        assert residuals.white
 
 
 @pytest.mark.parametrize(
@@ -173,11 +130,11 @@ def test_roll_moment_of_paper_four_is_observed_as_by_the_continuous_observer(
     pattern: str, gain: list[float]
 ) -> None:
     """The moment 0.25 Nm + 5e-3 Nm/s t on a roll at rest; the oracle integrates the paper's (8)."""
-    count = 1001
-    at = DT * np.arange(count)
-    rate = (0.25 * at + 5e-3 * at**2 / 2) / 1000
-    text = f'{ROLL}\n[method]\nname = "luenberger"\npattern = "{pattern}"\nfrequency = 0.05\n'
-    found = run(text, log_of(torque=np.zeros(count), roll_rate=rate))
+    log, true = example_script("paper_logs").roll_moment(np.random.default_rng(0))
+    found, at = (
+        run(paper_system("roll_moment").replace("butterworth", pattern), log),
+        DT * np.arange(1001),
+    )
     assert found.findings.plan.design.gain[:, 0] == pytest.approx(gain)
     L, A = np.array(gain), np.array([[0, 1e-3, 0], [0, 0, 1], [0, 0, 0]])
 
@@ -185,10 +142,9 @@ def test_roll_moment_of_paper_four_is_observed_as_by_the_continuous_observer(
         return A @ x + L * ((0.25 * t + 5e-3 * t**2 / 2) / 1000 - x[0])
 
     exact = solve_ivp(slope, (0, at[-1]), np.zeros(3), t_eval=at, rtol=1e-9, atol=1e-12).y
-    true = 0.25 + 5e-3 * at
-    assert found["moment_of_waves"] - true == pytest.approx(exact[1] - true, abs=3e-3)
+    assert found["disturbance"] - true == pytest.approx(exact[1] - true, abs=3e-3)
     if pattern == "butterworth":  # reference values of the error at 10, 20, 50 and 100 s
-        errors = true - found["moment_of_waves"]
+        errors = true - found["disturbance"]
         expected = [0.24839095, 0.18202279, -0.03536208, -0.0264498]
         assert errors[[100, 200, 500, 1000]] == pytest.approx(expected, abs=3e-3)
 

@@ -5,16 +5,15 @@ from functools import cache
 import numpy as np
 import pytest
 from channels import channel
+from example_scripts import example_script
 from linear_logs import DT, log_of
 from places import SAMPLE_DATA
-from scipy.integrate import solve_ivp
 from trial_logs import InChunks
 
 from analysis.linear.estimate import SystemEstimate, estimate
 from analysis.linear.joined_system import OutputSampling, estimator_model
 from analysis.linear.system_file import parse_system
 from shiplog import TrialLog, UsageError, read
-from shiplog.types import FloatArray
 
 LOG = SAMPLE_DATA / "zigzag_20_20.mcap"
 YAW = """
@@ -49,24 +48,6 @@ def error_share(found: SystemEstimate) -> float:
     true = truth()["yaw_rate"].values[120:]
     errors = [v[600::5] - true for v in (found["yaw_rate"], found.chunk.measured[:, 0])]
     return float(np.std(errors[0]) / np.std(errors[1]))
-
-
-def flight(count: int) -> FloatArray:
-    """Angles and rates of a free rigid body of 10 Hz, (n, 6), by the equations themselves."""
-    I1, I2, I3 = 2000, 3000, 2500
-
-    def rate(_: float, x: FloatArray) -> list[float]:
-        phi, theta, _, p, q, r = x
-        turn = q * np.sin(phi) + r * np.cos(phi)
-        angles = [p + np.tan(theta) * turn, q * np.cos(phi) - r * np.sin(phi), turn / np.cos(theta)]
-        return [*angles, (I2 - I3) / I1 * q * r, (I3 - I1) / I2 * r * p, (I1 - I2) / I3 * p * q]
-
-    at = DT * np.arange(count)
-    return solve_ivp(rate, at[[0, -1]], POINT, "DOP853", at, rtol=1e-12, atol=1e-14).y.T
-
-
-def body_log(states: FloatArray) -> TrialLog:
-    return log_of(roll=states[:, 0], pitch=states[:, 1], heading=states[:, 2])
 
 
 def test_yaw_along_the_trajectory_is_more_accurate_than_the_gyro_and_white() -> None:
@@ -106,22 +87,21 @@ def test_gain_of_the_rigid_body_is_that_of_the_per_tick_page(method: str) -> Non
 
 @pytest.mark.parametrize(("method", "count"), [("per-tick", 6), ("reduced-order", 3)])
 def test_rates_of_a_rigid_body_are_observed_from_its_angles(method: str, count: int) -> None:
-    states = flight(400)
+    log, true = example_script("paper_logs").spacecraft(np.random.default_rng(0))
     text = f'{BODY}\nname = "{method}"\npoles = {[-0.5] * count}\n'
-    found = estimate(body_log(states), parse_system(text, "body.toml"))
+    found = estimate(log, parse_system(text, "body.toml"))
     rates = np.column_stack([found[f"{name}_rate"] for name in ("roll", "pitch", "yaw")])
-    errors = np.abs(rates - states[:, 3:]).max(axis=1)
+    errors = np.abs(rates - true).max(axis=1)
     assert errors[0] > 1e-2
     assert errors[-1] < 1e-5
 
 
 def test_a_rigid_body_that_pitches_through_the_vertical_is_refused_with_its_time() -> None:
-    states = np.zeros((300, 6))
-    states[:, 1] = 0.1 * DT * np.arange(300)
+    pitch = np.minimum(0.1 * DT * np.arange(300), np.pi / 2)
+    log = log_of(roll=np.zeros(300), pitch=pitch, heading=np.zeros(300))
     text = f'{BODY}\nname = "reduced-order"\npoles = [-0.5, -0.5, -0.5]\n'
-    states[:, 1] = np.minimum(states[:, 1], np.pi / 2)
     with pytest.raises(UsageError, match=r"no gain at 15\.\d s"):
-        estimate(body_log(states), parse_system(text, "body.toml"))
+        estimate(log, parse_system(text, "body.toml"))
 
 
 def test_a_constant_gain_for_a_varying_plant_is_refused() -> None:
