@@ -23,6 +23,7 @@ _WHOLE = re.compile(rb"[$!][^$!\\\r\n]*\*[0-9A-Fa-f]{2}")  # the usual packet: o
 _PIECE = re.compile(rb"(?:\\[^\\]*\\)?[$!][^$!\\]*|[^$!]+")  # a sentence with its TAG block
 _TAG_PARAMETER = re.compile(r"([a-z]):([ -~]+)")
 _SOURCE = re.compile(r"[A-Za-z0-9_-]{1,15}")
+_GROUP = re.compile(r"([0-9]{1,2})-([0-9]{1,2})-([0-9]{1,9})")
 _HEX_BYTE = re.compile(rb"[0-9A-Fa-f]{2}")
 _MAX_TAG_NUMBER = 10**15
 _PRINTABLE = bytes(range(0x20, 0x7F))
@@ -50,11 +51,15 @@ class TagBlock(NamedTuple):
         The time (``c:``), ns since 1970-01-01 UTC; None without one.
     line
         The line count (``n:``); None without one.
+    group
+        The number of the sentence in its group, the number of sentences of it, and its code
+        (``g:``); None without one.
     """
 
     source: str = ""
     time_ns: int | None = None
     line: int | None = None
+    group: tuple[int, int, int] | None = None
 
 
 NO_TAG = TagBlock()
@@ -113,7 +118,7 @@ def parse_sentence(line: bytes, *, require_checksum: bool = True) -> Sentence:
     Examples
     --------
     >>> parse_sentence(b"$HEHDT,218.53,T*12")
-    Sentence(talker='HE', formatter='HDT', fields=(b'218.53', b'T'), tag=TagBlock(source='', time_ns=None, line=None))
+    Sentence(talker='HE', formatter='HDT', fields=(b'218.53', b'T'), tag=TagBlock(source='', time_ns=None, line=None, group=None))
     """  # noqa: E501
     if len(line) >= MAX_PACKET_BYTES:
         raise FramingError("line too long")
@@ -192,7 +197,13 @@ def _parse_tag(content: bytes) -> TagBlock:
     if source and not _SOURCE.fullmatch(source):
         raise FramingError("malformed TAG block")
     time, line = _tag_number(found.get("c")), _tag_number(found.get("n"))
-    return TagBlock(source, None if time is None else _epoch_ns(time), line)
+    group = _GROUP.fullmatch(found.get("g", ""))
+    return TagBlock(
+        source,
+        None if time is None else _epoch_ns(time),
+        line,
+        None if group is None else (int(group[1]), int(group[2]), int(group[3])),
+    )
 
 
 def _tag_number(text: str | None) -> int | None:

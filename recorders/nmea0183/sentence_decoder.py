@@ -16,6 +16,7 @@ from .framing import FramingError, Sentence, TagBlock, parse_sentence, split_pac
 from .navigation_sentences import NAVIGATION
 from .sentence_values import Fields, Values
 from .steering_sentences import STEERING
+from .tag_groups import TagGroups
 from .transducer_sentences import TRANSDUCERS, MotionUnit
 from .twin_devices import CHECKED, TwinDevices
 from .utc_fields import TIMED, utc_of
@@ -103,6 +104,7 @@ class SentenceDecoder:
             clock_kinds=("ZDA",),
         )
         self._twins = TwinDevices()
+        self._groups = TagGroups()
         self._lines: dict[str, int] = {}  # the last line count by sender
 
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
@@ -127,6 +129,8 @@ class SentenceDecoder:
             self._count_lost_lines(tag_of(line))
             return
         talker, formatter, fields, tag = sentence
+        if tag.group is not None:
+            tag = self._groups.complete(tag)
         kind = self._kind(talker, formatter)
         if tag.line is not None:
             self._count_lost_lines(tag)

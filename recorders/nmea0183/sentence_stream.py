@@ -27,12 +27,10 @@ from .sentence_times import (
     find_reference,
     first_day,
     midnight_ns,
-    sentences_of,
-    tag_times,
 )
+from .tag_groups import has_tag_times, tag_times
 
 HEAD_LINES = 5000  # of a file, from which stamps, checksums and times are detected
-_MOST = 0.5  # a share of lines
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -125,9 +123,7 @@ def _derive_times(
         if day is None:
             counts.warn("the lines have no date: counted from 1970-01-01; state it with --date")
         return even_times(batches, midnight_ns(day), arguments.interval)
-    tag_lines = [packet for packet in head if b"\\" in packet.data]
-    tagged = sum(sentence.tag.time_ns is not None for sentence in sentences_of(tag_lines))
-    if tagged > _MOST * len(head):
+    if has_tag_times(head):
         return tag_times(batches)
     reference = find_reference(head, day)
     for text in reference.warnings:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
 from recorders.streams.gnss_clock import ROLLOVER_NS, Utc, Warn, nearest_ns, rollovers
-from recorders.streams.packets import END_NS, NO_TIME, Batches, Packet
+from recorders.streams.packets import END_NS, Batches, Packet
 from shiplog.errors import LogError, UsageError
 from shiplog.tables.printed_times import DAY_NS
 
@@ -293,16 +293,3 @@ def even_times(batches: Batches, start_ns: int, interval_secs: float) -> Batches
             packet._replace(received_ns=start_ns + round(i * interval_secs * 1e9))
             for i, packet in enumerate(batch, first)
         ]
-
-
-def tag_times(batches: Batches) -> Batches:
-    """Yield lines with the times of their TAG blocks; a line without one has that of the last."""
-    time_ns = NO_TIME
-    for batch in batches:
-        done = []
-        for packet in batch:
-            for sentence in sentences_of([packet]):
-                time_ns = time_ns if sentence.tag.time_ns is None else sentence.tag.time_ns
-            if time_ns != NO_TIME:
-                done.append(packet._replace(received_ns=time_ns))
-        yield done

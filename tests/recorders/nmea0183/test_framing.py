@@ -102,7 +102,7 @@ def test_talkers_of_proprietary_and_ais_sentences_are_their_address(
 def test_the_parameters_of_a_tag_block_are_read() -> None:
     # the example of IEC 61162-450 in field notes: group 1-1-34, source GR0001
     assert parse_sentence(tagged("g:1-1-34,s:GR0001,n:12", "HEHDT,1,T")).tag == TagBlock(
-        "GR0001", None, 12
+        "GR0001", None, 12, (1, 1, 34)
     )
 
 

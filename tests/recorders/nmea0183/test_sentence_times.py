@@ -3,7 +3,7 @@
 from datetime import UTC, date, datetime
 
 import pytest
-from sentences import sentence, tagged
+from sentences import sentence
 
 from recorders.nmea0183 import sentence_times
 from recorders.nmea0183.sentence_times import (
@@ -11,7 +11,6 @@ from recorders.nmea0183.sentence_times import (
     even_times,
     find_reference,
     first_day,
-    tag_times,
 )
 from recorders.streams.packets import NO_TIME, Packet
 from shiplog.errors import LogError, UsageError
@@ -176,12 +175,6 @@ def test_even_times_go_on_from_batch_to_batch() -> None:
     batches = even_times(iter([_lines(HDT, HDT), _lines(HDT)]), 5 * SECOND_NS, 0.1)
     times = [packet.received_ns for batch in batches for packet in batch]
     assert times == [5_000_000_000, 5_100_000_000, 5_200_000_000]
-
-
-def test_times_of_tag_blocks_hold_until_the_next() -> None:
-    lines = [HDT, tagged("c:100", "HEHDT,1,T"), HDT, tagged("c:101", "HEHDT,1,T")]
-    times = [packet.received_ns for batch in tag_times(iter([_lines(*lines)])) for packet in batch]
-    assert times == [100 * SECOND_NS, 100 * SECOND_NS, 101 * SECOND_NS]
 
 
 def test_the_first_date_of_sentences() -> None:
