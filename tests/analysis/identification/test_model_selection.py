@@ -52,7 +52,7 @@ def identify_auto() -> AutoIdentification:
             trial = simulate(
                 vessel,
                 manoeuvre,
-                duration_secs=300.0,
+                duration_secs=200.0,
                 seed=seed,
                 sensors=suite("paper"),
                 vessel_toml=toml,
