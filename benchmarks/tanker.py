@@ -12,7 +12,7 @@ from PIL import Image
 
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.identify import identify
-from analysis.identification.prediction import zigzag_overshoots
+from analysis.identification.prediction import Zigzag, zigzag_overshoots
 from analysis.identification.runs import run_from_log
 from analysis.identification.validation import Validation, validate
 from analysis.replay.reading_options import ReadingOptions
@@ -166,14 +166,9 @@ def _simulated_rudder_rows(ships: dict[str, IdentifiedShip]) -> Iterator[tuple[s
     """Yield a row for each overshoot, the rudder controlled by the simulated heading."""
     for angle, measured in OVERSHOOTS.items():
         execute, delay = radians(EXECUTES[angle]), EXECUTES[angle] - angle
+        zigzag = Zigzag(radians(-angle), execute, speed=SPEEDS[angle], **STEERING)
         overshoots = [
-            delay
-            + np.degrees(
-                zigzag_overshoots(
-                    ship.fit, radians(-angle), execute, speed=SPEEDS[angle], **STEERING
-                )
-            )
-            for ship in ships.values()
+            delay + np.degrees(zigzag_overshoots(ship.fit, zigzag)) for ship in ships.values()
         ]
         for k, name in enumerate(("first", "second")):
             cells = [

@@ -11,7 +11,7 @@ from shiplog.errors import LogError
 from shiplog.files import atomic_write
 from shiplog.types import TrialLog
 
-from .long_form import COLUMNS, assemble, field_names, header_lines
+from .long_form import COLUMNS, LongColumns, assemble, field_names, header_lines
 
 CSV_MARK = "# shiplog csv 1"  # first line
 CSV_END = "# end"  # last line; without it the file was cut off
@@ -56,7 +56,7 @@ def read_csv(path: str | os.PathLike[str]) -> TrialLog:
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
             header = _csv_header(path, stream)
-            return assemble(path.name, header, *_csv_rows(path, stream, len(header) + 2))
+            return assemble(path.name, header, _csv_rows(path, stream, len(header) + 2))
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise LogError(f"cannot read: {reason}: {path}") from error
@@ -81,7 +81,7 @@ def _csv_header(path: Path, stream: IO[str]) -> list[str]:
     return header
 
 
-def _csv_rows(path: Path, stream: IO[str], before: int) -> tuple[Any, ...]:
+def _csv_rows(path: Path, stream: IO[str], before: int) -> LongColumns:
     """Read the five columns of the samples; `before` is the number of lines above them."""
     rows: tuple[list[Any], ...] = ([], [], [], [], [])
     topics, fields, measured, received, values = rows
@@ -101,7 +101,8 @@ def _csv_rows(path: Path, stream: IO[str], before: int) -> tuple[Any, ...]:
             values.append(float(text or "nan"))
         if not ended:
             raise LogError(f"cut off, the last line is not {CSV_END!r}; copy it again: {path}")
-        return (topics, fields, *(np.array(c, np.int64) for c in rows[2:4]), np.array(values))
+        measured_ns, received_ns = (np.array(c, np.int64) for c in (measured, received))
+        return LongColumns(topics, fields, measured_ns, received_ns, np.array(values))
     except OverflowError:
         raise LogError(f"a time needs more than 64 bits; convert the log again: {path}") from None
     except (ValueError, csv.Error) as error:

@@ -7,7 +7,7 @@ file in the metadata of its schema.
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +26,27 @@ HEADER_KEY = "shiplog"  # of the header in a frame's attrs and in the metadata o
 
 Codes = NDArray[np.int32]
 Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class LongColumns:
+    """The columns of n rows, in the order of `COLUMNS`.
+
+    Attributes
+    ----------
+    topics, fields
+        Topic and component of each row.
+    measured_ns, received_ns
+        (n,) times, ns since 1970-01-01 UTC.
+    values
+        (n,) values, in the units of the channels.
+    """
+
+    topics: Iterable[str]
+    fields: Iterable[str]
+    measured_ns: TimeArray
+    received_ns: TimeArray
+    values: FloatArray
 
 
 def to_frame(log: TrialLog) -> "pd.DataFrame":
@@ -84,8 +105,8 @@ def from_frame(frame: "pd.DataFrame", name: str = "frame") -> TrialLog:
             f"the attrs of the frame have no {HEADER_KEY!r} with the units of the channels; "
             f"make it with to_frame and keep the attrs: {name}"
         )
-    columns = [frame[column].to_numpy() for column in COLUMNS]
-    return assemble(name, str(frame.attrs[HEADER_KEY]).split("\n"), *columns)
+    columns = LongColumns(*(frame[column].to_numpy() for column in COLUMNS))
+    return assemble(name, str(frame.attrs[HEADER_KEY]).split("\n"), columns)
 
 
 def field_names(channel: Channel) -> tuple[str, ...]:
@@ -170,15 +191,7 @@ def _json(value: object) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def assemble(
-    name: str,
-    header: list[str],
-    topics: Iterable[str],
-    fields: Iterable[str],
-    measured_ns: TimeArray,
-    received_ns: TimeArray,
-    values: FloatArray,
-) -> TrialLog:
+def assemble(name: str, header: list[str], columns: LongColumns) -> TrialLog:
     """Assemble a trial from its header and its rows.
 
     Parameters
@@ -187,12 +200,8 @@ def assemble(
         Name of the trial, also for error messages.
     header
         Lines of `header_lines`.
-    topics, fields
-        Topic and component of each row.
-    measured_ns, received_ns
-        (n,) times.
-    values
-        (n,) values.
+    columns
+        The rows, of all channels.
 
     Raises
     ------
@@ -202,10 +211,11 @@ def assemble(
     outline = _read_header(name, header)
     empty = outline.channels
     place = {(c.topic, field): i for i, (c, field) in enumerate(_components(empty))}
-    labels = zip(topics, fields, strict=True)
-    of_row = np.fromiter((place.get(label, -1) for label in labels), np.int32, len(values))
+    labels = zip(columns.topics, columns.fields, strict=True)
+    of_row = np.fromiter((place.get(label, -1) for label in labels), np.int32, len(columns.values))
     if np.any(of_row < 0):
-        topic, field = list(zip(topics, fields, strict=True))[int(np.argmin(of_row))]
+        labels = zip(columns.topics, columns.fields, strict=True)
+        topic, field = list(labels)[int(np.argmin(of_row))]
         raise LogError(
             f"the header has no channel {topic!r} with a field {field!r}"
             f"{did_you_mean(topic, [t for t, _ in place])}; convert the log again: {name}"
@@ -214,7 +224,7 @@ def assemble(
     channels = []
     for channel in empty:
         channel_rows = [next(rows) for _ in field_names(channel)]
-        channels.append(_filled(name, channel, channel_rows, measured_ns, received_ns, values))
+        channels.append(_filled(name, channel, channel_rows, columns))
     return replace(outline, channels=tuple(channels))
 
 
@@ -259,29 +269,22 @@ def _empty_channel(
     return Channel(name, source, unit, empty, empty, values, tuple(fields), metadata)
 
 
-def _filled(
-    name: str,
-    channel: Channel,
-    rows: list[Rows],
-    measured_ns: TimeArray,
-    received_ns: TimeArray,
-    values: FloatArray,
-) -> Channel:
+def _filled(name: str, channel: Channel, rows: list[Rows], columns: LongColumns) -> Channel:
     """Fill a channel with samples; `rows` has the indices of the rows of each component."""
     first = rows[0]
     for field, field_rows in zip(field_names(channel), rows, strict=True):
         paired = len(field_rows) == len(first) and all(
             np.array_equal(stamps[field_rows], stamps[first])
-            for stamps in (measured_ns, received_ns)
+            for stamps in (columns.measured_ns, columns.received_ns)
         )
         if not paired:
             raise LogError(
                 f"{channel.topic}: the rows of its field {field!r} do not match those of "
                 f"{field_names(channel)[0]!r}; keep or drop all rows of an instant together: {name}"
             )
-    stamps = measured_ns[first], received_ns[first]
+    stamps = columns.measured_ns[first], columns.received_ns[first]
     if len(first) and min(int(s.min()) for s in stamps) < 0:
         raise LogError(f"{channel.topic} has times before 1970; correct its clock: {name}")
-    columns = [values[field_rows] for field_rows in rows]
-    together = np.stack(columns, axis=1) if channel.fields else columns[0]
+    values = [columns.values[field_rows] for field_rows in rows]
+    together = np.stack(values, axis=1) if channel.fields else values[0]
     return replace(channel, measured_ns=stamps[0], received_ns=stamps[1], values=together)

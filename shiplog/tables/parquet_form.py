@@ -7,7 +7,15 @@ from shiplog.errors import LogError
 from shiplog.files import atomic_write
 from shiplog.types import TrialLog
 
-from .long_form import COLUMNS, HEADER_KEY, assemble, header_lines, long_columns, row_labels
+from .long_form import (
+    COLUMNS,
+    HEADER_KEY,
+    LongColumns,
+    assemble,
+    header_lines,
+    long_columns,
+    row_labels,
+)
 
 
 def write_parquet(log: TrialLog, path: str | os.PathLike[str]) -> None:
@@ -57,11 +65,11 @@ def read_parquet(path: str | os.PathLike[str]) -> TrialLog:
                     f"a Parquet file, but not of shiplog; convert a log to Parquet: {path}"
                 )
             table = file.read(columns=list(COLUMNS))
-            columns = [table.column(name).to_numpy() for name in COLUMNS]
+            columns = LongColumns(*(table.column(name).to_numpy() for name in COLUMNS))
     except OSError as error:
         raise LogError(f"cannot read: {str(error).lower()}: {path}") from error
     except (pa.ArrowException, KeyError) as error:
         raise LogError(
             f"a damaged Parquet file ({error}); convert the log again: {path}"
         ) from error
-    return assemble(path.name, header.decode().split("\n"), *columns)
+    return assemble(path.name, header.decode().split("\n"), columns)
