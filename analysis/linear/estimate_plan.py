@@ -6,6 +6,7 @@ import numpy as np
 
 from analysis.replay.passes import resampled_chunks
 from analysis.replay.reading_options import ReadingOptions
+from analysis.signals.moments import Moments
 from shiplog.errors import LogError, UsageError
 from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, choose_clock
@@ -56,7 +57,7 @@ class EstimatePlan:
     start
         First values and rms values of the outputs.
     model, design
-        The joined system and the gain; of a varying plant those of the start.
+        The joined system and the gain; of a varying plant those at the rms values of its schedule.
     feedback
         The regulator; None where the system has none.
     quantities
@@ -137,7 +138,8 @@ def plan_estimate(
     bound = bind_signals(system.bindings, stats)
     m, r = len(system.outputs), len(system.inputs)
     outputs = tuple(_with_stride(signal, clock) for signal in bound[:m])
-    collected = _output_stats(screened, clock, outputs, on_progress)
+    schedule = bound[m + r :]
+    collected, typical = _signal_sizes(screened, clock, outputs, schedule, on_progress)
     stds, measured = _noise(outputs, collected, clock)
     intervals = np.array([_interval(each, clock) for each in outputs])
     start = StartSignals(
@@ -145,13 +147,14 @@ def plan_estimate(
         np.sqrt([each.moments.mean_square for each in collected]),
     )
     sampling = OutputSampling(stds**2, intervals, clock.dt_secs)
-    require_distinguishable(system, estimator_model(system, sampling))
+    there = system.linearised_at(typical)
+    require_distinguishable(system, estimator_model(system, sampling, there), there)
     _require_method(system, smooth=smooth)
     fitted: tuple[FittedParameter, ...] = ()
     if any(noise.fit for noise in system.shaped):
         signals = _fit_signals(screened, clock, outputs, bound[m : m + r], start, on_progress)
         system, fitted = fit_spectra(system, sampling, signals, log.name)
-    model = estimator_model(system, sampling)
+    model = estimator_model(system, sampling, there)
     design = system.method.design(model)
     return EstimatePlan(
         name=log.name,
@@ -160,7 +163,7 @@ def plan_estimate(
         clock=clock,
         outputs=outputs,
         inputs=bound[m : m + r],
-        schedule=bound[m + r :],
+        schedule=schedule,
         stds=stds,
         measured=measured,
         start=start,
@@ -232,13 +235,21 @@ def _interval(output: BoundSignal, clock: Clock) -> float:
     return max(0.0 if channel.hold else channel.interval_secs, clock.dt_secs)
 
 
-def _output_stats(
-    log: ScreenedLog, clock: Clock, outputs: tuple[BoundSignal, ...], on_progress: ProgressCallback
-) -> tuple[OutputStats, ...]:
+def _signal_sizes(
+    log: ScreenedLog,
+    clock: Clock,
+    outputs: tuple[BoundSignal, ...],
+    schedule: tuple[BoundSignal, ...],
+    on_progress: ProgressCallback,
+) -> tuple[tuple[OutputStats, ...], FloatArray]:
+    """Return the statistics of the outputs, and the rms values (s,) of the scheduling signals."""
     collected = tuple(OutputStats() for _ in outputs)
+    moments = tuple(Moments() for _ in schedule)
     for signals in resampled_chunks(log, clock, on_progress, "resample"):
         for output, stats in zip(outputs, collected, strict=True):
             stats.add(output.measured(signals))
+        for signal, each in zip(schedule, moments, strict=True):
+            each.add(signal.values(signals))
     for output, stats in zip(outputs, collected, strict=True):
         if stats.moments.count < MIN_MEASUREMENTS:
             raise LogError(
@@ -246,7 +257,7 @@ def _output_stats(
                 f" other channels have some, too, but {MIN_MEASUREMENTS} are needed; check the"
                 f" recorder or choose another log: {log.name}"
             )
-    return collected
+    return collected, np.sqrt([each.mean_square for each in moments])
 
 
 def _noise(

@@ -87,11 +87,17 @@ def design_feedback(
     UsageError
         There is no stabilising regulator; the message names the mode.
     """
-    weights, plant = system.regulator, system.plant
+    weights, n = system.regulator, model.size
     if weights is None:
         return None
     regulator = cycle_regulator(
-        plant.A, plant.B, weights.P, weights.R, weights.cycles, G=weights.G, shift=weights.shift
+        model.A[:n, :n],
+        model.B[:n],
+        weights.P,
+        weights.R,
+        weights.cycles,
+        G=weights.G,
+        shift=weights.shift,
     )[-1]
     is_stationary = not system.disturbances and design.gain is not None
     predicted = MeanCost(np.nan, np.nan)

@@ -131,15 +131,22 @@ def state_names(system: LinearSystem) -> tuple[str, ...]:
     return (*augmented.states, *shaped)
 
 
-def require_distinguishable(system: LinearSystem, model: EstimatorModel) -> None:
-    """Refuse disturbances and states that the outputs cannot tell apart and that do not decay.
+def require_distinguishable(system: LinearSystem, model: EstimatorModel, at: Linearisation) -> None:
+    """Refuse disturbances and states that the outputs cannot separate and that do not decay.
+
+    Parameters
+    ----------
+    system, model
+        The system, and the model joined from it.
+    at
+        The plant for which the model was joined.
 
     Raises
     ------
     UsageError
         The message names the mode, what takes part in it, and the measurement that resolves it.
     """
-    augmented = _with_disturbances(system, system.start())
+    augmented = _with_disturbances(system, at)
     limit = AXIS_TOLERANCE * float(np.linalg.norm(augmented.A))
     unresolved = [each for each in system_ambiguities(augmented) if each.mode.real >= -limit]
     if unresolved:

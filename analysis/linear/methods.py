@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_discrete_lyapunov
 
 from analysis.design.augmentation import Plant
 from analysis.design.cascade import cascade
 from analysis.design.discrete_correction import matched_correction, optimal_correction
 from analysis.design.exosystem import disturbance_observer
+from analysis.design.noise_placement import place_for_noise
 from analysis.design.observability import ComplexArray
 from analysis.design.placement import place_multilevel
 from analysis.design.quality import (
@@ -199,6 +200,8 @@ class CascadeMethod:
 class PlacedMethod:
     """An observer with placed poles, each channel by itself.
 
+    What the poles leave free in a channel of several outputs is used to keep the noise low.
+
     Attributes
     ----------
     spectrum
@@ -226,14 +229,18 @@ class PlacedMethod:
             self.spectrum,
             frequency=self.frequency,
         )
-        M, first = np.zeros((N, m)), 0
+        L, M, first, remarks = np.zeros((N, m)), np.zeros((N, m)), 0, []
         for states in map(np.array, observer.channels):
             sensors = np.flatnonzero(model.C[:, states].any(axis=1))
+            own, gain = np.ix_(states, states), np.ix_(states, sensors)
             poles = observer.poles[first : first + len(states)]
-            F, C = model.step.F[np.ix_(states, states)], model.C[np.ix_(sensors, states)]
-            M[np.ix_(states, sensors)] = _sampled(F, C, poles, model.dt)
+            C, R = model.C[np.ix_(sensors, states)], np.diag(np.diag(model.R)[sensors])
+            placed = place_for_noise(model.A[own], C, poles, model.W[own], R)
+            L[gain] = placed.gain
+            M[gain] = _sampled_for_noise(model, own, C, poles, model.r[sensors])
             first += len(states)
-        return EstimatorDesign(observer.L, M, observer.poles)
+            remarks.append(f"{placed.summary} at these poles")
+        return EstimatorDesign(L, M, observer.poles, remarks=tuple(remarks))
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,6 +295,26 @@ class TickMethod:
             F[np.ix_(others, others)], F[np.ix_(measured, others)], np.exp(self.poles * model.dt)
         )
         return EstimatorDesign(L, M, self.poles)
+
+
+def _sampled_for_noise(
+    model: EstimatorModel,
+    own: tuple[NDArray[np.intp], ...],
+    C: FloatArray,
+    poles: ComplexArray,
+    r: FloatArray,
+) -> FloatArray:
+    """Compute the correction (n, m) with the poles exp(s dt) that keeps the noise low.
+
+    The bilinear transform X = (F_L - I) (F_L + I)⁻¹ of F_L = F - K C, K being the gain of the
+    predictor, is X = A - L C of a continuous pair, in which L is placed; M = F⁻¹ K.
+    """
+    F, one = model.step.F[own], np.eye(len(C.T))
+    inverse, z = np.linalg.inv(F + one), np.exp(poles * model.dt)
+    A, S = (F - one) @ inverse, C @ inverse
+    L = place_for_noise(A, S, (z - 1) / (z + 1), model.step.Q[own] / 2, np.diag(r) / 2).gain / 2
+    M: FloatArray = np.linalg.solve(F, (F + one) @ np.linalg.solve(one + L @ C, L))
+    return M
 
 
 def _stage_covariance(

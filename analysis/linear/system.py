@@ -186,3 +186,9 @@ class LinearSystem:
     def start(self) -> Linearisation:
         """Return the plant's own A and B, with b = 0."""
         return Linearisation(self.plant.A, self.plant.B, np.zeros(len(self.plant.A)))
+
+    def linearised_at(self, schedule: FloatArray) -> Linearisation:
+        """Return the plant at scheduling signals (s,), its state being zero."""
+        if self.linearise is None:
+            return self.start()
+        return self.linearise(np.zeros(len(self.plant.A)), schedule)

@@ -10,7 +10,7 @@ from scipy.signal import tf2ss
 from analysis.design.augmentation import Exosystem, Plant
 from analysis.design.shaping import TransferFunction
 from shiplog.errors import SystemFileError, UsageError
-from shiplog.toml_text import list_errors, parse_toml
+from shiplog.toml_text import list_errors, parse_toml, read_toml_text
 from shiplog.types import FloatArray
 from shiplog.units import UNITS, did_you_mean
 
@@ -33,14 +33,7 @@ def load_system(path: str | os.PathLike[str]) -> LinearSystem:
     SystemFileError
         The file cannot be read or has errors; the message lists all of them.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise SystemFileError(
-            f"cannot read the system file ({reason}); name another: {path}"
-        ) from error
-    return parse_system(text, os.fspath(path))
+    return parse_system(read_toml_text(path, KIND, SystemFileError), os.fspath(path))
 
 
 def parse_system(text: str, where: str) -> LinearSystem:

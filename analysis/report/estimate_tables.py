@@ -127,7 +127,7 @@ def _method_remarks(findings: EstimateFindings) -> Iterator[str]:
     yield f"Method: {kind}{smoothed}, of order {size}; a step of {dt:g} s."
     if plan.system.linearise is not None:
         along = ", ".join(signal.binding.channel for signal in plan.schedule) or "the estimate"
-        yield f"The plant is linearised along {along}; poles and gain are those of the start."
+        yield f"The plant is linearised along {along}; poles and gain are those at its rms values."
 
 
 def _gain_table(

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 from gaussian import LinearRun, held
 from linear_logs import DT, log_of, response
+from scipy.linalg import block_diag
 from trial_logs import InChunks
 
 from analysis.linear.estimate import estimate
@@ -172,3 +173,134 @@ def test_smoothing_a_constant_gain_is_refused() -> None:
     text = SYSTEM + '[method]\nname = "luenberger"\nfrequency = 1.0\n'
     with pytest.raises(UsageError, match="'luenberger' cannot be smoothed"):
         estimate(trial(u, measured), parse_system(text, "roll.toml"), smoothed=True)
+
+
+def test_disturbance_and_coloured_noise_are_the_conditional_mean_of_the_joint_system() -> None:
+    """The joint system is written out here, with the start of the shaping filter stationary."""
+    rng, count, T, std = np.random.default_rng(4), 50, 2.0, 0.05
+    joint = np.zeros((4, 4))
+    joint[:2, :2], joint[0, 2], joint[0, 3], joint[3, 3] = A, 1.0, 0.7, -1 / T
+    joint[2, 2] = -0.02  # an exponential disturbance on the rate
+    W = np.diag([1e-3, 0.0, 1e-5, 2 * std**2 / T])
+    F, Q = held(joint, W, DT)
+    P = block_diag(P0, 0.1**2, std**2)
+    u = np.zeros((count, 1))
+    C, r = np.eye(2, 4), np.array([0.02, 0.01]) ** 2
+    C[1, 2] = 0.5  # the disturbance acts on the second sensor, too
+    run = LinearRun(response(joint, np.eye(4, 1), u, np.array([*X0, 0.2, 0.0])), F, Q, P, C, r)
+    measured = run.drawn(rng)[1]
+    text = SYSTEM.replace("roll = -0.05 }", "roll = -0.05, swell = 0.2 }").replace(
+        "roll = 0.1 }", "roll = 0.1, swell = 0.1 }"
+    )
+    text += """
+    [[disturbance]]
+    name = "swell"
+    model = "exponential"
+    rate = -0.02
+    on_state = { roll_rate = 1.0 }
+    on_sensor = { roll = 0.5 }
+    intensity = 1e-5
+    [[coloured]]
+    name = "gust"
+    spectrum = "first-order"
+    std = 0.05
+    time = 2.0
+    on_state = { roll_rate = 0.7 }
+    """
+    found = estimate(trial(u, measured), parse_system(text, "roll.toml"))
+    states, covariances = run.filtered(measured)
+    stds = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    assert found.chunk.values[:, :3] == pytest.approx(states[:, :3], rel=1e-8, abs=1e-9)
+    assert found["gust"] == pytest.approx(states[:, 3], rel=1e-8, abs=1e-9)
+    assert found.chunk.stds == pytest.approx(stds, rel=1e-7)
+
+
+def test_a_transfer_function_responds_as_that_of_the_control_library() -> None:
+    at = DT * np.arange(300)
+    u = np.sin(0.4 * at)
+    _, y = control.forced_response(control.tf([2.0, 1.0], [1.0, 0.6, 0.5]), at, u)
+    text = """
+    [plant]
+    num = [2.0, 1.0]
+    den = [1.0, 0.6, 0.5]
+    [inputs.u]
+    channel = "rudder"
+    [outputs.y]
+    channel = "heel"
+    std = 1e-3
+    [initial]
+    state = { x1 = 0, x2 = 0 }
+    std = { x1 = 0, x2 = 0 }
+    """
+    found = estimate(log_of(rudder=u, heel=y), parse_system(text, "tf.toml"))
+    assert found.chunk.predicted[:, 0] == pytest.approx(y, abs=1e-9)
+
+
+def test_a_slow_heading_counts_once_per_sample_between_which_it_is_interpolated() -> None:
+    at = DT * np.arange(600)
+    heading = np.where(np.arange(600) % 10 == 0, 0.01 * at, np.nan)
+    text = """
+    [plant]
+    model = "yaw"
+    T = 20
+    K = 0.1
+    heading = true
+    [outputs.heading]
+    std = 0.01
+    [outputs.yaw_rate]
+    std = 0.001
+    [noise]
+    process = { yaw_rate = 1e-6 }
+    """
+    log = log_of(heading=heading, yaw_rate=np.full(600, 0.01))
+    found = estimate(log, parse_system(text, "yaw.toml"))
+    assert found.findings.plan.clock.dt_secs == pytest.approx(DT)
+    assert found.findings.residuals[0].count == 60
+    assert found.findings.residuals[1].count in (591, 600)
+
+
+def test_samples_averaged_within_a_step_have_the_noise_of_their_mean() -> None:
+    rng = np.random.default_rng(0)
+    text = """
+    step_secs = 1.0
+    [plant]
+    A = [[0.0]]
+    states = { drift = "m/s" }
+    [outputs.drift]
+    channel = "sway"
+    std = 0.1
+    [noise]
+    process = { drift = 1e-4 }
+    """
+    log = log_of(sway=0.1 * rng.standard_normal(8000))
+    found = estimate(log, parse_system(text, "drift.toml"))
+    assert found.findings.plan.stds == pytest.approx([0.1 / np.sqrt(10)])
+    mean, _ = found.findings.residuals[0].mean_nis, None
+    assert mean == pytest.approx(1, abs=0.2)
+
+
+def test_an_input_that_stops_is_held_with_a_warning_that_states_for_how_long() -> None:
+    u, _, measured = record(300)
+    u = u.copy()
+    u[100:200] = np.nan
+    found = estimate(trial(u, measured), parse_system(SYSTEM, "roll.toml"))
+    (warning,) = [text for text in found.findings.warnings if text.startswith("moment")]
+    assert "held at its last value" in warning
+
+
+def test_a_state_that_the_outputs_do_not_show_needs_a_stated_start() -> None:
+    u, _, measured = record()
+    text = SYSTEM[: SYSTEM.index("[initial]")].replace(
+        "[[-0.3, -0.8], [1.0, 0.0]]", "[[-0.3, 0], [0, -1]]"
+    )
+    text = text.replace('[outputs.roll]\nchannel = "heel"\nstd = 0.01\n', "")
+    with pytest.raises(UsageError, match=r"initial value of 'roll'; state initial\.std of it"):
+        estimate(trial(u, measured), parse_system(text, "roll.toml"))
+
+
+def test_a_channel_with_too_few_samples_is_refused_by_name() -> None:
+    u, _, measured = record()
+    measured = measured.copy()
+    measured[3:, 1] = np.nan
+    with pytest.raises(LogError, match=r"channel 'heel' has \d samples"):
+        estimate(trial(u, measured), parse_system(SYSTEM, "roll.toml"))

@@ -8,12 +8,17 @@ from channels import channel
 from example_scripts import example_script
 from linear_logs import DT, log_of
 from places import SAMPLE_DATA
-from trial_logs import InChunks
+from trial_logs import InChunks, as_log
 
 from analysis.linear.estimate import SystemEstimate, estimate
 from analysis.linear.joined_system import OutputSampling, estimator_model
 from analysis.linear.system_file import parse_system
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import simulate
+from recorders.simulated.trajectory import Gust
 from shiplog import TrialLog, UsageError, read
+from shiplog.ships.paper import rudder_effect
+from shiplog.vessel.vessel_parser import load_vessel
 
 LOG = SAMPLE_DATA / "zigzag_20_20.mcap"
 YAW = """
@@ -134,3 +139,28 @@ def test_estimates_begin_where_the_inputs_are_known() -> None:
     found = estimate(TrialLog("late.mcap", (rate, rudder)), parse_system(text, "yaw.toml"))
     assert np.isfinite(found["yaw_rate"]).all()
     assert len(found["yaw_rate"]) == 100
+
+
+def test_a_gust_on_the_ship_is_found_along_its_trajectory() -> None:
+    vessel, _ = load_vessel("table1")
+    trial = simulate(
+        vessel, "zigzag-20-20", duration_secs=500, seed=1, sensors=suite("white"),
+        gusts=(Gust(np.radians(2), 200.0),),
+    )  # fmt: skip
+    text = (
+        YAW
+        + """
+    [[disturbance]]
+    name = "gust"
+    unit = "rad/s3"
+    model = "constant"
+    on_state = { yaw_acceleration_rest = 1.0 }
+    intensity = 1e-16
+    """
+    )
+    found = estimate(as_log(trial), parse_system("tick_secs = 0.5\n" + text, "yaw.toml"))
+    c = vessel.paper_coefficients
+    approach = np.sqrt(-c.h * 80 / c.g)  # the speed straight ahead at 80 rpm
+    moment = c.d * rudder_effect(c, approach, 80.0) * np.radians(2)
+    assert np.mean(found["gust"][1000:2000]) / moment == pytest.approx(0, abs=0.1)
+    assert np.mean(found["gust"][3500:]) / moment == pytest.approx(1, abs=0.05)
