@@ -19,7 +19,6 @@ from marlin.envelope import EnvelopeError, parse
 from recorders.streams.packets import END_NS, MAX_PACKET_BYTES
 
 DATAGRAM_HEADER = b"UdPbC\0"
-_WHOLE = re.compile(rb"[$!][^$!\\\r\n]*\*[0-9A-Fa-f]{2}")  # the usual packet: one sentence
 _PIECE = re.compile(rb"(?:\\[^\\]*\\)?[$!][^$!\\]*|[^$!]+")  # a sentence with its TAG block
 _TAG_PARAMETER = re.compile(r"([a-z]):([ -~]+)")
 _SOURCE = re.compile(r"[A-Za-z0-9_-]{1,15}")
@@ -34,6 +33,10 @@ _REASONS = {
     "invalid_utf8_in_sentence_type": "characters that are not printable",
 }
 """The reasons for which marlin rejects a sentence; the others concern the address."""
+
+
+is_sentence = re.compile(rb"[$!][^$!\\\r\n]*\*[0-9A-Fa-f]{2}").fullmatch
+"""Whether a packet is one sentence and nothing else, as most are: it needs no `split_packet`."""
 
 
 class FramingError(Exception):
@@ -91,8 +94,6 @@ def split_packet(data: bytes) -> list[bytes]:
 
     A line into which another sentence was cut is returned in parts, of which the last may be whole.
     """
-    if _WHOLE.fullmatch(data):
-        return [data]
     data = data.removeprefix(DATAGRAM_HEADER).strip(b"\r\n\0 \t")
     lines = data.splitlines() if b"\n" in data or b"\r" in data else [data]
     if len(lines) == 1 and data.count(b"$") + data.count(b"!") == 1:

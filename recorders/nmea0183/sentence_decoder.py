@@ -7,19 +7,26 @@ from math import isnan
 from typing import NamedTuple
 
 from recorders.streams.counts import MAX_KINDS, StreamCounts
-from recorders.streams.gnss_clock import GnssClock
+from recorders.streams.gnss_clock import GnssClock, Utc
 from recorders.streams.packets import Packet
 from recorders.streams.sample_buffer import MAX_TOPICS, SampleBuffer
 
 from .environment_sentences import ENVIRONMENT
-from .framing import FramingError, Sentence, TagBlock, parse_sentence, split_packet, tag_of
+from .framing import (
+    FramingError,
+    TagBlock,
+    is_sentence,
+    parse_sentence,
+    split_packet,
+    tag_of,
+)
 from .navigation_sentences import NAVIGATION
 from .sentence_values import Fields, Values
 from .steering_sentences import STEERING
 from .tag_groups import TagGroups
 from .transducer_sentences import TRANSDUCERS, MotionUnit
 from .twin_devices import CHECKED, TwinDevices
-from .utc_fields import TIMED, utc_of
+from .utc_fields import UTC_READERS
 
 FieldDecoder = Callable[[Fields], Values]
 _USUAL_TIME = "ZDA"  # other sentences' times of a talker have a source of their own
@@ -55,13 +62,13 @@ class _Kind(NamedTuple):
         The name under which they are counted.
     decode
         Decodes their fields; None where they are not decoded.
-    is_timed
-        Whether they bear a time.
+    read_utc
+        Reads the time in them; None where they bear none.
     """
 
     name: str
     decode: FieldDecoder | None
-    is_timed: bool
+    read_utc: Callable[[Fields], Utc | None] | None
 
 
 class SentenceDecoder:
@@ -110,6 +117,9 @@ class SentenceDecoder:
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
         """Decode a batch of lines or datagrams."""
         for data, received_ns, _ in batch:
+            if is_sentence(data):
+                self._decode_line(data, received_ns, samples)
+                continue
             for line in split_packet(data) or [b""]:  # an empty datagram is counted
                 self._decode_line(line, received_ns, samples)
 
@@ -123,26 +133,27 @@ class SentenceDecoder:
 
     def _decode_line(self, line: bytes, received_ns: int, samples: SampleBuffer) -> None:
         try:
-            sentence = parse_sentence(line, require_checksum=self._options.require_checksum)
+            talker, formatter, fields, tag = parse_sentence(
+                line, require_checksum=self._options.require_checksum
+            )
         except FramingError as error:
             self.counts.reject(str(error))
             self._count_lost_lines(tag_of(line))
             return
-        talker, formatter, fields, tag = sentence
         if tag.group is not None:
             tag = self._groups.complete(tag)
         kind = self._kind(talker, formatter)
         if tag.line is not None:
             self._count_lost_lines(tag)
-        if kind.decode is None and not kind.is_timed:
+        if kind.decode is None and kind.read_utc is None:
             self.counts.skip(kind.name)
             return
         source = f"{tag.source}.{talker}" if tag.source else talker
         time_ns = None
         try:
             values = kind.decode(fields) if kind.decode else ()
-            if kind.is_timed:
-                time_ns = self._gnss_time_ns(source, sentence, received_ns, samples)
+            if kind.read_utc is not None and (utc := kind.read_utc(fields)) is not None:
+                time_ns = self._set_time((source, formatter), utc, received_ns, samples)
         except ValueError:
             self.counts.reject(f"malformed field of {formatter}")
             return
@@ -160,16 +171,17 @@ class SentenceDecoder:
         """Return how sentences with this address are decoded."""
         name = talker if talker == formatter else talker + formatter
         decode = self._decoders.get(name) or self._decoders.get(formatter)
-        return _Kind(name, decode, formatter in TIMED)
+        return _Kind(name, decode, UTC_READERS.get(formatter))
 
-    def _gnss_time_ns(
-        self, source: str, sentence: Sentence, received_ns: int, samples: SampleBuffer
+    def _set_time(
+        self,
+        source_and_formatter: tuple[str, str],
+        utc: Utc,
+        received_ns: int,
+        samples: SampleBuffer,
     ) -> int | None:
         """Return the time in a sentence, ns; one with a date is a sample of ``gnss_time``."""
-        formatter = sentence.formatter
-        utc = utc_of(formatter, sentence.fields)
-        if utc is None:
-            return None
+        source, formatter = source_and_formatter
         time_ns = self._clock.set_time(source, formatter, utc, received_ns)
         if time_ns is not None and utc.day is not None:
             name = source if formatter == _USUAL_TIME else f"{source}.{formatter}"

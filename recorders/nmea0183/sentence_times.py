@@ -11,13 +11,13 @@ from shiplog.errors import LogError, UsageError
 from shiplog.tables.printed_times import DAY_NS
 
 from .framing import FramingError, Sentence, parse_sentence, split_packet
-from .utc_fields import TIMED, utc_of
+from .utc_fields import UTC_READERS, utc_of
 
 MAX_HELD = 200_000  # lines that wait for the next time
 _GAP_RATIO, _MIN_GAP_NS = 10, 5 * 10**9  # longer between two times than usual: lines are missing
 _MAX_BACK = 10  # times that run backwards one after the other: then the receiver's clock was set
 _SECOND_NS = 10**9
-_TIMED_LINE = re.compile("|".join(sorted(TIMED)).encode())
+_TIMED_LINE = re.compile("|".join(sorted(UTC_READERS)).encode())
 _REMEDY = "state the time between its lines with --interval (in s), or record it with time stamps"
 
 

@@ -29,7 +29,7 @@ def utc_of(formatter: str, fields: Fields) -> Utc | None:
     >>> utc_of("ZDA", (b"000000.17", b"01", b"08", b"2014"))
     Utc(clock_ns=170000000, day=16283)
     """
-    reader = _READERS.get(formatter)
+    reader = UTC_READERS.get(formatter)
     return None if reader is None else reader(fields)
 
 
@@ -81,12 +81,11 @@ def _zda(fields: Fields) -> Utc | None:
     return Utc(clock_ns, _days(day, month, year) if day and month and year else None)
 
 
-_READERS: dict[str, Callable[[Fields], Utc | None]] = {
+UTC_READERS: dict[str, Callable[[Fields], Utc | None]] = {
     "RMC": _rmc,
     "ZDA": _zda,
     "GGA": lambda f: _only_clock(text_at(f, 0), valid=has_fix(f)),
     "GNS": lambda f: _only_clock(text_at(f, 0), valid=has_mode(f)),
     "GLL": lambda f: _only_clock(text_at(f, 4), valid=is_valid(f, 5) and is_valid(f, 6, FIX_MODES)),
 }
-TIMED = frozenset(_READERS)
-"""The formatters of sentences that bear a time."""
+"""What reads the time in the fields of each of these sentences, by formatter; as `utc_of`."""

@@ -238,9 +238,9 @@ class GnssClock:
         if utc.day is None:
             return nearest_ns(utc.clock_ns, received_ns)
         utc_ns = utc.day * DAY_NS + utc.clock_ns
-        if abs(received_ns - utc_ns) < _MAX_DATE_ERROR_NS:
-            receiver.rollovers = 0
-            return utc_ns
+        usual_ns = utc_ns + receiver.rollovers * ROLLOVER_NS  # as the date before it
+        if abs(received_ns - usual_ns) < _MAX_DATE_ERROR_NS:
+            return usual_ns
         count = rollovers(utc_ns, received_ns)
         corrected_ns = utc_ns + count * ROLLOVER_NS
         if count and not receiver.rollovers:

@@ -14,6 +14,7 @@ from recorders.nmea0183.framing import (
     FramingError,
     TagBlock,
     checksum,
+    is_sentence,
     parse_sentence,
     split_packet,
 )
@@ -123,6 +124,13 @@ def test_a_datagram_holds_several_sentences_with_tag_blocks() -> None:
 def test_a_sentence_after_a_cut_one_in_the_same_line_is_saved() -> None:
     assert list(split_packet(b"$AGRSA,1.22," + HDT)) == [b"$AGRSA,1.22,", HDT]
     assert list(split_packet(b"x9$" + HDT)) == [b"x9", b"$", HDT]
+
+
+@given(st.sampled_from([HDT, b"!AIVDM,1*00", b"$HEHDT", b"\\s:a*00\\"]), st.binary(max_size=20))
+def test_a_packet_that_is_one_sentence_needs_no_division(begin: bytes, end: bytes) -> None:
+    for data in (begin + end, end + begin, begin[:-3] + end + begin[-3:]):
+        if is_sentence(data):
+            assert split_packet(data) == [data]
 
 
 @pytest.mark.parametrize("data", [b"", b"\0\0\0", b"\r\n", DATAGRAM_HEADER, b" \r\n\t"])
