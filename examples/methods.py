@@ -83,7 +83,7 @@ ADVICE = (
         "`--filter quality --set filter.shift=...`: faster, but noisier",
     ),
     (
-        "the same poles in every state of the ship",
+        "the same poles of yaw, and of surge, in every state of the ship",
         "`--filter per-tick`: for a ship nearly the same as `steady-state`",
     ),
     (

@@ -227,7 +227,8 @@ def tick_observer(
     """Build the per-tick observer of x' = rate(x, u), y = C x, with x (n,) and u (r,).
 
     It gains nothing where the gain hardly depends on the state, as for a ship: a constant gain is
-    as good there.
+    as good there. Where several measurements leave the gain free, it is that of `place_multilevel`,
+    not the one of the least noise, whose search takes too long for each tick.
 
     Parameters
     ----------

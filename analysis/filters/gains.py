@@ -146,6 +146,8 @@ def relinearised_gain(
     """Compute the gain (s,) of one output that places the poles for the motion of this instant.
 
     Ackermann's formula: each of yaw and surge has one output, so that the poles determine the gain.
+    Their coupling is neglected: hard over, the poles of both together deviate by up to a quarter.
+    Gains that place them exactly have the same noise or more (`docs/papers_per_tick_observer.md`).
 
     Parameters
     ----------

@@ -135,6 +135,25 @@ def test_yaw_with_moment_and_gyro_error_has_less_noise_than_the_gain_of_scipy() 
     assert result.kalman_ratio[:4].max() < 4
 
 
+def test_yaw_and_surge_of_a_ship_placed_together_have_the_noise_of_those_placed_apart() -> None:
+    """Hard over, with the noise and the poles of the steady-state filter of the sample data."""
+    A = np.array([[0, 1, 0], [-3.561e-3, -2.6667e-2, 9.131e-7], [-5.83, 0, -2.66e-3]])
+    C, poles = np.eye(3)[[0, 2]], np.array([-0.0133 - 0.0596j, -0.0133 + 0.0596j, -0.0063])
+    R = np.diag([1.04e-4, 0.113]) ** 2 * 0.1
+    W = np.diag([0, 6.25e-10 * R[0, 0], 2.5e-5 * R[1, 1]])
+    apart = np.zeros((3, 2))
+    apart[:2, :1] = place_multilevel(A[:2, :2], [[1, 0]], poles[:2])
+    apart[2, 1] = A[2, 2] + 0.0063
+    together = place_for_noise(A, C, poles, W, R)
+    assert polynomial_error(A - together.gain @ C, poles) < 1e-12
+    of_apart, of_plain = (
+        np.sqrt(np.diag(error_covariance(A, L, C, W, R)))
+        for L in (apart, place_multilevel(A, C, poles))
+    )
+    assert np.all(np.sqrt(np.diag(together.covariance)) < 1.1 * of_apart)
+    assert of_plain[0] > 170 * of_apart[0]
+
+
 def test_gyros_of_one_rate_are_weighted_by_their_noise() -> None:
     result = place_for_noise([[-0.05]], [[1], [1]], [-0.4], 0, np.diag([1.0, 4]))
     assert result.gain[:, 0] + result.gain[:, 1] == pytest.approx(0.35)

@@ -8,6 +8,7 @@ from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_ly
 
 from analysis.filters.gains import LinearAxis, linear_axes, relinearised_gain
 from analysis.filters.noise_model import NoiseModel, Wave
+from analysis.filters.ship_step import linearise
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import UsageError, Vessel
 from shiplog.compiled import compiled
@@ -249,6 +250,20 @@ def test_a_per_tick_gain_places_the_same_poles_whatever_the_motion(
     K = placed(J, between, np.eye(len(c))[2], among, dt, 1)
     assert (1 - K[2]) * np.exp(J[2, 2] * dt) == pytest.approx(among[2].real, rel=1e-12)
     assert not np.any(np.delete(K, 2))
+
+
+def test_hard_over_the_poles_of_yaw_and_surge_together_deviate_from_those_placed_apart(
+    vessel: Vessel,
+) -> None:
+    """As the page on the per-tick observer states, there in continuous time."""
+    J, dt, C = np.zeros((3, 3)), 0.1, np.eye(3)[[0, 2]]
+    hard_over = np.array([8.88e-3, 0, 4.43])  # a steady turn at 35° and 80 rpm
+    linearise.py_func(vessel.coefficients, hard_over, np.radians(35), 0.0, 80.0, J)
+    among = np.exp(np.array([-0.1, -0.1, -0.05]) * dt).astype(complex)
+    by_rate, by_speed = (placed(J, np.zeros((0, 0)), c, among, dt, k) for k, c in enumerate(C))
+    kept = (np.eye(3) - np.outer(by_speed, C[1])) @ (np.eye(3) - np.outer(by_rate, C[0]))
+    poles = np.log(np.linalg.eigvals(kept @ expm(J * dt)).astype(complex)).real / dt
+    assert np.sort(poles) == pytest.approx([-0.1095, -0.0882, -0.0523], abs=3e-4)
 
 
 @WAVES
