@@ -16,7 +16,7 @@ from pathlib import Path
 from shiplog.errors import ShiplogError
 from shiplog.files import is_device, write_error
 from shiplog.mcap.writer import LogWriter
-from shiplog.types import Channel
+from shiplog.types import Channel, Event
 
 from .source import Recordable, Source
 
@@ -205,6 +205,7 @@ class _RecordedPart:
         self._rotation = rotation or Rotation()
         self._overwrites = overwrites
         self._part = final if is_device(final) else final.with_name(final.name + _PART)
+        self._has_data = False  # samples or raw packets: a log of events alone is worth nothing
         self.topics = set[str]()
         self.samples = 0
 
@@ -221,7 +222,7 @@ class _RecordedPart:
         except KeyboardInterrupt:  # the file is complete
             end = _End.INTERRUPTED
         except ShiplogError as error:
-            if writer.messages:
+            if self._has_data:
                 message = f"{error}; the {writer.samples} samples until then are in {self._part}"
                 raise ShiplogError(message) from error
             if self._part != self._final:
@@ -265,6 +266,7 @@ class _RecordedPart:
     ) -> _End:
         opened = time.monotonic()
         for chunk in chunks:
+            self._has_data |= any(len(item) for item in chunk if not isinstance(item, Event))
             with _write_errors(), _uninterrupted():
                 writer.write(*chunk)
                 writer.flush()

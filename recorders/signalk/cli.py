@@ -33,6 +33,8 @@ def _make_decoder(options: argparse.Namespace) -> DeltaDecoder:
 def _open_file(batches: Batches, options: argparse.Namespace) -> OpenedFile:
     """Take the times of the lines from stamps before them, or else from the deltas."""
     head, batches = peek(batches, HEAD_LINES)
+    if not any(b"{" in packet.data for packet in head):
+        raise LogError(f"none of the first {len(head)} lines is a delta of Signal K, which is JSON")
     form = find_stamp_form(head)
     own_times = form is None
     decoder = DeltaDecoder(options.self, own_times=own_times, gnss_time=options.time == "gnss")

@@ -110,11 +110,6 @@ class LogWriter:
         """The number of samples written so far; raw packets and events are none."""
         return self._samples
 
-    @property
-    def messages(self) -> int:
-        """The number of samples, raw packets and events written so far."""
-        return sum(self._counts.values())
-
     def write(self, *items: Channel | RawPackets | Event) -> None:
         """Append samples, raw packets and events, interleaved in the order of reception.
 

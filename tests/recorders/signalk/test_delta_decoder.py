@@ -236,6 +236,11 @@ def test_a_file_without_times_is_refused() -> None:
         decode_file(SIGNALK, [line])
 
 
+def test_a_file_of_another_format_is_refused() -> None:
+    with pytest.raises(LogError, match="none of the first 2 lines is a delta of Signal K"):
+        decode_file(SIGNALK, [b"$HEHDT,218.53,T*12"] * 2)
+
+
 def test_names_of_sources_fit_a_topic() -> None:
     lines = [
         delta(("navigation.headingTrue", 1.0), source=source)

@@ -54,6 +54,15 @@ def test_a_file_without_any_sample_is_an_error_that_names_it(tmp_path: Path) -> 
         list(source.chunks())
 
 
+def test_a_file_without_any_sample_leaves_no_recording(tmp_path: Path) -> None:
+    """The next attempt, with the right format, finds nothing in its way."""
+    for _ in range(2):
+        source = open_streams([_request(_written(tmp_path / "a.txt", "x", "y"))], ReceptionClock())
+        with pytest.raises(LogError, match=r"no sample could be decoded from a\.txt"):
+            record(source, tmp_path / "log.mcap")
+    assert not list(tmp_path.glob("log*"))
+
+
 def test_a_file_without_any_sample_beside_another_is_a_warning(tmp_path: Path) -> None:
     good = _written(tmp_path / "good.txt", "rpm 60")
     bad = _written(tmp_path / "bad.txt", "x", "y")
