@@ -1,13 +1,12 @@
 """The plan of an estimation: all that must be known of a log before the estimator starts."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from analysis.replay.passes import resampled_chunks
 from analysis.replay.reading_options import ReadingOptions
-from analysis.signals.moments import Moments
-from shiplog.errors import LogError, UsageError
+from shiplog.errors import UsageError
 from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, choose_clock
 from shiplog.screening import ScreenedLog, Screening, screen_log, screen_without_delays
@@ -25,13 +24,17 @@ from .joined_system import (
     state_names,
 )
 from .methods import EstimatorDesign, KalmanMethod
+from .signal_sizes import (
+    measurement_interval,
+    measurement_noise,
+    signal_sizes,
+    with_stride,
+)
 from .spectrum_fit import MAX_FITTED, FitSignals, FittedParameter, fit_spectra
 from .system import LinearSystem
-from .system_signals import BoundSignal, HeldSignals, OutputStats, bind_signals, is_interpolated
+from .system_signals import BoundSignal, HeldSignals, bind_signals
 
-MIN_MEASUREMENTS = 4  # the noise is estimated from third differences
 SMOOTHED_OUTPUTS = 2  # at most, of the fixed-interval smoother
-MIN_STRIDE = 1.5  # steps between samples from which an interpolated output is thinned
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +140,12 @@ def plan_estimate(
     clock = choose_clock(screened, stats, step, channels=names)
     bound = bind_signals(system.bindings, stats)
     m, r = len(system.outputs), len(system.inputs)
-    outputs = tuple(_with_stride(signal, clock) for signal in bound[:m])
+    outputs = tuple(with_stride(signal, clock) for signal in bound[:m])
     schedule = bound[m + r :]
-    collected, typical = _signal_sizes(screened, clock, outputs, schedule, on_progress)
-    stds, measured = _noise(outputs, collected, clock)
-    intervals = np.array([_interval(each, clock) for each in outputs])
+    sizes = signal_sizes(screened, clock, outputs, bound[m:], on_progress)
+    collected, typical = sizes.outputs, sizes.rms[r:]
+    stds, measured = measurement_noise(outputs, collected, clock)
+    intervals = np.array([measurement_interval(each, clock) for each in outputs])
     start = StartSignals(
         np.array([each.first for each in collected]),
         np.sqrt([each.moments.mean_square for each in collected]),
@@ -192,13 +196,6 @@ def _step_secs(system: LinearSystem, log: ScreenedLog) -> float | None:
     return min(intervals) if is_optimal else max(intervals)
 
 
-def _with_stride(signal: BoundSignal, clock: Clock) -> BoundSignal:
-    channel = clock.channels[signal.binding.channel]
-    ratio = channel.interval_secs / clock.dt_secs
-    thinned = is_interpolated(channel) and not channel.hold and ratio > MIN_STRIDE
-    return replace(signal, stride=round(ratio)) if thinned else signal
-
-
 def _warnings(system: LinearSystem) -> tuple[str, ...]:
     return tuple(
         f"the input {name!r} of the plant has no channel and is taken as zero"
@@ -227,57 +224,6 @@ def _fit_signals(
     return FitSignals(
         np.ascontiguousarray(measured[first:]), np.ascontiguousarray(known[first:]), start
     )
-
-
-def _interval(output: BoundSignal, clock: Clock) -> float:
-    """Return the time from one measurement of an output to the next, s."""
-    channel = clock.channels[output.binding.channel]
-    return max(0.0 if channel.hold else channel.interval_secs, clock.dt_secs)
-
-
-def _signal_sizes(
-    log: ScreenedLog,
-    clock: Clock,
-    outputs: tuple[BoundSignal, ...],
-    schedule: tuple[BoundSignal, ...],
-    on_progress: ProgressCallback,
-) -> tuple[tuple[OutputStats, ...], FloatArray]:
-    """Return the statistics of the outputs, and the rms values (s,) of the scheduling signals."""
-    collected = tuple(OutputStats() for _ in outputs)
-    moments = tuple(Moments() for _ in schedule)
-    for signals in resampled_chunks(log, clock, on_progress, "resample"):
-        for output, stats in zip(outputs, collected, strict=True):
-            stats.add(output.measured(signals))
-        for signal, each in zip(schedule, moments, strict=True):
-            each.add(signal.values(signals))
-    for output, stats in zip(outputs, collected, strict=True):
-        if stats.moments.count < MIN_MEASUREMENTS:
-            raise LogError(
-                f"channel {output.binding.channel!r} has {stats.moments.count} samples where the"
-                f" other channels have some, too, but {MIN_MEASUREMENTS} are needed; check the"
-                f" recorder or choose another log: {log.name}"
-            )
-    return collected, np.sqrt([each.mean_square for each in moments])
-
-
-def _noise(
-    outputs: tuple[BoundSignal, ...], collected: tuple[OutputStats, ...], clock: Clock
-) -> tuple[FloatArray, tuple[bool, ...]]:
-    """Return the noise (m,) of one measurement on the clock, stated or estimated from the log.
-
-    The mean of the samples within a step of the clock has less noise than one sample.
-    """
-    stds, measured = np.zeros(len(outputs)), []
-    for k, (output, stats) in enumerate(zip(outputs, collected, strict=True)):
-        channel = clock.channels[output.binding.channel]
-        stated = output.binding.std
-        if stated is None:
-            stds[k] = stats.noise_std
-        else:
-            averaged = 1.0 if is_interpolated(channel) else channel.interval_secs / clock.dt_secs
-            stds[k] = abs(output.binding.scale) * stated * np.sqrt(min(averaged, 1.0))
-        measured.append(stated is None)
-    return stds, tuple(measured)
 
 
 def _require_method(system: LinearSystem, *, smooth: bool) -> None:

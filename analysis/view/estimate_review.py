@@ -70,22 +70,27 @@ class EstimateReview:
             normalised = chunk.innovations[:, j] / chunk.innovation_stds[:, j]
             columns = (chunk.measured[:, j], chunk.predicted[:, j], normalised)
             rows, (measured, predicted, normalised) = _sampled(samples, chunk.first, columns)
-            name = f"output_{output.binding.name}"
+            name = _entity("output", output.binding.name)
             lines = Line("measured", measured, GREY, 2.5), Line("predicted", predicted, BLUE)
             self._add(f"{name}/outputs", Series("outputs", rows * dt, lines))
             line = Line("innovation / σ", normalised, BLUE)
-            entity = f"innovation_{output.binding.name}/normalised"
+            entity = f"{_entity('innovation', output.binding.name)}/normalised"
             self._add(entity, Series("normalised", rows * dt, (line,), spiky=True))
         for k, quantity in enumerate(plan.quantities):
             half_width = BAND_STDS * chunk.stds[:, k]
             colour = COLOURS[quantity.kind]
             band = banded("estimate", chunk.values[:, k], half_width, colour)
-            self._add(f"{quantity.kind}_{quantity.name}/estimate", Series("estimate", at, band))
+            self._add(
+                f"{_entity(quantity.kind, quantity.name)}/estimate", Series("estimate", at, band)
+            )
         for j, signal in enumerate(plan.inputs):
             inputs = [Line("recorded", chunk.inputs[:, j], GREEN, 1.5)]
             if chunk.commanded.size:
                 inputs.append(Line("commanded", chunk.commanded[:, j], ORANGE))
-            self._add(f"input_{signal.binding.name}/inputs", Series("inputs", at, tuple(inputs)))
+            self._add(
+                f"{_entity('input', signal.binding.name)}/inputs",
+                Series("inputs", at, tuple(inputs)),
+            )
 
     def finish(self, text: str) -> None:
         """Draw what is known only at the end; `text` is the page in Markdown."""
@@ -122,15 +127,15 @@ class EstimateReview:
         """Return the panels of outputs and inputs, of estimates, and of innovations."""
         plan = self._plan
         signals = [
-            _panel(f"{kind}_{each.binding.name}", title_of(each.binding.name, each.unit), drawn)
+            _panel(_entity(kind, each.binding.name), title_of(each.binding.name, each.unit), drawn)
             for kind, bound in (("output", plan.outputs), ("input", plan.inputs))
             for each in bound
-            for drawn in [series[f"{kind}_{each.binding.name}/{kind}s"]]
+            for drawn in [series[f"{_entity(kind, each.binding.name)}/{kind}s"]]
         ]
         estimates = [
             _panel(name, title_of(q.name, q.unit), series[f"{name}/estimate"])
             for q in plan.quantities
-            for name in [f"{q.kind}_{q.name}"]
+            for name in [_entity(q.kind, q.name)]
         ]
         end = (plan.clock.count - 1) * plan.clock.dt_secs
         lines = (Line("±2σ", np.full(2, sign * BAND_STDS), GREY) for sign in (1, -1))
@@ -138,7 +143,7 @@ class EstimateReview:
         innovations = [
             _panel(name, f"{words(each.binding.name)} innovation / expected σ", drawn, guides)
             for each in plan.outputs
-            for name in [f"innovation_{each.binding.name}"]
+            for name in [_entity("innovation", each.binding.name)]
             for drawn in [series[f"{name}/normalised"]]
         ]
         return signals, estimates, innovations
@@ -171,6 +176,11 @@ def _sampled(
     """Return the instants (k,) of measurements and the columns (c, k) there."""
     rows, values = samples.step(first, np.column_stack(columns))
     return np.asarray(rows, np.float64), values.T
+
+
+def _entity(kind: str, name: str) -> str:
+    """Return the path of an entity: names may have blanks, of which Rerun warns."""
+    return re.sub(r"\W+", "_", f"{kind}_{name}")
 
 
 def _panel(name: str, title: str, *series: Series) -> Panel:

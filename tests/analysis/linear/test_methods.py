@@ -275,3 +275,23 @@ def test_the_same_wave_on_moment_and_gyro_is_refused_by_name() -> None:
         UsageError, match="'wave moment' and 'wave on gyro' cannot be distinguished"
     ):
         run(text, log_of(rudder=noise(), yaw_rate=noise()))
+
+
+def test_two_shifts_that_violate_their_bound_are_refused_with_the_pole() -> None:
+    """The dual of the example in which fast and slow shifts destabilise a regulator."""
+    text = """
+    [plant]
+    A = [[-2.0, 0.0], [0.0, -0.2]]
+    C = [[1.0, 1.0]]
+    [outputs.sum]
+    channel = "roll"
+    std = 3.1622776601683795
+    [method]
+    name = "quality"
+    shift = [6.0, 1.0]
+    border = 1.0
+    """
+    with pytest.raises(UsageError, match=r"one is at 0\.216\d*; use one shift"):
+        run(text, log_of(roll=0.1 * noise()))
+    once = run(text.replace("[6.0, 1.0]", "1.0").replace("border = 1.0", ""), log_of(roll=noise()))
+    assert once.findings.plan.design.poles.real.max() < -0.5

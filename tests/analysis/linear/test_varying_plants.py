@@ -8,16 +8,20 @@ from channels import channel
 from example_scripts import example_script
 from linear_logs import DT, log_of
 from places import SAMPLE_DATA
+from scipy.integrate import solve_ivp
 from trial_logs import InChunks, as_log
 
+from analysis.design.augmentation import Plant
 from analysis.linear.estimate import SystemEstimate, estimate
 from analysis.linear.joined_system import OutputSampling, estimator_model
+from analysis.linear.system import ChannelBinding, Linearisation, LinearSystem
 from analysis.linear.system_file import parse_system
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import Gust
 from shiplog import TrialLog, UsageError, read
 from shiplog.ships.paper import rudder_effect
+from shiplog.types import FloatArray
 from shiplog.vessel.vessel_parser import load_vessel
 
 LOG = SAMPLE_DATA / "zigzag_20_20.mcap"
@@ -164,3 +168,54 @@ def test_a_gust_on_the_ship_is_found_along_its_trajectory() -> None:
     moment = c.d * rudder_effect(c, approach, 80.0) * np.radians(2)
     assert np.mean(found["gust"][1000:2000]) / moment == pytest.approx(0, abs=0.1)
     assert np.mean(found["gust"][3500:]) / moment == pytest.approx(1, abs=0.05)
+
+
+def test_headings_more_than_half_a_turn_apart_are_refused_with_the_offset_that_joins_them() -> None:
+    heading = np.radians(350) + 0.01 * np.sin(DT * np.arange(300))
+    order = np.full(300, np.radians(2))
+    text = """
+    [plant]
+    A = [[-0.1]]
+    B = [[0.1]]
+    states = { heading = "rad" }
+    [inputs.heading_order]
+    [outputs.heading]
+    std = 0.01
+    [noise]
+    process = { heading = 1e-4 }
+    """
+    log = log_of(heading=heading, heading_order=order)
+    with pytest.raises(UsageError, match=r"offset of 'heading_order' to -6\.28318531"):
+        estimate(log, parse_system(text, "loop.toml"))
+    joined = text.replace("[inputs.heading_order]", "[inputs.heading_order]\noffset = -6.28318531")
+    found = estimate(log, parse_system(joined, "loop.toml"))
+    assert found["heading"][-1] == pytest.approx(np.radians(351), abs=0.05)
+
+
+def test_a_pendulum_of_ones_own_is_linearised_at_its_estimate() -> None:
+    """A system made in Python, with a function of its own; the truth by integration."""
+
+    def linearise(x: FloatArray, _: FloatArray) -> Linearisation:
+        J = np.array([[0.0, 1.0], [-np.cos(x[0]), 0.0]])
+        return Linearisation(J, np.zeros((2, 0)), np.array([x[1], -np.sin(x[0])]) - J @ x)
+
+    at = DT * np.arange(600)
+    angle, rate = solve_ivp(
+        lambda _, x: [x[1], -np.sin(x[0])], at[[0, -1]], [1.2, 0.3], t_eval=at, rtol=1e-9
+    ).y
+    system = LinearSystem(
+        name="pendulum",
+        plant=Plant(
+            *linearise(np.zeros(2), np.zeros(0))[:2], np.eye(1, 2), ("angle", "rate"), ("angle",)
+        ),
+        D=np.zeros((1, 0)),
+        units=("rad", "rad/s"),
+        inputs=(),
+        outputs=(ChannelBinding("angle", "roll", std=0.01),),
+        W=np.diag([0.0, 1e-4]),
+        linearise=linearise,
+    )
+    noisy = angle + 0.01 * np.random.default_rng(0).standard_normal(600)
+    found = estimate(log_of(roll=noisy), system)
+    assert np.std((found["rate"] - rate)[100:]) < 0.02
+    assert np.mean(np.abs(found["angle"] - angle)[100:] < 2 * found.std("angle")[100:]) > 0.9
