@@ -1,6 +1,7 @@
 """The verb replay: estimate states, disturbances and coefficients from a log."""
 
 import argparse
+import sys
 import tomllib
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from shiplog.cli.paths import (
 from shiplog.cli.verb import ExitCode, Verb
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import extension_names
-from shiplog.vessel.settings import DISTURBANCES
+from shiplog.vessel.settings import DISTURBANCES, SENSOR_ERRORS
 
 from .shared_options import add_reading_options, reading_options, show_review
 
@@ -39,6 +40,12 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="separate the waves in the yaw rate from the ship's own turning "
         "(default filter then: extended)",
+    )
+    parser.add_argument(
+        "--sensor-bias",
+        metavar="SENSORS",
+        help="sensor errors to estimate with the states: auto for those that the log determines, "
+        f"or some of {','.join(SENSOR_ERRORS)}; heading and position are then measurements too",
     )
     parser.add_argument(
         "--disturbance",
@@ -76,7 +83,11 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
 
     with (
         progress("analysis") as on_progress,
-        compiling_beside(arguments.filter, smooth=arguments.smooth) as compilation,
+        compiling_beside(
+            arguments.filter,
+            smooth=arguments.smooth,
+            sensors=arguments.sensor_bias is not None,
+        ) as compilation,
     ):
         on_progress("read")
         log = open_cut(arguments.log, arguments)
@@ -101,6 +112,8 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
     if arguments.json:
         write_json(replay_json(findings), arguments.json)
     print_tables(replay_tables(findings), to_stderr=arguments.json == "-")
+    for error in findings.sensor_errors:
+        print(error, file=sys.stderr if arguments.json == "-" else sys.stdout)
     print_warnings(findings.warnings)
     show_review(output, view=arguments.view)
     return ExitCode.DATA_LOST if log.data_lost else ExitCode.OK
@@ -133,6 +146,8 @@ def replay_settings(parsed: argparse.Namespace) -> dict[str, object]:
         found["filter.kind"] = parsed.filter
     if parsed.disturbance is not None:
         found["disturbance.models"] = [model.strip() for model in parsed.disturbance.split(",")]
+    if parsed.sensor_bias is not None:
+        found["filter.sensor_bias"] = parsed.sensor_bias
     flags = {"filter.smooth": parsed.smooth, "filter.wave": parsed.wave}
     return found | {name: True for name, given in flags.items() if given}
 

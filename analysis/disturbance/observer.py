@@ -9,19 +9,16 @@ measurements", eqs (3), (4).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from math import degrees, inf, pi, radians, sqrt
+from math import inf, pi
 
 import numpy as np
 
 from analysis.filters.noise_model import NoiseModel
 from analysis.signals.hold import last_inputs
-from analysis.signals.moments import Moments
 from analysis.signals.signal_stats import SignalStats, signal_stats
-from shiplog.checks.quantiles import Quantiles
 from shiplog.errors import UsageError
-from shiplog.ships.paper import PAPER_INPUTS, Coefficients, rudder_effects, yaw_stiffness
-from shiplog.types import FloatArray, Signals
+from shiplog.ships.paper import PAPER_INPUTS, Coefficients, yaw_stiffness
+from shiplog.types import Signals
 from shiplog.vessel.settings import (
     DisturbanceSettings,
     number_error,
@@ -31,91 +28,19 @@ from shiplog.vessel.settings import (
 
 from .loop import initial_state, make_ship_observer, observe_chunk, surge_plant, yaw_plant
 from .observer_design import ForceModel, Sampling, force_observer
+from .summary import (
+    DISTURBANCE_UNITS,
+    RUDDER_MAX,
+    Disturbance,
+    DisturbanceCollector,
+    DisturbanceSummary,
+)
 
-RUDDER_MAX = radians(35)  # of most ships; used where the steering gear is not known
-MIN_EFFECT_SHARE = 0.3  # of the rudder's largest effect: below it an angle is not counted
-# of each disturbance: the SI unit, the unit displayed, and the factor from the first to the second
-DISTURBANCE_UNITS = {
-    "yaw": ("rad/s³", "0.001 deg/s³", degrees(1) * 1e3),
-    "rudder": ("rad", "deg", degrees(1)),
-    "surge": ("m/s²", "mm/s²", 1e3),
-    "yaw_wave": ("rad/s³", "0.001 deg/s³", degrees(1) * 1e3),
-    "surge_wave": ("m/s²", "mm/s²", 1e3),
-}
 DEFAULT_SETTINGS = DisturbanceSettings()
 MAX_POLE_TIMES_INTERVAL = 10.0  # beyond it the observer forgets a sample by the next one
 # wave frequency times sampling interval: towards Nyquist's π the error due to noise has no bound
 MAX_WAVE_TIMES_INTERVAL = 0.9 * pi
 MAX_DISTURBANCE = 1e6  # in SI units: a larger estimate means that the observer has diverged
-
-
-@dataclass(frozen=True, eq=False)
-class Disturbance:
-    """Estimated disturbances on the signals' clock, as terms of the equations of motion.
-
-    NaN where the observer has diverged.
-
-    Attributes
-    ----------
-    yaw
-        Slow part (constant or ramp) of the yaw disturbance, rad/s³, (n,): a term of w''. Zero where
-        neither a constant nor a ramp is estimated.
-    surge
-        Slow part of the surge disturbance, m/s², (n,): a term of v'. Zero as for `yaw`.
-    rudder
-        The rudder angle, rad, (n,), that would have the effect of `yaw` at the estimated speed; NaN
-        where the rudder has practically no effect.
-    yaw_wave, surge_wave
-        The waves, rad/s³ and m/s², (n,); None where none is estimated.
-    """
-
-    yaw: FloatArray
-    surge: FloatArray
-    rudder: FloatArray
-    yaw_wave: FloatArray | None = None
-    surge_wave: FloatArray | None = None
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether the observer has not diverged."""
-        return bool(np.isfinite(self.yaw).all() and np.isfinite(self.surge).all())
-
-
-@dataclass(frozen=True)
-class DisturbanceSummary:
-    """Summary of one disturbance over a trial, without the observer's first transient.
-
-    Attributes
-    ----------
-    unit
-        SI unit of the values.
-    mean, rms, min, max
-        Mean, root mean square and extremes.
-    at_end
-        Mean over the last `settling_secs` of the trial.
-    noise_std
-        Standard deviation that sensor noise alone causes in an observer after its transient, at
-        the trial's rms yaw rate; model errors are not included, they count as a disturbance. For a
-        wave it is that of its value, and, where the wave is well above it, of its amplitude. NaN
-        for the rudder where the rudder has no effect.
-    settling_secs
-        Duration of the first transient, s, which is not counted in a trial more than twice as long.
-    """
-
-    unit: str
-    mean: float
-    rms: float
-    min: float
-    max: float
-    at_end: float
-    noise_std: float
-    settling_secs: float
-
-    @property
-    def amplitude(self) -> float:
-        """Amplitude of a wave: that of a sinusoid of its variance, minus the variance of noise."""
-        variance = self.rms**2 - self.mean**2 - self.noise_std**2
-        return np.nan if np.isnan(variance) else sqrt(2 * max(variance, 0.0))
 
 
 class ForceObserver:
@@ -158,7 +83,7 @@ class ForceObserver:
         *,
         rudder_max: float = RUDDER_MAX,
     ) -> None:
-        self._model, self._rudder_max = model, rudder_max
+        self._model = model
         models = force_models(settings, wave_frequency, stats)
         stiffness = yaw_stiffness(model, stats.yaw_rate_rms)
         yaw = force_observer(yaw_plant(model, stiffness), *models["yaw"])
@@ -166,24 +91,16 @@ class ForceObserver:
         forces = yaw.force, surge.force
         self._observer = make_ship_observer(model, stiffness, *forces, *models["yaw"])
         self._state = initial_state(self._observer, stats)
-        # at almost no speed and thrust the rudder has no effect, and the equivalent angle is NaN
-        self._min_rudder_effect = 1e-3 * abs(model.d) * stats.max_rudder_effect
-        self._least_counted_effect = MIN_EFFECT_SHARE * abs(model.d) * stats.max_rudder_effect
-        self._unsettled = int(yaw.settling_secs / stats.dt_secs)
-        self._counted = self._excessive = 0
-        self._rudder_effects = Quantiles()
         self._stds: dict[str, float] = {}
-        self._summaries: dict[str, _SummaryCollector] = {}
-        names = ("yaw", "rudder", "surge", "yaw_wave", "surge_wave")
-        for name in names:
+        settling: dict[str, float] = {}
+        for name in DISTURBANCE_UNITS:
             output, design = (1, surge) if name.startswith("surge") else (0, yaw)
             if name.endswith("wave") and models[name.removesuffix("_wave")][0].wave is None:
                 continue
             std = design.stds[int(name.endswith("wave"))]
             self._stds[name] = float(std * noise.measurement_std[output])
-            self._summaries[name] = _SummaryCollector(
-                design.settling_secs, stats.count, stats.dt_secs
-            )
+            settling[name] = design.settling_secs
+        self._collector = DisturbanceCollector(model, stats, settling, rudder_max=rudder_max)
 
     def step(self, chunk: Signals, following: Mapping[str, float]) -> Disturbance:
         """Estimate the disturbances of the next chunk.
@@ -201,49 +118,21 @@ class ForceObserver:
             chunk.dt_secs,
         )  # fmt: skip
         rows[~(np.abs(rows) < MAX_DISTURBANCE)] = np.nan
-        v, yaw, yaw_wave, surge, surge_wave = rows
-        effect = self._model.d * rudder_effects(self._model, v, chunk["rpm"])
-        self._rudder_effects.add(np.abs(effect))
-        effective = np.abs(effect) > self._min_rudder_effect
-        with np.errstate(divide="ignore", invalid="ignore"):
-            rudder = np.where(effective, yaw / effect, np.nan)
-        self._count_excess(rudder, np.abs(effect))
-        disturbance = Disturbance(
-            yaw,
-            surge,
-            rudder,
-            yaw_wave if "yaw_wave" in self._summaries else None,
-            surge_wave if "surge_wave" in self._summaries else None,
-        )
-        for name, collector in self._summaries.items():
-            collector.add(getattr(disturbance, name))
-        return disturbance
-
-    def _count_excess(self, rudder: FloatArray, effect: FloatArray) -> None:
-        """Count the instants at which the disturbance exceeds the rudder that the ship has.
-
-        The transient at the start does not count, nor instants at which the rudder has little
-        effect: there a small moment is worth much rudder.
-        """
-        counted = (effect > self._least_counted_effect)[self._unsettled :]
-        excessive = ~(np.abs(rudder[self._unsettled :]) <= self._rudder_max)
-        self._counted += int(np.sum(counted))
-        self._excessive += int(np.sum(counted & excessive))
-        self._unsettled = max(self._unsettled - len(rudder), 0)
+        v, *forces = rows
+        names = ("yaw", "yaw_wave", "surge", "surge_wave")
+        estimated = {
+            name: force for name, force in zip(names, forces, strict=True) if name in self._stds
+        }
+        return self._collector.add(estimated, v, chunk["rpm"])
 
     @property
     def excess_share(self) -> float:
         """Share of the instants at which the yaw disturbance exceeds the largest rudder angle."""
-        return self._excessive / self._counted if self._counted else 0.0
+        return self._collector.excess_share
 
     def result(self) -> dict[str, DisturbanceSummary]:
         """Return the summaries of yaw, rudder, surge and the waves estimated, over all chunks."""
-        effect = self._rudder_effects.median()
-        stds = self._stds | {"rudder": self._stds["yaw"] / effect if effect > 0 else np.nan}
-        return {
-            name: collector.result(stds[name], DISTURBANCE_UNITS[name][0])
-            for name, collector in self._summaries.items()
-        }
+        return self._collector.result(self._stds)
 
 
 def observe_disturbance(
@@ -273,39 +162,6 @@ def observe_disturbance(
     observer = ForceObserver(model, noise, stats, settings, wave_frequency)
     disturbance = observer.step(signals, last_inputs(signals))
     return disturbance, observer.result()
-
-
-class _SummaryCollector:
-    """Collects the summary of one disturbance from its chunks."""
-
-    def __init__(self, settling_secs: float, count: int, dt: float) -> None:
-        self._settling_secs = settling_secs
-        settling = int(settling_secs / dt)
-        self._skipped = settling if count > 2 * settling else 0
-        self._tail = max(settling, 1)
-        self._settled = Moments()
-        self._last_values: FloatArray = np.zeros(0)
-
-    def add(self, values: FloatArray) -> None:
-        """Add the next values, (n,)."""
-        values = np.where(np.isfinite(values), values, np.nan)
-        self._settled.add(values[self._skipped :])
-        self._skipped = max(self._skipped - len(values), 0)
-        self._last_values = np.concatenate((self._last_values, values))[-self._tail :]
-
-    def result(self, std: float, unit: str) -> DisturbanceSummary:
-        """Return the summary, with the standard deviation of noise and the unit given."""
-        settled, last = self._settled, self._last_values[np.isfinite(self._last_values)]
-        return DisturbanceSummary(
-            unit=unit,
-            mean=settled.mean,
-            rms=float(np.sqrt(settled.mean_square)),
-            min=settled.min,
-            max=settled.max,
-            at_end=float(np.mean(last)) if len(last) and settled.count else np.nan,
-            noise_std=std,
-            settling_secs=self._settling_secs,
-        )
 
 
 def force_models(

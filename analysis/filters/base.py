@@ -19,6 +19,37 @@ OUTPUT_STATES = (0, 3)  # the positions of the outputs, yaw rate and speed, amon
 
 NOISE_SETTINGS = ("yaw_rate_std", "speed_std", "process_ratio")  # they determine the noise model
 WAVE_SETTINGS = ("wave", "wave_frequency", "wave_damping", "wave_std")
+FURTHER_SETTINGS = ("sensor_bias", "heading_std", "position_std")
+
+
+@dataclass(frozen=True, eq=False)
+class FurtherStates:
+    """Estimates beside those of the ship's motion: heading, position, sensor errors, disturbances.
+
+    Attributes
+    ----------
+    names, units
+        The k estimates: ``heading``, ``north``, ``east``, the sensor errors (`SENSOR_ERRORS` of the
+        settings), ``current_north``, ``current_east``, ``drift_length``, ``yaw_moment``,
+        ``surge_force`` and the waves of these, as far as the filter has them.
+    prior_stds
+        Their standard deviations before anything is measured.
+    values, stds
+        (n, k): the estimates, and their standard deviations.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    prior_stds: tuple[float, ...]
+    values: FloatArray
+    stds: FloatArray
+
+    def of(self, name: str) -> tuple[FloatArray, FloatArray] | None:
+        """Return values (n,) and standard deviations (n,) of an estimate; None if there is none."""
+        if name not in self.names:
+            return None
+        at = self.names.index(name)
+        return self.values[:, at], self.stds[:, at]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,13 +64,16 @@ class Estimates:
     stds
         (n, 5): their standard deviations.
     innovations
-        (n, 2): yaw rate, rad/s, and speed, m/s, measured minus predicted; NaN where not measured.
+        (n, m): yaw rate, rad/s, speed, m/s, and the further outputs that the filter uses (heading,
+        rad, or heading and position, m), measured minus predicted; NaN where not measured.
     innovation_stds
-        (n, 2): the standard deviations that the filter predicts for them.
+        (n, m): the standard deviations that the filter predicts for them.
     rejected
-        (n, 2): whether a sample was rejected by the gate.
+        (n, m): whether a sample was rejected by the gate.
     wave
         (n,): the part of the yaw rate that is due to waves, rad/s; None where no wave is modelled.
+    further
+        The further estimates; None where the filter has none.
     """
 
     states: FloatArray
@@ -48,13 +82,14 @@ class Estimates:
     innovation_stds: FloatArray
     rejected: NDArray[np.bool_]
     wave: FloatArray | None = None
+    further: FurtherStates | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
     """The intermediate results of a filter that a smoother needs.
 
-    The filter has s states of its own and two outputs, which correct it one after the other.
+    The filter has s states of its own and m outputs, which correct it one after the other.
 
     Attributes
     ----------
@@ -64,17 +99,21 @@ class Trace:
         (n, s, s): the covariance of the same.
     transitions
         (n, s, s): the transition matrix from each instant to the next.
+    rows
+        (n, m, s): the row of the output matrix by which each output corrected the state; zero where
+        there was no correction.
     gains
-        (n, 2, s): the gain of each output; zero where there was no correction.
+        (n, m, s): the gain of each output; zero where there was no correction.
     innovations
-        (n, 2): the innovation of each output; zero where there was no correction.
+        (n, m): the innovation of each output; zero where there was no correction.
     variances
-        (n, 2): the variance of each innovation.
+        (n, m): the variance of each innovation.
     """
 
     states: FloatArray
     covariances: FloatArray
     transitions: FloatArray
+    rows: FloatArray
     gains: FloatArray
     innovations: FloatArray
     variances: FloatArray
@@ -90,7 +129,8 @@ class Filter(Protocol):
         ----------
         chunk
             The signals ``yaw_rate``, rad/s, and ``speed``, m/s, NaN where not measured, and the
-            inputs ``rudder``, rad, and ``rpm``, which are never NaN.
+            inputs ``rudder``, rad, and ``rpm``, which are never NaN; where `NoiseModel.further` has
+            further outputs, these too.
         following
             The inputs at the instant after the chunk.
         """
@@ -100,11 +140,6 @@ class Filter(Protocol):
 @runtime_checkable
 class SmoothableFilter(Filter, Protocol):
     """A filter that also returns what the smoother needs."""
-
-    @property
-    def outputs(self) -> FloatArray:
-        """The output matrix C, (2, s): yaw rate and speed from the states."""
-        ...
 
     def trace(self, chunk: Signals, following: Mapping[str, float]) -> tuple[Estimates, Trace]:
         """Filter the next chunk as `step` does, and return the intermediate results as well."""
@@ -116,8 +151,8 @@ class SmoothableFilter(Filter, Protocol):
         following: Mapping[str, float],
         states: FloatArray,
         covariances: FloatArray,
-    ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-        """Convert states of the filter to `states`, `stds` and `wave` of `Estimates`.
+    ) -> tuple[FloatArray, FloatArray, FloatArray | None, FurtherStates | None]:
+        """Convert states of the filter to `states`, `stds`, `wave` and `further` of `Estimates`.
 
         Parameters
         ----------
@@ -149,7 +184,8 @@ class FilterKind:
         smoother's equations assume.
     settings
         The keys of ``[filter]`` that the filter uses, beside ``kind`` and ``smooth``. A filter that
-        models a wave in the yaw rate lists `WAVE_SETTINGS`.
+        models a wave in the yaw rate lists `WAVE_SETTINGS`, one that has the further states of
+        `NoiseModel.further` lists `FURTHER_SETTINGS`.
     process_noise
         What the process noise drives: ``"forces"``, the yaw moment and the surge force
         (`NoiseModel.process_ratio` in 1/s⁴ and 1/s²), or ``"states"``, all states (in 1/s², as in
@@ -166,3 +202,8 @@ class FilterKind:
     def models_wave(self) -> bool:
         """Whether the filter can separate waves in the yaw rate from the ship's own turning."""
         return "wave" in self.settings
+
+    @property
+    def has_further_states(self) -> bool:
+        """Whether the filter can have sensor errors and disturbances as states."""
+        return "sensor_bias" in self.settings

@@ -76,7 +76,7 @@ def smoothable(filter_: Filter) -> SmoothableFilter:
     """Return the same filter as one that can be smoothed; raise `ShiplogError` if it cannot."""
     if not isinstance(filter_, SmoothableFilter):
         raise ShiplogError(
-            f"{type(filter_).__name__} is declared smoothable, but lacks one of outputs, trace and"
+            f"{type(filter_).__name__} is declared smoothable, but lacks trace or"
             " to_estimates; correct its FilterKind"
         )
     return filter_
@@ -105,7 +105,7 @@ def filter_states(
         return filter_.step(signals, following)
     tracing = smoothable(filter_)
     estimates, trace = tracing.trace(signals, following)
-    backward = SmoothingPass(tracing.outputs)
+    backward = SmoothingPass()
     backward.add(trace)
     (end,) = backward.result()
     return smoothed(tracing, signals, following, estimates, trace, end)

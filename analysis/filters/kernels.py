@@ -122,19 +122,26 @@ def correct(
 
 
 @compiled
-def propagate(P: FloatArray, F: FloatArray, Q: FloatArray, FP: FloatArray) -> None:
-    """Set P (s, s) to F P F' + Q, in place; `FP` (s, s) is work space."""
+def propagate(P: FloatArray, F: FloatArray, Q: FloatArray, FP: FloatArray, dynamic: int) -> None:
+    """Set P (s, s) to F P F' + Q, in place; `FP` (s, s) is work space.
+
+    The rows of F from `dynamic` on are those of the unit matrix: states that change by noise alone.
+    """
     n = len(P)
-    for i in range(n):
+    for i in range(dynamic):
         for j in range(n):
             FP[i, j] = 0.0
             for k in range(n):
                 FP[i, j] += F[i, k] * P[k, j]
-    for i in range(n):
+    for i in range(dynamic):
         for j in range(i + 1):
             P[i, j] = Q[i, j]
             for k in range(n):
                 P[i, j] += FP[i, k] * F[j, k]
+            P[j, i] = P[i, j]
+    for i in range(dynamic, n):
+        for j in range(i + 1):
+            P[i, j] = Q[i, j] + (FP[j, i] if j < dynamic else P[i, j])
             P[j, i] = P[i, j]
 
 

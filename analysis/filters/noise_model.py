@@ -1,4 +1,4 @@
-"""The noise that a filter assumes."""
+"""The noise that a filter assumes: of its sensors, of the ship's motion, and of disturbances."""
 
 from dataclasses import dataclass
 from math import inf
@@ -6,6 +6,7 @@ from math import inf
 from shiplog.types import FloatArray
 
 MIN_CONTRAST = 1.5  # standard errors
+FURTHER_OUTPUTS = ("compass", "north", "east")  # measurements beside yaw rate and speed
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,56 @@ class Wave:
         return self.evidence > self.needed and self.contrast > MIN_CONTRAST
 
 
+@dataclass(frozen=True)
+class ForceNoise:
+    """A yaw moment or a surge force of known kind and unknown size, as a state of the filter.
+
+    Attributes
+    ----------
+    degree
+        0 for a random walk, 1 for a ramp whose slope is one; None for no slow part.
+    frequency
+        How fast the slow part is followed, rad/s: the optimal filter of a random walk has
+        Butterworth poles of this magnitude, as the disturbance observer has.
+    wave
+        Frequency of a wave, rad/s; None for no wave.
+    """
+
+    degree: int | None
+    frequency: float
+    wave: float | None = None
+
+
+@dataclass(frozen=True)
+class FurtherModel:
+    """The states of a filter beside the ship's: sensor errors, heading, position, disturbances.
+
+    Attributes
+    ----------
+    outputs
+        The further measurements, in the order of `FURTHER_OUTPUTS`: none, the compass, or all.
+    output_stds
+        The standard deviation of the white noise of one sample of each, rad and m.
+    sensors
+        The sensor errors, some of `shiplog.vessel.settings.SENSOR_ERRORS`.
+    yaw, surge
+        The yaw moment and the surge force; None where the filter has no such state.
+    """
+
+    outputs: tuple[str, ...] = ()
+    output_stds: tuple[float, ...] = ()
+    sensors: tuple[str, ...] = ()
+    yaw: ForceNoise | None = None
+    surge: ForceNoise | None = None
+
+    def __bool__(self) -> bool:
+        """Whether there is any further state."""
+        return bool(self.outputs or self.sensors or self.yaw or self.surge)
+
+
+NO_FURTHER = FurtherModel()
+
+
 @dataclass(frozen=True, eq=False)
 class NoiseModel:
     """The noise that a filter assumes: white noise of measurements and process, and a wave.
@@ -65,6 +116,8 @@ class NoiseModel:
         Whether `process_ratio` of each output was estimated from the log.
     wave
         The wave in the yaw rate; None where none is modelled.
+    further
+        The further states of the filter; empty by default.
     """
 
     measurement_std: FloatArray
@@ -72,3 +125,4 @@ class NoiseModel:
     measured: tuple[bool, bool] = (False, False)
     tuned: tuple[bool, bool] = (False, False)
     wave: Wave | None = None
+    further: FurtherModel = NO_FURTHER

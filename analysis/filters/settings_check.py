@@ -21,6 +21,11 @@ def check_filter_settings(kind: FilterKind, settings: FilterSettings) -> None:
             f"filter.wave needs a filter that can model a wave, and {kind.name!r} cannot;"
             " use 'extended'"
         )
+    if settings.sensors and not kind.has_further_states:
+        raise UsageError(
+            f"filter.sensor_bias needs a filter that can have sensor errors as states, and"
+            f" {kind.name!r} cannot; use 'extended' or 'pseudo-input'"
+        )
     if settings.smooth and not kind.smoothable:
         raise UsageError(
             f"filter.smooth needs a filter with the optimal gain, which {kind.name!r} has not;"
@@ -54,6 +59,8 @@ def unused_settings(
     used = {*GENERAL_SETTINGS, *kind.settings}
     if not settings.wave:
         used -= set(WAVE_SETTINGS)
+    if not settings.sensors:
+        used -= {"heading_std", "position_std"}
     if observes_wave:
         used.add("wave_frequency")
     unused = [

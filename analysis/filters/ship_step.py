@@ -16,33 +16,29 @@ from shiplog.ships.paper import (
 )
 from shiplog.types import FloatArray
 
+from .core import StepInputs
+
 
 @compiled
 def predict_ship(
-    c: Coefficients,
-    x: FloatArray,
-    F: FloatArray,
-    delta: float,
-    delta_dot: float,
-    n: float,
-    n_dot: float,
-    dt: float,
+    c: Coefficients, x: FloatArray, F: FloatArray, B: FloatArray, u: StepInputs, dt: float
 ) -> None:
-    """Advance the state by a Runge-Kutta step of fourth order, and compute the transition matrix.
+    """Advance the state by a Runge-Kutta step of fourth order, and compute its derivatives.
 
     Parameters
     ----------
     c
         The coefficients of the identification paper's model.
     x
-        (s,) the state w, w', v and those of a wave; changed in place.
+        (s,) the state, of which the first three, w, w' and v, are changed in place.
     F
         (s, s) the transition matrix. F[:3, :3] is set to the derivative of the step by the ship's
-        states; by F[3:, 3:] the states of the wave advance.
-    delta, delta_dot
-        The rudder angle at the start, rad, and its rate during the step, rad/s.
-    n, n_dot
-        The revolutions at the start, rpm, and their rate during the step, rpm/s.
+        states.
+    B
+        (3, 2) set to the derivative of the step by a constant yaw moment and surge force; (3, 0)
+        where there are none.
+    u
+        The inputs at the start, and their rates during the step.
     dt
         The time step, s.
 
@@ -51,45 +47,53 @@ def predict_ship(
     The equations of motion: `shiplog.ships.paper`. The derivative of the step follows the
     variational equation through the same stages.
     """
-    eye = np.eye(3)
-    J, slopes = np.zeros((3, 3)), np.zeros((4, 3, 3))
+    eye, forced = np.eye(3), B.shape[1] > 0
+    J, slopes, pushes = np.zeros((3, 3)), np.zeros((4, 3, 3)), np.zeros((4, 3, 2))
     rates, stage_x = np.empty((4, 3)), np.empty(3)
     for stage in range(4):
         share = (0.0, 0.5, 0.5, 1.0)[stage]
         h = share * dt
         for i in range(3):
             stage_x[i] = x[i] + (h * rates[stage - 1, i] if stage else 0.0)
-        stage_delta, stage_n = delta + delta_dot * h, n + n_dot * h
+        delta, n = u.delta + u.delta_dot * h, u.n + u.n_dot * h
         w, w_dot, v = stage_x[0], stage_x[1], stage_x[2]
         rates[stage, 0] = w_dot
-        rates[stage, 1] = yaw_acceleration_rate(c, w, w_dot, v, stage_n, stage_delta, delta_dot)
-        rates[stage, 2] = surge_acceleration(c, w, v, stage_n)
-        linearise(c, stage_x, stage_delta, delta_dot, stage_n, J)
-        for i in range(3):
-            for j in range(3):
-                slopes[stage, i, j] = J[i, j]
-                if stage:
-                    for m in range(3):
-                        slopes[stage, i, j] += h * J[i, m] * slopes[stage - 1, m, j]
+        rates[stage, 1] = yaw_acceleration_rate(c, w, w_dot, v, n, delta, u.delta_dot) + u.moment
+        rates[stage, 2] = surge_acceleration(c, w, v, n) + u.force
+        linearise(c, stage_x, delta, u.delta_dot, n, J)
+        _add_slopes(slopes, stage, h, J)
+        if forced:
+            _add_pushes(pushes, stage, h, J)
     for i in range(3):
         x[i] += dt / 6 * (rates[0, i] + 2 * rates[1, i] + 2 * rates[2, i] + rates[3, i])
         for j in range(3):
             total = slopes[0, i, j] + 2 * slopes[1, i, j] + 2 * slopes[2, i, j] + slopes[3, i, j]
             F[i, j] = eye[i, j] + dt / 6 * total
-    _advance_wave(x, F)
+        for j in range(B.shape[1]):
+            total = pushes[0, i, j] + 2 * pushes[1, i, j] + 2 * pushes[2, i, j] + pushes[3, i, j]
+            B[i, j] = dt / 6 * total
 
 
 @compiled
-def _advance_wave(x: FloatArray, F: FloatArray) -> None:
-    """Multiply the states of the wave by their transition matrix, in place."""
-    size = len(x)
-    if size > 3:
-        advanced = np.zeros(size)
-        for i in range(3, size):
-            for j in range(3, size):
-                advanced[i] += F[i, j] * x[j]
-        for i in range(3, size):
-            x[i] = advanced[i]
+def _add_slopes(slopes: FloatArray, stage: int, h: float, J: FloatArray) -> None:
+    """Compute the slopes of a stage, of (4, 3, 3), by the states at the start of the step."""
+    for i in range(3):
+        for j in range(3):
+            slopes[stage, i, j] = J[i, j]
+            if stage:
+                for m in range(3):
+                    slopes[stage, i, j] += h * J[i, m] * slopes[stage - 1, m, j]
+
+
+@compiled
+def _add_pushes(pushes: FloatArray, stage: int, h: float, J: FloatArray) -> None:
+    """Compute the slopes of a stage, of (4, 3, 2), by moment and force, which drive w' and v."""
+    for i in range(3):
+        for j in range(2):
+            pushes[stage, i, j] = 1.0 if i == j + 1 else 0.0
+            if stage:
+                for m in range(3):
+                    pushes[stage, i, j] += h * J[i, m] * pushes[stage - 1, m, j]
 
 
 @compiled
@@ -118,84 +122,42 @@ def linearise(
 
 
 @compiled
-def output_row(
+def ship_row(
     c: Coefficients,
     x: FloatArray,
     P: FloatArray,
-    delta: float,
-    delta_dot: float,
-    n: float,
+    u: StepInputs,
+    slopes: FloatArray,
     row: FloatArray,
 ) -> None:
     """Compute w, w', w'', v and v' of one instant, and their variances.
 
     w'' and v' follow from the model, and their variances, to first order, from its derivatives.
-
-    Parameters
-    ----------
-    c
-        The coefficients of the identification paper's model.
-    x
-        (s,) the state.
-    P
-        (s, s) its covariance.
-    delta, delta_dot, n
-        The rudder angle, rad, its rate, rad/s, and the revolutions, rpm.
-    row
-        (10,) the result: the five states in rad/s^k and m/s^k, then their variances.
+    The parameters are those of `core.output_row`, with the coefficients of the ship for the core.
     """
     w, w_dot, v = x[0], x[1], x[2]
     J = np.zeros((3, 3))
-    linearise(c, x, delta, delta_dot, n, J)
+    linearise(c, x, u.delta, u.delta_dot, u.n, J)
     row[0], row[1], row[3] = w, w_dot, v
-    row[2] = yaw_acceleration_rate(c, w, w_dot, v, n, delta, delta_dot)
-    row[4] = surge_acceleration(c, w, v, n)
+    row[2] = yaw_acceleration_rate(c, w, w_dot, v, u.n, u.delta, u.delta_dot) + u.moment
+    row[4] = surge_acceleration(c, w, v, u.n) + u.force
     row[5], row[6], row[8] = P[0, 0], P[1, 1], P[2, 2]
-    row[7], row[9] = _variance(J[1], P), _variance(J[2], P)
+    row[7], row[9] = _variance(J[1], slopes[0], P), _variance(J[2], slopes[1], P)
     for i in range(5, 10):
         row[i] = max(row[i], 0.0)
 
 
 @compiled
-def _variance(slope: FloatArray, P: FloatArray) -> float:
-    """Return slope' P slope of the first three states."""
-    total = 0.0
-    for i in range(3):
-        for j in range(3):
-            total += slope[i] * P[i, j] * slope[j]
-    return total
+def _variance(ship: FloatArray, further: FloatArray, P: FloatArray) -> float:
+    """Return g' P g; of the slope g, the first three are `ship` and the others those of `further`.
 
-
-@compiled
-def output_rows(
-    c: Coefficients,
-    states: FloatArray,
-    covariances: FloatArray,
-    delta: FloatArray,
-    n: FloatArray,
-    dt: float,
-) -> FloatArray:
-    """Compute `output_row` for each instant of a chunk.
-
-    Parameters
-    ----------
-    c
-        The coefficients of the identification paper's model.
-    states, covariances
-        (m, s) the states, and (m, s, s) their covariances.
-    delta
-        (m + 1,) the rudder angle, rad, at each instant and the next one.
-    n
-        (m,) or more: the revolutions, rpm.
-    dt
-        The time step, s.
-
-    Returns
-    -------
-    (m, 10) the five states, then their variances.
+    Most of these others are zero.
     """
-    rows = np.empty((len(states), 10))
-    for k in range(len(states)):
-        rate = (delta[k + 1] - delta[k]) / dt
-        output_row(c, states[k], covariances[k], delta[k], rate, n[k], rows[k])
-    return rows
+    total = 0.0
+    for i in range(len(further)):
+        slope_i = ship[i] if i < 3 else further[i]
+        if i >= 3 and slope_i == 0.0:
+            continue
+        for j in range(len(further)):
+            total += slope_i * P[i, j] * (ship[j] if j < 3 else further[j])
+    return total

@@ -61,43 +61,38 @@ class _ChunkMap:
 
 
 class SmoothingPass:
-    """The first pass: takes the traces of all chunks in order, returns the adjoints at their ends.
+    """The first pass: takes the traces of all chunks in order, for the adjoints at their ends."""
 
-    Parameters
-    ----------
-    outputs
-        The output matrix C, (2, s), of the filter.
-    """
-
-    def __init__(self, outputs: FloatArray) -> None:
-        self._C = np.ascontiguousarray(outputs)
+    def __init__(self) -> None:
         self._maps: list[_ChunkMap] = []
 
     def add(self, trace: Trace) -> None:
         """Take the trace of the next chunk."""
-        size = self._C.shape[1]
-        zero = Adjoint(np.zeros(size), np.zeros((size, size)))
-        *_, start, transition = _backward(self._C, *_backward_arrays(trace), *zero)
+        *_, start, transition = _backward(*_backward_arrays(trace), *_nothing(trace))
         self._maps.append(_ChunkMap(transition, Adjoint(*start)))
+        self._last = _nothing(trace)
 
     def result(self) -> list[Adjoint]:
         """Return the adjoint at the end of each chunk, in order."""
-        size = self._C.shape[1]
-        ends = [Adjoint(np.zeros(size), np.zeros((size, size)))]  # no measurement after the last
+        ends = [self._last]
         for chunk_map in reversed(self._maps[1:]):
             ends.append(chunk_map.at_start(ends[-1]))
         return ends[::-1]
 
 
-def smooth(trace: Trace, outputs: FloatArray, end: Adjoint) -> tuple[FloatArray, FloatArray]:
+def _nothing(trace: Trace) -> Adjoint:
+    """Return the adjoint where no measurement follows."""
+    size = trace.states.shape[1]
+    return Adjoint(np.zeros(size), np.zeros((size, size)))
+
+
+def smooth(trace: Trace, end: Adjoint) -> tuple[FloatArray, FloatArray]:
     """Smooth the states of a chunk.
 
     Parameters
     ----------
     trace
         The intermediate results of the filter.
-    outputs
-        The output matrix C, (2, s).
     end
         The adjoint at the end of the chunk.
 
@@ -108,8 +103,7 @@ def smooth(trace: Trace, outputs: FloatArray, end: Adjoint) -> tuple[FloatArray,
     covariances
         (n, s, s).
     """
-    C = np.ascontiguousarray(outputs)
-    slopes, curvatures, *_ = _backward(C, *_backward_arrays(trace), *end)
+    slopes, curvatures, *_ = _backward(*_backward_arrays(trace), *end)
     return _smoothed(trace.states, trace.covariances, slopes, curvatures)
 
 
@@ -134,13 +128,15 @@ def smoothed(
     end
         The adjoint at the end of the chunk.
     """
-    states, covariances = smooth(trace, filter_.outputs, end)
-    states, stds, wave = filter_.to_estimates(chunk, following, states, covariances)
-    return replace(estimates, states=states, stds=stds, wave=wave)
+    states, covariances = smooth(trace, end)
+    states, stds, wave, further = filter_.to_estimates(chunk, following, states, covariances)
+    return replace(estimates, states=states, stds=stds, wave=wave, further=further)
 
 
-def _backward_arrays(trace: Trace) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    return trace.transitions, trace.gains, trace.innovations, trace.variances
+def _backward_arrays(
+    trace: Trace,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    return trace.rows, trace.transitions, trace.gains, trace.innovations, trace.variances
 
 
 @compiled
@@ -164,22 +160,23 @@ def _backward(
     transition
         Φ, (s, s): the product of the transitions and corrections of the chunk.
     """
-    count, size = len(F), C.shape[1]
+    (count, outputs, size) = C.shape
     slopes, curvatures = np.empty((count, size)), np.empty((count, size, size))
     slope, curvature, transition = slope.copy(), curvature.copy(), np.eye(size)
     work, row, zero = np.empty((size, size)), np.empty(size), np.zeros((size, size))
     for k in range(count - 1, -1, -1):
         _multiply_transposed(F[k], slope, row)
-        propagate(curvature, F[k].T, zero, work)
+        propagate(curvature, F[k].T, zero, work, size)
         _multiply(transition, F[k], work)
         copy_vector(slopes[k], slope)
         copy_matrix(curvatures[k], curvature)
-        for output in range(1, -1, -1):
-            if np.any(K[k, output] != 0.0):
+        for output in range(outputs - 1, -1, -1):
+            c = C[k, output]
+            if np.any(c != 0.0):
                 _before_correction(
-                    C[output], K[k, output], e[k, output], S[k, output], slope, curvature, row
+                    c, K[k, output], e[k, output], S[k, output], slope, curvature, row
                 )
-                _correction_before(C[output], K[k, output], transition)
+                _correction_before(c, K[k, output], transition)
     return slopes, curvatures, (slope, curvature), transition
 
 
@@ -253,7 +250,7 @@ def _smoothed(
     work, zero = np.empty((size, size)), np.zeros((size, size))
     for k in range(len(x)):
         copy_matrix(covariances[k], curvatures[k])
-        propagate(covariances[k], P[k], zero, work)
+        propagate(covariances[k], P[k], zero, work, size)
         for i in range(size):
             states[k, i] = x[k, i]
             for j in range(size):

@@ -19,7 +19,7 @@ from shiplog.screening import ScreenedLog
 from shiplog.types import FloatArray, Log, Signals
 
 from .estimate_plan import EstimatePlan, plan_estimate
-from .estimator import Estimator, smoother_outputs
+from .estimator import Estimator
 from .feedback import CostMeter, CostSummary
 from .linear_loop import combine
 from .system import LinearSystem
@@ -230,7 +230,7 @@ class EstimateRun:
             u, at = inputs.step(signals), schedule.step(signals)
             run = estimator.step(measured, u, at)
             if adjoints is not None and run.trace is not None:
-                smoothed = smooth(run.trace, smoother_outputs(plan.model), next(adjoints))
+                smoothed = smooth(run.trace, next(adjoints))
                 run.values[run.first :], run.stds[run.first :] = combine(self._rows, *smoothed)
             plant = run.values[:, : plan.model.size]  # the states come first
             commanded = meter.add(plant, u) if meter else np.zeros((len(u), 0))
@@ -249,7 +249,7 @@ class EstimateRun:
         """Return for each chunk, in order, what the measurements after it add: one more pass."""
         estimator = Estimator(self.plan)
         inputs, schedule = self._held()
-        backward = SmoothingPass(smoother_outputs(self.plan.model))
+        backward = SmoothingPass()
         for signals in self._resampled("smooth"):
             u, at = inputs.step(signals), schedule.step(signals)
             trace = estimator.step(self._measured(signals), u, at).trace

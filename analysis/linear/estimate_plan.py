@@ -34,8 +34,6 @@ from .spectrum_fit import MAX_FITTED, FitSignals, FittedParameter, fit_spectra
 from .system import LinearSystem
 from .system_signals import BoundSignal, HeldSignals, bind_signals
 
-SMOOTHED_OUTPUTS = 2  # at most, of the fixed-interval smoother
-
 
 @dataclass(frozen=True, eq=False)
 class EstimatePlan:
@@ -244,9 +242,4 @@ def _require_method(system: LinearSystem, *, smooth: bool) -> None:
         raise UsageError(
             f"the method {method.name!r} cannot be smoothed: the smoother assumes the optimal gain;"
             " use kalman with a time-varying gain"
-        )
-    if smooth and len(system.outputs) > SMOOTHED_OUTPUTS:
-        raise UsageError(
-            f"the system has {len(system.outputs)} outputs, and the smoother takes at most"
-            f" {SMOOTHED_OUTPUTS}; estimate without smoothing, or omit outputs"
         )

@@ -8,8 +8,7 @@ from analysis.filters.base import Trace
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
-from .estimate_plan import SMOOTHED_OUTPUTS, EstimatePlan
-from .estimator_model import EstimatorModel
+from .estimate_plan import EstimatePlan
 from .initial_estimate import initial_estimate
 from .joined_system import OutputSampling, estimator_model
 from .linear_loop import StretchModel, StretchResult, combine, run_stretch, stretch_model
@@ -113,15 +112,9 @@ class Estimator:
         names = ("states", "covariances", "gains", "sequential", "sequential_variances")
         arrays = [np.concatenate([getattr(r, name) for r in results]) for name in names]
         states, covariances, gains, innovations, variances = arrays
-        F = np.reshape(following, (len(following), *covariances.shape[1:]))
-        return Trace(
-            states,
-            covariances,
-            np.ascontiguousarray(F),
-            _padded(gains, 0.0),
-            _padded(innovations, 0.0),
-            _padded(variances, 1.0),
-        )
+        F = np.ascontiguousarray(np.reshape(following, (len(following), *covariances.shape[1:])))
+        rows = self._model.C * np.any(gains != 0.0, axis=2, keepdims=True)
+        return Trace(states, covariances, F, rows, gains, innovations, variances)
 
     def warnings(self) -> tuple[str, ...]:
         """Return a warning where the estimate began late."""
@@ -186,19 +179,6 @@ class Estimator:
             model, x, np.zeros((N, N)), before, measured, np.ascontiguousarray(u), not self._started
         )
         return result.states
-
-
-def smoother_outputs(model: EstimatorModel) -> FloatArray:
-    """Return the output matrix C (2, N) for the smoother; a single output has a zero row beside."""
-    C: FloatArray = _padded(model.C[None], 0.0)[0]
-    return C
-
-
-def _padded(values: FloatArray, fill: float) -> FloatArray:
-    """Fill up the outputs, the second axis, to the two that the smoother has."""
-    missing = max(0, SMOOTHED_OUTPUTS - values.shape[1])
-    width = [(0, 0), (0, missing), *[(0, 0)] * (values.ndim - 2)]
-    return np.asarray(np.pad(values, width, constant_values=fill))
 
 
 def _require_regular(there: Linearisation, dt: float) -> None:

@@ -118,7 +118,7 @@ def run_stretch(
     for k in range(count):
         if k > 0 or not is_start:
             _predict(model, x, u_before, u[k], ahead)
-            propagate(P, model.F, model.Q, work)
+            propagate(P, model.F, model.Q, work, N)
         for j in range(m):
             predicted[k, j] = _output(model, j, x, u[k])
             innovations[k, j] = y[k, j] - predicted[k, j]
@@ -208,7 +208,7 @@ def _correct_constantly(
             for k in range(N):
                 T[i, k] -= model.M[i, j] * model.C[j, k]
                 noise[i, k] += model.M[i, j] * model.r[j] * model.M[k, j]
-    propagate(P, T, noise, work)
+    propagate(P, T, noise, work, N)
 
 
 @compiled

@@ -171,10 +171,27 @@ def _observer_stays_finite(plan: Plan) -> bool:
 
 def without_rejected(held: Signals, estimates: Estimates) -> Signals:
     """Return the signals with the samples that the filter rejected set to NaN."""
-    if not estimates.rejected.any():
+    if not estimates.rejected[:, : len(PAPER_OUTPUTS)].any():
         return held
     accepted = {
         name: np.where(estimates.rejected[:, i], np.nan, held[name])
         for i, name in enumerate(PAPER_OUTPUTS)
     }
     return replace(held, values=dict(held.values) | accepted)
+
+
+def without_sensor_errors(signals: Signals, estimates: Estimates) -> Signals:
+    """Return the signals without the sensor errors that the filter has found by each instant."""
+    if estimates.further is None:
+        return signals
+    zero = np.zeros(len(signals))
+    gyro, log, scale, rudder = (
+        found[0] if (found := estimates.further.of(name)) else zero
+        for name in ("gyro", "log", "log_scale", "rudder")
+    )
+    corrected = {
+        "yaw_rate": signals["yaw_rate"] - gyro,
+        "speed": (signals["speed"] - log) / (1 + scale),
+        "rudder": signals["rudder"] - rudder,
+    }
+    return replace(signals, values=dict(signals.values) | corrected)

@@ -27,6 +27,7 @@ from shiplog.types import ChunkedLog, FloatArray, Log
 from shiplog.vessel.settings import MIN_WINDOW_SECS
 
 from .channel_warnings import channel_warnings, end_warnings, late_channel_warnings
+from .measured_channels import MeasuredChannels, RawChunks, with_measured_channels
 from .reading_options import ReadingOptions
 
 REQUIRED_CHANNELS = (*PAPER_OUTPUTS, *PAPER_INPUTS)
@@ -119,6 +120,8 @@ def first_pass(
     screened = screen_without_delays(log, options.sensor_delays, screen)
     stats = screened.screening.stats
     clock = choose_clock(screened, stats, channels=REQUIRED_CHANNELS, optional=("heading",))
+    if vessel.filter.sensors:
+        clock = with_measured_channels(clock, stats)
     return FirstPass(screened, with_steering_gear(clock, vessel.rudder_rate))
 
 
@@ -157,14 +160,14 @@ def second_pass(
     expected = [clock.channels[name].interval_secs / clock.dt_secs for name in PAPER_OUTPUTS]
     intervals = np.maximum(np.round(expected), 1.0)
     equations = _Equations(alphas, clock, intervals, window_secs)
-    listeners = hold.add_raw, consistency.add
-    for signals in resampled_chunks(log, clock, on_progress, "resample", *listeners):
+    listeners, chunked = (hold.add_raw, consistency.add), MeasuredChannels(log, clock, log_stats)
+    for signals in resampled_chunks(chunked, clock, on_progress, "resample", *listeners):
         collector.add(hold.step(signals))
         equations.add(signals, collector.max_speed)
     stats = collector.result()
     if not np.array_equal(stats.intervals, equations.intervals):
         equations = _Equations(alphas, clock, stats.intervals, window_secs)
-        for signals in resampled_chunks(log, clock, on_progress, "resample"):
+        for signals in resampled_chunks(chunked, clock, on_progress, "resample"):
             equations.add(signals, stats.max_speed)
     _require_outputs(log, stats)
     findings = consistency.result()
@@ -183,7 +186,7 @@ def second_pass(
 
 
 def resampled_chunks(
-    log: ChunkedLog,
+    log: RawChunks,
     clock: Clock,
     on_progress: ProgressCallback,
     step: str,

@@ -5,7 +5,7 @@ disturbances to estimate.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import sqrt
 
 from analysis.disturbance.observer import wave_frequency_warnings
@@ -23,7 +23,6 @@ from shiplog.checks.consistency.findings import naming_contradictions
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.resampling import Clock
 from shiplog.screening import Screening
-from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Log
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, settings_dict
 from shiplog.vessel.vessel import with_length, with_settings
@@ -31,6 +30,7 @@ from shiplog.vessel.vessel_parser import parse_vessel
 
 from .passes import FirstPass, SecondPass, first_pass, second_pass
 from .reading_options import DEFAULT_OPTIONS, ReadingOptions
+from .sensor_errors import sensor_model, with_forces
 
 GIVEN_MODEL = "given"
 ATTACHED_MODEL = "attached to the log"
@@ -68,6 +68,9 @@ class Plan:
         Problems found so far, each in a sentence.
     contradictions
         Those of the warnings by which a unit or a sign is wrong.
+    omitted_sensors
+        The sensor errors that the log does not determine, each with the reason, where
+        ``filter.sensor_bias`` is ``auto``.
     """
 
     screening: Screening
@@ -82,6 +85,7 @@ class Plan:
     surge_solution: RegressionSolution
     warnings: tuple[str, ...]
     contradictions: tuple[str, ...] = ()
+    omitted_sensors: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -151,8 +155,7 @@ def _plan(
     else:
         model_warnings = _other_model_warnings(vessel)
     warnings += [*model_warnings, *unused_setting_warnings(kind, vessel.filter, vessel.disturbance)]
-    noise, noise_warnings = _noise(vessel, kind, first, second.stats)
-    disturbance, wave_warnings = _disturbance_settings(vessel, kind, second.stats, noise)
+    design = _design(vessel, kind, first.log_stats, second.stats)
     return Plan(
         screening=first.screening,
         clock=first.clock,
@@ -160,11 +163,12 @@ def _plan(
         model_origin=origin,
         filter_kind=kind,
         stats=second.stats,
-        noise=noise,
-        disturbance_settings=disturbance,
+        noise=design.noise,
+        disturbance_settings=design.disturbance,
+        omitted_sensors=design.omitted_sensors,
         yaw_solution=second.yaw.solution(),
         surge_solution=second.surge.solution(),
-        warnings=(*warnings, *noise_warnings, *wave_warnings),
+        warnings=(*warnings, *design.warnings),
         contradictions=second.contradictions,
     )
 
@@ -201,11 +205,14 @@ def with_default_settings(plan: Plan, names: Iterable[str]) -> Plan:
     """
     vessel = with_settings(plan.vessel, dict.fromkeys(names, "auto"))
     vessel, kind = _with_filter(vessel, None)
-    averaged = _averaged(vessel.filter, plan.log_stats, plan.clock.dt_secs)
-    noise = noise_of(plan.stats, vessel.paper_coefficients, averaged, kind)
-    disturbance, _ = _disturbance_settings(vessel, kind, plan.stats, noise)
+    design = _design(vessel, kind, plan.log_stats, plan.stats)
     return replace(
-        plan, vessel=vessel, filter_kind=kind, noise=noise, disturbance_settings=disturbance
+        plan,
+        vessel=vessel,
+        filter_kind=kind,
+        noise=design.noise,
+        disturbance_settings=design.disturbance,
+        omitted_sensors=design.omitted_sensors,
     )
 
 
@@ -267,12 +274,39 @@ def _other_model_warnings(vessel: Vessel) -> list[str]:
     return [text]
 
 
-def _noise(
-    vessel: Vessel, kind: FilterKind, first: FirstPass, stats: SignalStats
-) -> tuple[NoiseModel, list[str]]:
-    """Return the noise that the filter assumes, and warnings about its wave."""
-    settings = _averaged(vessel.filter, first.log_stats, first.clock.dt_secs)
-    noise, warnings = noise_of(stats, vessel.paper_coefficients, settings, kind), []
+@dataclass(frozen=True, eq=False)
+class _Design:
+    """The noise and the further states of the filter, and the disturbances."""
+
+    noise: NoiseModel
+    disturbance: DisturbanceSettings
+    omitted_sensors: Mapping[str, str]
+    warnings: tuple[str, ...]
+
+
+def _design(vessel: Vessel, kind: FilterKind, log_stats: LogStats, stats: SignalStats) -> _Design:
+    """Choose the sensor errors, the noise and the disturbances, in this order.
+
+    Where the states are smoothed the disturbances are states too, and the noise is estimated with
+    them; the frequency of a wave among them follows from the noise without them.
+    """
+    settings, model = _averaged(vessel.filter, log_stats, stats.dt_secs), vessel.paper_coefficients
+    further, omitted = sensor_model(settings, model, stats, vessel.disturbance)
+    has_forces = settings.smooth and kind.has_further_states
+    noise, disturbance = None, vessel.disturbance
+    wave_warnings: list[str] = []
+    if not has_forces or "wave" in disturbance.models:
+        noise = noise_of(stats, model, settings, kind, further)
+        disturbance, wave_warnings = _disturbance_settings(vessel, kind, stats, noise)
+    if noise is None or has_forces:
+        noise = noise_of(stats, model, settings, kind, with_forces(further, disturbance, stats))
+    warnings = (*_wave_warnings(settings, noise), *wave_warnings)
+    return _Design(noise, disturbance, omitted, warnings)
+
+
+def _wave_warnings(settings: FilterSettings, noise: NoiseModel) -> list[str]:
+    """Warn where a wave was asked for, and there is none."""
+    warnings = []
     if settings.wave and noise.wave is None:
         warnings.append(
             "no wave found in the residual of the yaw rate: none is separated from the ship's "
@@ -284,7 +318,7 @@ def _noise(
             "the wave set in [filter] is less likely than no wave: the residual of the yaw rate "
             "has no such peak"
         )
-    return noise, warnings
+    return warnings
 
 
 def _disturbance_settings(
@@ -313,8 +347,16 @@ def _averaged(settings: FilterSettings, log_stats: LogStats, dt_secs: float) -> 
 
     Samples of a channel that is faster than the clock are averaged.
     """
-    stds = []
-    for name, std in zip(PAPER_OUTPUTS, (settings.yaw_rate_std, settings.speed_std), strict=True):
-        together = max(1.0, dt_secs / log_stats[name].interval_secs)
-        stds.append(None if std is None else std / sqrt(together))
-    return replace(settings, yaw_rate_std=stds[0], speed_std=stds[1])
+    channels = {
+        "yaw_rate_std": "yaw_rate",
+        "speed_std": "speed",
+        "heading_std": "heading",
+        "position_std": "position",
+    }
+    stds = {}
+    for key, name in channels.items():
+        std = getattr(settings, key)
+        if std is not None and name in log_stats:
+            together = max(1.0, dt_secs / log_stats[name].interval_secs)
+            stds[key] = std / sqrt(together)
+    return replace(settings, **stds)

@@ -10,12 +10,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 
 from analysis.disturbance.observer import observe_disturbance
-from analysis.filters.factory import filter_states
-from analysis.filters.noise_model import NoiseModel
+from analysis.filters.factory import filter_kind, filter_states
+from analysis.filters.noise_model import FurtherModel, NoiseModel
 from analysis.regression.changes import ChangeTest
 from analysis.regression.newey_west import window_variances
 from analysis.regression.sliding import fit_regression
@@ -33,7 +34,9 @@ DT_SECS = 1.0
 
 
 @contextmanager
-def compiling_beside(kind: str | None, *, smooth: bool) -> Iterator[subprocess.Popen[bytes] | None]:
+def compiling_beside(
+    kind: str | None, *, smooth: bool, sensors: bool = False
+) -> Iterator[subprocess.Popen[bytes] | None]:
     """Start the compilation of the estimators' loops in a second process, on a first run.
 
     Parameters
@@ -42,6 +45,8 @@ def compiling_beside(kind: str | None, *, smooth: bool) -> Iterator[subprocess.P
         The name of the filter; None for the default one.
     smooth
         Whether the smoother is compiled too.
+    sensors
+        Whether sensor errors are states of the filter.
 
     Yields
     ------
@@ -52,7 +57,8 @@ def compiling_beside(kind: str | None, *, smooth: bool) -> Iterator[subprocess.P
     if is_compiled("analysis"):
         yield None
         return
-    command = [sys.executable, "-m", __name__, kind or "", "smooth" if smooth else ""]
+    flags = ("smooth" if smooth else "", "auto" if sensors else "")
+    command = [sys.executable, "-m", __name__, kind or "", *flags]
     quiet = subprocess.DEVNULL
     process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)  # noqa: S603
     try:
@@ -74,6 +80,8 @@ def compile_estimators(settings: FilterSettings) -> None:
     }
     signals = Signals(0, DT_SECS, values)
     noise = NoiseModel(np.array([1e-4, 0.1]), np.array([1e-5, 1e-5]))
+    if filter_kind(settings.chosen).has_further_states and (settings.smooth or settings.sensors):
+        noise = replace(noise, further=FurtherModel(sensors=("rudder",)))
     filter_states(signals, model, noise, settings)
     observe_disturbance(signals, model, noise)
 
@@ -111,6 +119,10 @@ def _example_rows() -> Rows:
 
 if __name__ == "__main__":
     gc.set_threshold(RARE_COLLECTION)
-    kind, smooth = sys.argv[1:]
-    compile_estimators(FilterSettings(kind=kind or None, smooth=bool(smooth)))
+    kind, smooth, sensors = sys.argv[1:]
+    compile_estimators(
+        FilterSettings(
+            kind=kind or None, smooth=bool(smooth), sensor_bias=(sensors,) if sensors else None
+        )
+    )
     compile_windows()

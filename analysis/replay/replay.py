@@ -20,6 +20,7 @@ from shiplog.screening import ScreenedLog
 from shiplog.types import Log
 
 from .estimator_design import make_estimators
+from .measured_channels import MeasuredChannels
 from .passes import resampled_chunks
 from .plan import Plan, plan_replay
 from .reading_options import DEFAULT_OPTIONS, ReadingOptions
@@ -115,6 +116,7 @@ class Replay:
         self, log: Log, plan: Plan, *, on_progress: ProgressCallback = no_progress
     ) -> None:
         self._log = ScreenedLog(log, plan.screening)
+        self._chunked = MeasuredChannels(self._log, plan.clock, plan.log_stats)
         self.plan, self._on_progress = plan, on_progress
         self._started = False
         self._findings: Findings | None = None
@@ -138,7 +140,7 @@ class Replay:
         adjoints = self._backward_pass() if self.plan.vessel.filter.smooth else None
         hold, stages = InputHold(clock), Stages(self.plan)
         listeners = hold.add_raw, stages.tracker.add_raw
-        resampled = resampled_chunks(self._log, clock, self._on_progress, "replay", *listeners)
+        resampled = resampled_chunks(self._chunked, clock, self._on_progress, "replay", *listeners)
         for signals, held, following in held_throughout(resampled, hold):
             adjoint = next(adjoints) if adjoints is not None else None
             yield stages.step(signals, held, following, adjoint)
@@ -156,9 +158,9 @@ class Replay:
         plan = self.plan
         hold, (filter_, _) = InputHold(plan.clock), make_estimators(plan)
         tracing = smoothable(filter_)
-        backward = SmoothingPass(tracing.outputs)
+        backward = SmoothingPass()
         resampled = resampled_chunks(
-            self._log, plan.clock, self._on_progress, "smooth", hold.add_raw
+            self._chunked, plan.clock, self._on_progress, "smooth", hold.add_raw
         )
         for _, held, following in held_throughout(resampled, hold):
             backward.add(tracing.trace(held, following)[1])

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from analysis.disturbance.observer import Disturbance, DisturbanceSummary
+from analysis.disturbance.summary import Disturbance, DisturbanceSummary
 from analysis.filters.base import Estimates
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit
@@ -12,6 +12,7 @@ from shiplog.types import Event
 
 from .plan import Plan
 from .residuals import ResidualSummary
+from .sensor_errors import SensorError
 from .track import Track
 
 
@@ -52,7 +53,8 @@ class Findings:
     metadata
         The metadata of the log.
     residuals
-        The tests of the innovations of yaw rate and speed.
+        The tests of the innovations of yaw rate and speed, and of the heading and the position
+        (``north``, ``east``) that the filter uses.
     disturbances
         The summary of each disturbance: ``"yaw"``, ``"rudder"`` (yaw, as the rudder that would do
         the same), ``"surge"``, and ``"yaw_wave"`` and ``"surge_wave"`` where they are estimated.
@@ -66,6 +68,8 @@ class Findings:
         Those of the plan and those of the replay.
     events
         The events of the log, in the order of time.
+    sensor_errors
+        The sensor errors that the filter estimates, and those that it was to and cannot.
     """
 
     plan: Plan
@@ -78,6 +82,7 @@ class Findings:
     track_origin: str
     warnings: tuple[str, ...]
     events: tuple[Event, ...] = ()
+    sensor_errors: tuple[SensorError, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

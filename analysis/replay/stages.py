@@ -4,8 +4,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from analysis.disturbance.filter_forces import FilterForces
+from analysis.disturbance.summary import Disturbance
 from analysis.filters.base import OUTPUT_STATES, Estimates
 from analysis.filters.factory import smoothable
+from analysis.filters.noise_model import FURTHER_OUTPUTS
 from analysis.filters.smoother import Adjoint, smoothed
 from analysis.regression.changes import ShipChangeTest
 from analysis.regression.coefficients import CoefficientStage
@@ -18,11 +21,13 @@ from .estimator_design import (
     make_estimators,
     require_settings_of_observer,
     without_rejected,
+    without_sensor_errors,
 )
 from .passes import weak_form_on_clock
 from .plan import Plan
 from .replay_results import Findings, ReplayChunk
 from .residuals import ResidualTest
+from .sensor_errors import sensor_errors
 from .track import Tracker
 
 MIN_EXCESS_SHARE = 0.5  # of the trial, with a disturbance beyond the rudder: the model is wrong
@@ -40,7 +45,22 @@ class Stages:
     def __init__(self, plan: Plan) -> None:
         self._plan, self._unchecked = plan, True
         self._filter, self._observer = make_estimators(plan)
-        self._residual_tests = [_residual_test(plan, i) for i in range(len(PAPER_OUTPUTS))]
+        further = plan.noise.further
+        self._forces = (
+            FilterForces(
+                plan.vessel.paper_coefficients,
+                plan.stats,
+                plan.disturbance_settings,
+                rudder_max=plan.vessel.rudder_max,
+            )
+            if further.yaw
+            else None
+        )
+        self._last: dict[str, tuple[float, float]] = {}
+        self._residual_tests = [
+            *(_residual_test(plan, i) for i in range(len(PAPER_OUTPUTS))),
+            *(_further_residual_test(plan, name) for name in further.outputs),
+        ]
         weak_form = weak_form_on_clock(
             plan.vessel.paper_coefficients, plan.clock, plan.stats.intervals
         )
@@ -82,10 +102,7 @@ class Stages:
                 estimates.innovation_stds[:, i],
                 estimates.rejected[:, i],
             )
-        disturbance = self._observer.step(without_rejected(held, estimates), following)
-        if self._unchecked and not disturbance.is_finite:
-            self._unchecked = False
-            require_settings_of_observer(self._plan)
+        disturbance = self._disturbance(held, following, estimates)
         yaw_rows, surge_rows = self._weak_form.step(signals, self._plan.stats.max_speed)
         self._change_test.add(yaw_rows, surge_rows)
         return ReplayChunk(
@@ -102,19 +119,43 @@ class Stages:
         residuals = tuple(test.result() for test in self._residual_tests)
         changes = self._change_test.result()
         warnings = [residual.warning for residual in residuals if residual.warning]
-        warnings += _excess_warnings(self._plan, self._observer.excess_share)
+        disturbances = self._forces or self._observer
+        warnings += _excess_warnings(self._plan, disturbances.excess_share)
         return Findings(
             plan=self._plan,
             metadata=dict(log.metadata),
             residuals=residuals,
-            disturbances=self._observer.result(),
+            disturbances=disturbances.result(),
             yaw=self._yaw.result(),
             surge=self._surge.result(),
             changes=changes,
             track_origin=self.tracker.origin,
             warnings=(*self._plan.warnings, *warnings, *map(str, changes)),
             events=log.events,
+            sensor_errors=sensor_errors(
+                self._plan.noise.further.sensors,
+                self._plan.omitted_sensors,
+                self._last,
+                residuals,
+            ),
         )
+
+    def _disturbance(
+        self, held: Signals, following: Mapping[str, float], estimates: Estimates
+    ) -> Disturbance:
+        """Take the disturbance from the filter, or estimate it by the observer."""
+        if estimates.further is not None:
+            rows = zip(estimates.further.values[-1], estimates.further.stds[-1], strict=True)
+            pairs = [(float(value), float(std)) for value, std in rows]
+            self._last = dict(zip(estimates.further.names, pairs, strict=True))
+        if self._forces is not None:
+            return self._forces.step(held, estimates)
+        corrected = without_sensor_errors(without_rejected(held, estimates), estimates)
+        disturbance = self._observer.step(corrected, following)
+        if self._unchecked and not disturbance.is_finite:
+            self._unchecked = False
+            require_settings_of_observer(self._plan)
+        return disturbance
 
     def _estimates(
         self, held: Signals, following: Mapping[str, float], adjoint: Adjoint | None
@@ -159,4 +200,20 @@ def _residual_test(plan: Plan, output: int) -> ResidualTest:
         plan.clock.dt_secs,
         noise_measured=noise_measured,
         constant=low == high,
+    )
+
+
+def _further_residual_test(plan: Plan, output: str) -> ResidualTest:
+    """Set up the test of the innovations of the heading, or of the position north or east."""
+    values = plan.stats.head[output]
+    steps = np.diff(np.flatnonzero(np.isfinite(values)))
+    is_heading = output == FURTHER_OUTPUTS[0]
+    stated = plan.vessel.filter.heading_std if is_heading else plan.vessel.filter.position_std
+    return ResidualTest(
+        "heading" if is_heading else output,
+        "rad" if is_heading else "m",
+        float(np.median(steps)) if len(steps) else 1.0,
+        plan.clock.dt_secs,
+        noise_measured=stated is None,
+        constant=bool(np.ptp(values[np.isfinite(values)]) == 0),
     )

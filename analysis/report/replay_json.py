@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from analysis.disturbance.observer import DisturbanceSummary
-from analysis.filters.noise_model import Wave
+from analysis.disturbance.summary import DisturbanceSummary
+from analysis.filters.noise_model import NoiseModel, Wave
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit
 from analysis.replay.replay_results import Findings
@@ -123,8 +123,15 @@ def residual_json(residuals: ResidualSummary) -> JsonObject:
 
 
 def _residuals(findings: Findings, output: int) -> JsonObject:
-    noise = findings.plan.noise
-    return residual_json(findings.residuals[output]) | {
+    return residual_json(findings.residuals[output]) | _noise(findings.plan.noise, output)
+
+
+def _noise(noise: NoiseModel, output: int) -> JsonObject:
+    """Return the noise that the filter assumes of an output; the further ones have no process."""
+    further = output - len(noise.measurement_std)
+    if further >= 0:
+        return {"measurement_std": noise.further.output_stds[further]}
+    return {
         "measurement_std": float(noise.measurement_std[output]),
         "measurement_std_origin": "log" if noise.measured[output] else "vessel file",
         "process_ratio": float(noise.process_ratio[output]),

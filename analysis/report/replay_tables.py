@@ -9,7 +9,7 @@ from analysis.replay.replay_results import Findings
 from analysis.replay.residuals import MIN_CORRELATION, SIGNIFICANCE, ResidualSummary
 from shiplog.checks.event_table import event_table
 from shiplog.text_table import TextTable
-from shiplog.units import CATALOGUE, conversion_factor
+from shiplog.units import display_conversion
 
 from .display import BAND_STDS, DISTURBANCES
 from .markdown import markdown_page
@@ -65,8 +65,8 @@ def _log_table(findings: Findings) -> TextTable:
 def _residual_table(findings: Findings) -> TextTable:
     rows = []
     for residuals in findings.residuals:
-        unit = CATALOGUE[residuals.name].display_unit
-        rms = residuals.rms * conversion_factor(residuals.unit, unit)
+        unit, factor = display_conversion(residuals.name, residuals.unit)
+        rms = residuals.rms * factor
         low, high = residuals.nis_band
         cells = (
             f"{_words(residuals.name)} [{unit}]",

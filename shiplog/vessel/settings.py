@@ -14,6 +14,8 @@ from shiplog.toml_text import unknown_key
 FILTER_GROUP = "shiplog.filters"  # the entry points whose names `[filter] kind` accepts
 DISTURBANCES = ("constant", "ramp", "wave")
 SPECTRA = ("butterworth", "binomial")
+SENSOR_ERRORS = ("gyro", "log", "log_scale", "rudder", "compass")
+SENSOR_CHOICES = ("auto", "none", *SENSOR_ERRORS)
 
 MIN_WINDOW_SECS = 60.0  # length of one test function of the equations in integral form
 
@@ -80,6 +82,11 @@ class FilterSettings:
         Separate waves in the yaw rate from the ship's own turning.
     wave_frequency, wave_damping, wave_std
         Frequency in rad/s, damping ratio, and standard deviation in rad/s of the wave model.
+    sensor_bias
+        Sensor errors that are states of the filter, some of `SENSOR_ERRORS`; ``auto`` selects those
+        that the log determines. Heading and position are then measurements of the filter too.
+    heading_std, position_std
+        Standard deviation of the white noise of one sample of heading, rad, and position, m.
     """
 
     SECTION: ClassVar[str] = "filter"
@@ -101,6 +108,14 @@ class FilterSettings:
     wave_frequency: float | None = _number(positive=True, least=1e-6, most=1e3)
     wave_damping: float | None = _number(positive=True, least=1e-6, most=1.0)
     wave_std: float | None = _number(positive=True, least=1e-8, most=1.0)
+    sensor_bias: tuple[str, ...] | None = _choice(SENSOR_CHOICES, None, several=True)
+    heading_std: float | None = _number(positive=True, least=1e-7, most=1.0)
+    position_std: float | None = _number(positive=True, least=1e-4, most=1e4)
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """The sensor errors requested, which may be ``auto``; empty for none."""
+        return tuple(name for name in self.sensor_bias or () if name != "none")
 
     @property
     def chosen(self) -> str:

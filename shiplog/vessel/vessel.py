@@ -121,7 +121,8 @@ def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
         The vessel.
     settings
         Values by section and key, such as ``{"filter.kind": "extended"}``. The keys are those of
-        `[filter]`, `[disturbance]` and `[identifier]`; the value "auto" restores the default.
+        `[filter]`, `[disturbance]` and `[identifier]`; the value "auto" restores the default, but
+        for ``filter.sensor_bias``, which has a choice of that name.
 
     Raises
     ------
@@ -141,7 +142,9 @@ def with_settings(vessel: Vessel, settings: Mapping[str, object]) -> Vessel:
     tables = {section: settings_dict(getattr(vessel, section)) for section in SECTIONS}
     for name, value in settings.items():
         section, _, key = name.partition(".")
-        if section in tables and value == "auto":
+        if name == "filter.sensor_bias" and isinstance(value, str):
+            tables[section][key] = [word.strip() for word in value.split(",")]
+        elif section in tables and value == "auto":
             tables[section].pop(key, None)
         elif section in tables:
             tables[section][key] = value

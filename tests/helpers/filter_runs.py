@@ -192,10 +192,10 @@ def smoothed_run(
 ) -> tuple[Estimates, Trace, tuple[np.ndarray, np.ndarray]]:
     """What the filter made of a whole run, how, and the smoothed states and covariances."""
     estimates, trace = filtering.trace(signals, last_inputs(signals))
-    going = SmoothingPass(filtering.outputs)
+    going = SmoothingPass()
     going.add(trace)
     (end,) = going.result()
-    return estimates, trace, smooth(trace, filtering.outputs, end)
+    return estimates, trace, smooth(trace, end)
 
 
 def together(parts: list[Estimates] | list[Trace]) -> Estimates | Trace:

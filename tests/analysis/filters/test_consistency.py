@@ -114,7 +114,7 @@ def judged(
         expected = true if own == 5 else told_of(c, true[:, :3], *inputs.T, stats.dt_secs)
         ways = (trace.states, trace.covariances), smoothed
         for kept, (x, P) in zip(result, ways, strict=True):
-            outputs, _, _ = filtering.to_estimates(signals, last_inputs(signals), x, P)
+            outputs, *_ = filtering.to_estimates(signals, last_inputs(signals), x, P)
             kept.append((x[:, :own] - true[:, :own], P[:, :own, :own], outputs - expected))
     filtered, smoothed = (Ensemble(*map(np.array, zip(*runs, strict=True))) for runs in result)
     return filtered, smoothed

@@ -177,7 +177,7 @@ def test_a_trace_is_kept_without_changing_what_is_said(
     estimates = filtering.to_estimates(
         signals, last_inputs(signals), trace.states, trace.covariances
     )
-    for name, values in zip(("states", "stds", "wave"), estimates, strict=True):
+    for name, values in zip(("states", "stds", "wave", "further"), estimates, strict=True):
         expected = getattr(result, name)
         assert values is expected is None or np.array_equal(values, expected), name
 

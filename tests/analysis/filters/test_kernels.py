@@ -93,7 +93,7 @@ def test_a_covariance_goes_on_as_f_p_f_and_q_and_stays_symmetric(seed: int) -> N
     _, Q, _ = drawn(rng, 5)
     F = rng.standard_normal((5, 5))
     expected = F @ P @ F.T + Q
-    propagate(P, F, Q, np.empty((5, 5)))
+    propagate(P, F, Q, np.empty((5, 5)), 5)
     assert np.abs(P - expected).max() < 1e-13 * np.abs(expected).max()
     assert np.array_equal(P, P.T)
 

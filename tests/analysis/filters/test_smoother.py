@@ -117,13 +117,13 @@ def smoothed_in_chunks(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gone through twice, as a trial longer than memory is."""
     first, second = filters
-    going = SmoothingPass(first.outputs)
+    going = SmoothingPass()
     for chunk, following in in_chunks(signals, cuts):
         going.add(first.trace(chunk, following)[1])
     ends = going.result()
     assert len(ends) == len(cuts) + 1
     parts = [
-        smooth(second.trace(chunk, following)[1], second.outputs, end)
+        smooth(second.trace(chunk, following)[1], end)
         for (chunk, following), end in zip(in_chunks(signals, cuts), ends, strict=True)
     ]
     states, covariances = zip(*parts, strict=True)
@@ -211,7 +211,7 @@ def test_the_settings_smooth_what_is_told_and_leave_the_innovations_alone(
         assert np.array_equal(getattr(computed, name), getattr(plain, name), equal_nan=True), name
     filtering = made(vessel, signals, kind)
     _, _, (x, P) = smoothed_run(filtering, signals)
-    states, stds, _ = filtering.to_estimates(signals, last_inputs(signals), x, P)
+    states, stds, *_ = filtering.to_estimates(signals, last_inputs(signals), x, P)
     assert np.array_equal(computed.states, states)
     assert np.array_equal(computed.stds, stds)
     assert not np.array_equal(computed.states, plain.states)
@@ -223,8 +223,8 @@ def test_a_smoothed_wave_is_told_too(vessel: Vessel, signals: Signals) -> None:
     computed = filter_states(signals, c, noise, settings)
     filtering = made(vessel, signals, "extended", WAVE)
     estimates, trace, (x, _) = smoothed_run(filtering, signals)
-    assert np.array_equal(computed.wave, x[:, 3:] @ filtering.outputs[0, 3:])
-    nothing = SmoothingPass(filtering.outputs)
+    assert np.array_equal(computed.wave, x[:, 3:] @ filtering._wave)
+    nothing = SmoothingPass()
     nothing.add(trace)
     (end,) = nothing.result()
     again = smoothed(filtering, signals, last_inputs(signals), estimates, trace, end)

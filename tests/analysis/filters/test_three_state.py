@@ -18,10 +18,11 @@ from filter_runs import (
 from gaussian import apart
 from scipy.integrate import solve_ivp
 
+from analysis.filters.core import StepInputs
 from analysis.filters.factory import filter_states, make_filter
 from analysis.filters.gains import linear_axes
 from analysis.filters.noise_model import NoiseModel, Wave
-from analysis.filters.ship_step import output_row, predict_ship
+from analysis.filters.ship_step import predict_ship, ship_row
 from analysis.filters.tuning import noise_of
 from analysis.replay.residuals import assess_innovations
 from analysis.signals.hold import last_inputs
@@ -70,9 +71,13 @@ def drawn(rng: np.random.Generator) -> tuple[np.ndarray, float, float, float, fl
     return x, *rng.uniform([-0.6, -0.05, 40, -1], [0.6, 0.05, 120, 1]).tolist()
 
 
+def acting(*u: float, moment: float = 0.0, force: float = 0.0) -> StepInputs:
+    return StepInputs(*u, moment, force)
+
+
 def step(c: Coefficients, x: np.ndarray, u: tuple[float, ...], dt: float) -> np.ndarray:
     moved = x.copy()
-    predict_ship(c, moved, np.zeros((len(x), len(x))), *u, dt)
+    predict_ship(c, moved, np.zeros((len(x), len(x))), np.zeros((3, 0)), acting(*u), dt)
     return moved
 
 
@@ -95,7 +100,7 @@ def test_the_transition_is_the_derivative_of_the_step(vessel: Vessel, seed: int)
     c, dt = vessel.coefficients, 0.7
     x, *u = drawn(np.random.default_rng(seed))
     F = np.zeros((3, 3))
-    predict_ship(c, x.copy(), F, *u, dt)
+    predict_ship(c, x.copy(), F, np.zeros((3, 0)), acting(*u), dt)
     for j, h in enumerate((1e-6, 1e-6, 1e-4)):
         shift = h * np.eye(3)[j]
         slope = (step(c, x + shift, u, dt) - step(c, x - shift, u, dt)) / (2 * h)
@@ -213,7 +218,8 @@ def test_what_is_no_state_is_as_unsure_as_the_states_it_follows_from(
     x, delta, delta_dot, n, _ = drawn(rng)
     root = 1e-3 * UNITS[:, None] * rng.standard_normal((3, 3))
     row = np.empty(10)
-    output_row(c, x, root @ root.T, delta, delta_dot, n, row)
+    u = acting(delta, delta_dot, n, 0.0)
+    ship_row(c, x, root @ root.T, u, np.zeros((2, 3)), row)
     helm = np.array([delta, delta + delta_dot * dt]), np.full(2, n)
     close = np.testing.assert_allclose
     close(row[:5], told_of(c, np.array([x, x]), *helm, dt)[0], rtol=1e-12)

@@ -13,7 +13,7 @@ from shiplog.vessel.settings import FilterSettings
 
 A_REPLAY_AFTERWARDS = f"""
 from analysis.disturbance.loop import observe_chunk
-from analysis.filters.pseudo_input import _filter
+from analysis.filters.filter_loop import run_filter
 from analysis.regression.changes import _add_to_blocks
 from analysis.regression.newey_west import add_rows, window_variances
 from analysis.regression.window_qr import _push_batch
@@ -22,7 +22,7 @@ from analysis.replay.replay import analyse
 from analysis.replay.residuals import _add_products
 from shiplog.vessel.settings import FilterSettings
 
-estimators, windows = (_filter, observe_chunk), (_push_batch,)
+estimators, windows = (run_filter, observe_chunk), (_push_batch,)
 tests = (add_rows, window_variances, _add_to_blocks, _add_products)
 compile_tests()
 assert all(loop.signatures for loop in tests)
@@ -41,6 +41,8 @@ def test_the_loops_of_every_filter_are_compiled_by_running_them(name: str) -> No
     compile_estimators(FilterSettings(kind=name))
     if filter_kind(name).smoothable:
         compile_estimators(FilterSettings(kind=name, smooth=True))
+    if filter_kind(name).has_further_states:
+        compile_estimators(FilterSettings(kind=name, sensor_bias=("auto",)))
 
 
 def test_a_replay_compiles_no_loop_again_and_each_process_its_own() -> None:

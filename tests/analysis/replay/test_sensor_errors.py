@@ -1,0 +1,155 @@
+"""Sensor errors as states of the filter, through a whole replay."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from places import SAMPLE_DATA
+from scipy.interpolate import CubicSpline
+from trial_logs import InChunks
+
+from analysis.replay.reading_options import ReadingOptions
+from analysis.replay.replay import analyse
+from analysis.replay.replay_results import Analysis
+from shiplog import TrialLog, UsageError, load_vessel, read
+
+BIASED = SAMPLE_DATA / "zigzag_10_10_dropouts.mcap"  # a gyro with a bias of 0.02 deg/s
+TRANSIENT_SECS = 60.0
+AUTO = {"filter.kind": "extended", "filter.smooth": True, "filter.sensor_bias": ["auto"]}
+
+
+@cache
+def biased() -> TrialLog:
+    return read(BIASED)
+
+
+@cache
+def replayed() -> Analysis:
+    return analyse(biased(), settings=AUTO)
+
+
+def wrong_model() -> ReadingOptions:
+    """T1 20 % too large, and h 10 %."""
+    vessel, _ = load_vessel("table1")
+    c, T1, T2 = vessel.paper_coefficients, 180.0, 50.0
+    scaled = {name: getattr(c, name) / 1.2 for name in ("b1", "b2", "b3", "d", "e")}
+    return ReadingOptions(
+        vessel=replace(
+            vessel, coefficients=c._replace(a=-(T1 + T2) / (T1 * T2), h=1.1 * c.h, **scaled)
+        )
+    )
+
+
+def error_of_yaw_rate(result: Analysis) -> float:
+    """Root mean square after the transient, deg/s."""
+    truth = read(SAMPLE_DATA / "zigzag_10_10_dropouts.truth.mcap")["yaw_rate"]
+    true_secs = (truth.measured_ns - result.signals.start_ns) * 1e-9
+    secs = result.signals.time_secs
+    within = (secs > TRANSIENT_SECS) & (secs < true_secs[-1])
+    errors = result.estimates.states[:, 0] - CubicSpline(true_secs, truth.values)(secs)
+    return float(np.degrees(np.sqrt(np.mean(errors[within] ** 2))))
+
+
+def without(log: TrialLog, *names: str) -> TrialLog:
+    return replace(log, channels=tuple(c for c in log.channels if c.name not in names))
+
+
+def test_a_biased_gyro_is_found_and_the_yaw_rate_is_accurate() -> None:
+    result = replayed()
+    assert error_of_yaw_rate(result) < 1e-4
+    rudder = result.findings.disturbances["rudder"]
+    assert np.degrees(rudder.rms) < 0.05  # 1.1 deg without the bias
+    assert all(residual.consistent for residual in result.findings.residuals[:2])
+    gyro, log = result.findings.sensor_errors
+    assert (gyro.name, gyro.determined, log.name, log.determined) == ("gyro", True, "log", True)
+    assert abs(np.degrees(gyro.value) - 0.02) < 2.6 * np.degrees(gyro.std) < 1e-3
+
+
+def test_a_wrong_model_hardly_disturbs_the_bias() -> None:
+    settings = AUTO | {"filter.process_ratio": "auto"}
+    result = analyse(biased(), wrong_model(), settings=settings)
+    assert error_of_yaw_rate(result) < 1e-3
+    gyro = result.findings.sensor_errors[0]
+    assert abs(np.degrees(gyro.value) - 0.02) < 2.6 * np.degrees(gyro.std)
+
+
+def test_where_the_innovations_contradict_the_noise_set_nothing_is_determined() -> None:
+    found = analyse(biased(), wrong_model(), settings=AUTO).findings.sensor_errors
+    assert not any(error.determined for error in found)
+    assert all("filter.process_ratio=auto" in error.reason for error in found)
+
+
+@pytest.mark.parametrize("kind", ["pseudo-input", "steady-state", "quality", "per-tick"])
+def test_every_filter_finds_the_bias(kind: str) -> None:
+    result = analyse(biased(), settings={"filter.kind": kind, "filter.sensor_bias": ["auto"]})
+    gyro = result.findings.sensor_errors[0]
+    assert gyro.determined
+    assert abs(np.degrees(gyro.value) - 0.02) < 1e-3
+    assert abs(np.degrees(result.findings.disturbances["rudder"].at_end)) < 0.1
+
+
+def test_where_the_chunks_are_cut_changes_nothing() -> None:
+    settings = AUTO | {"filter.smooth": False}
+    whole, cut = (
+        analyse(log, settings=settings)
+        for log in (biased(), InChunks(biased(), [7.3, 111.1, 400.0]))
+    )
+    for name in ("values", "stds"):
+        one, other = (getattr(result.estimates.further, name) for result in (whole, cut))
+        assert np.array_equal(one, other)
+    assert np.array_equal(whole.disturbance.yaw, cut.disturbance.yaw)
+    assert whole.findings.residuals == cut.findings.residuals
+    assert whole.findings.sensor_errors == cut.findings.sensor_errors
+
+
+def test_what_the_log_does_not_determine_is_omitted_with_the_reason() -> None:
+    settings = {"filter.sensor_bias": ["auto"]}
+    gyro, log = analyse(without(biased(), "position"), settings=settings).findings.sensor_errors
+    assert gyro.determined
+    assert not log.determined
+    assert str(log) == "speed log bias: not estimated: it needs positions"
+    gyro, log = analyse(without(biased(), "heading"), settings=settings).findings.sensor_errors
+    assert str(gyro) == "gyro bias: not estimated: it needs a heading"
+
+
+REFUSED: dict[str, tuple[Mapping[str, object], tuple[str, ...], str]] = {
+    "gyro bias and yaw moment": (
+        {"filter.sensor_bias": ["gyro"]},
+        ("heading",),
+        "gyro bias and constant yaw moment cannot be distinguished at the mode 0 1/s; it takes a h",
+    ),
+    "rudder zero and yaw moment": (
+        {"filter.sensor_bias": ["rudder"]},
+        (),
+        "rudder zero and constant yaw moment cannot be distinguished",
+    ),
+    "compass bias": (
+        {"filter.sensor_bias": ["compass"]},
+        ("position",),
+        "compass bias cannot be seen at the mode 0 1/s; it takes positions",
+    ),
+    "log bias and surge force": (
+        {"filter.sensor_bias": ["log"]},
+        ("position",),
+        "speed log bias and constant surge force cannot be distinguished at the mode 0 1/s; it t",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_distinguished_is_refused_by_name(case: str) -> None:
+    settings, missing, message = REFUSED[case]
+    with pytest.raises(UsageError) as error:
+        analyse(without(biased(), *missing), settings=settings)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_gyro_bias_without_a_heading_is_estimated_where_no_constant_moment_is() -> None:
+    settings = {
+        "filter.kind": "extended", "filter.sensor_bias": ["gyro"], "disturbance.models": ["wave"],
+    }  # fmt: skip
+    (gyro,) = analyse(without(biased(), "heading"), settings=settings).findings.sensor_errors
+    assert abs(np.degrees(gyro.value) - 0.02) < 1e-3
