@@ -610,7 +610,9 @@ def test_an_unknown_verb_is_rejected_with_the_list_of_verbs(
     with pytest.raises(SystemExit) as caught:
         main(["inspect", "replay"])
     assert caught.value.code == USAGE
-    assert "'record', 'info', 'convert', 'replay', 'identify', 'check'" in capsys.readouterr().err
+    assert "'record', 'info', 'convert', 'replay', 'identify', 'estimate', 'check'" in (
+        capsys.readouterr().err
+    )
 
 
 def test_a_replay_imports_no_unneeded_library(recorded: Path) -> None:
