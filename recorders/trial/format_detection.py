@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 
 from recorders.streams.counts import StreamCounts
 from recorders.streams.format import GROUP, StreamFormat
@@ -35,29 +36,39 @@ def detect_stream_format(address: str) -> str:
     ShiplogError
         Nothing can be received, or the file cannot be read.
     UsageError
-        No installed format reads most of the packets without options of its own.
+        No installed format reads most of the packets without options of its own, or several do.
     """
-    formats = {
-        name: load_extension(GROUP, name, StreamFormat, "format") for name in extension_names(GROUP)
-    }
+    formats = _loadable_formats()
     clock = ReceptionClock()
     for name, stream_format in formats.items():
         if stream_format.open_transport(address, clock) is not None:
             return name  # an address that only this format has
     packets = _live_packets(address, clock) if is_live(address) else _file_packets(address)
-    shares = {
-        name: max(_readable(each, packets), _readable(each, _without_stamps(packets)))
+    unstamped = _without_stamps(packets)
+    able = [
+        name
         for name, each in formats.items()
-    }
-    best = max(shares, key=lambda name: shares[name])
-    if shares[best] <= _MOST:
-        cause = "no format reads most of its packets" if packets else "nothing was received"
-        raise UsageError(
-            f"the format of {address} was not detected ({cause}); state it: "
-            f"shiplog record FORMAT {address} with one of {', '.join(formats)}; csv-lines needs "
-            "--layout, and a table is converted by `shiplog convert`"
-        )
-    return best
+        if max(_readable(each, packets), _readable(each, unstamped)) > _MOST
+    ]
+    if len(able) == 1:
+        return able[0]
+    cause = "no format reads most of its packets" if packets else "nothing was received"
+    if able:
+        cause = f"{' and '.join(able)} read most of its packets"
+    raise UsageError(
+        f"the format of {address} was not detected ({cause}); state it: "
+        f"shiplog record FORMAT {address} with one of {', '.join(formats)}; csv-lines needs "
+        "--layout, and a table is converted by `shiplog convert`"
+    )
+
+
+def _loadable_formats() -> dict[str, StreamFormat]:
+    """Return the installed formats without those that cannot be loaded; `record` lists these."""
+    formats = {}
+    for name in extension_names(GROUP):
+        with suppress(ShiplogError):
+            formats[name] = load_extension(GROUP, name, StreamFormat, "format")
+    return formats
 
 
 def _readable(stream_format: StreamFormat, packets: Sequence[Packet]) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from number_format import NUMBERS
 from sentences import sentence
 
 from recorders.trial import format_detection
@@ -85,6 +86,16 @@ def test_a_file_of_no_format_is_refused_with_what_to_write(name: str, tmp_path: 
         UsageError, match=r"not detected \(no format reads.*record FORMAT .* with one"
     ):
         detect_stream_format(str(file))
+
+
+def test_packets_that_two_formats_read_have_no_detected_format(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    formats = dict.fromkeys(("one", "another"), NUMBERS)
+    monkeypatch.setattr(format_detection, "_loadable_formats", lambda: formats)
+    (tmp_path / "a.log").write_text("heading 1.0\n")
+    with pytest.raises(UsageError, match=r"not detected \(one and another read most"):
+        detect_stream_format(str(tmp_path / "a.log"))
 
 
 def test_a_file_without_lines_is_refused(tmp_path: Path) -> None:
