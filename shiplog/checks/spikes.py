@@ -15,15 +15,14 @@ SMOOTH_QUANTITIES = (
     "yaw_rate", "speed", "rudder", "rpm", "heading", "sway", "speed_over_ground",
 )  # fmt: skip
 NEIGHBOURS = 3  # samples before and after, with which one is compared
-REACH = 20  # samples before and after, of which
-MAX_ALIKE = 2  # may have at least
-MIN_ALIKE = 0.25  # of a spike's excess: more is noise that has risen for a while
+REACH = 20  # samples before and after, which show the noise at a spike
 MARGIN = NEIGHBOURS + REACH
 MIN_SAMPLES = 100  # fewer do not show the noise
 MAX_INTERVAL_SECS = 2.0  # between samples; in a longer one, a ship may move and return
 MAX_WINDOW_INTERVALS = 2.0  # mean interval among the neighbours over the channel's own
 # An excess is a spike from these on:
 MIN_RANGES = 3.0  # times the range of the neighbours,
+MIN_STDS = 8.0  # times the standard deviation of the noise among the samples in reach,
 NOISE_QUANTILE, MIN_NOISE_RATIO = 0.98, 5.0  # times this quantile of all excesses,
 MIN_DIGITS = 5.0  # times the last digit (of a constant channel, which does not show its digits,
 MIN_CONSTANT_SIZE = 0.2  # times its value),
@@ -75,9 +74,8 @@ class SpikeSearch:
     three after it, of which the highest and the lowest do not count: so that a second spike among
     them, or a spike of two samples, hides nothing. A step, a ramp and a resolved peak have no
     excess beyond the range of their own neighbourhood, which a spike must exceed several times, as
-    it must exceed the channel's own noise and its last digit. A spike is alone among the samples in
-    its reach, so that noise that rises for a while is none. The first and the last `MARGIN` samples
-    of a channel are not judged.
+    it must exceed the noise of the channel, about it and in general, and its last digit. The first
+    three samples of a channel and the last three are not judged.
 
     Parameters
     ----------
@@ -105,7 +103,7 @@ class SpikeSearch:
         self._times: TimeArray = np.zeros(0, np.int64)  # the last samples, not all judged
         self._values: FloatArray = np.zeros(0)
         self._excesses, self._sizes = Quantiles(MAX_VALUES), Quantiles(MAX_VALUES)
-        self._digit = np.inf
+        self._digit, self._begun = np.inf, False
         self._candidates = [np.zeros(0, _CANDIDATE)]
 
     def add(self, times_ns: TimeArray, values: FloatArray) -> None:
@@ -119,25 +117,39 @@ class SpikeSearch:
             self._add_block(times[block], values[block])
         self._keep_largest()
 
-    def _add_block(self, times: TimeArray, values: FloatArray) -> None:
-        """Judge the samples that have all others in reach among these."""
+    def _add_block(self, times: TimeArray, values: FloatArray, *, last: bool = False) -> None:
+        """Judge the samples that have all in reach among these, or are the first or the last."""
         low, high = _neighbourhood(values, circular=self._circular)
         spread, excess = high - low, np.maximum(np.maximum(-high, low), 0.0)
-        judged = slice(REACH, len(excess) - REACH)
+        judged = slice(REACH if self._begun else 0, len(excess) - (0 if last else REACH))
+        self._begun = True
         self._excesses.add(excess[judged])
         least = float(spread.min())
         least = least or float(np.min(spread, where=spread > 0, initial=np.inf))
         self._digit = min(self._digit, least)
-        at = REACH + np.flatnonzero(excess[judged] > MIN_RANGES * spread[judged])
-        in_reach = excess[at[:, None] + np.arange(-REACH, REACH + 1)]
-        alike = np.count_nonzero(in_reach > MIN_ALIKE * excess[at, None], axis=1) - 1
-        at = at[alike <= MAX_ALIKE]
+        at = judged.start + np.flatnonzero(excess[judged] > MIN_RANGES * spread[judged])
+        at = at[excess[at] > MIN_STDS * self._noise_std(values, at)]
         candidates = np.zeros(len(at), _CANDIDATE)
         candidates["time_ns"] = times[at + NEIGHBOURS]
         candidates["value"] = values[at + NEIGHBOURS]
         candidates["excess"] = excess[at]
         candidates["window_ns"] = times[at + 2 * NEIGHBOURS] - times[at]
         self._candidates.append(candidates)
+
+    def _noise_std(self, values: FloatArray, at: NDArray[np.intp]) -> FloatArray:
+        """Return the standard deviation of the noise in reach of some samples, (m,).
+
+        It is the larger of those before and after the sample, in case the noise rises or falls
+        there. Third differences do not contain the ship's motion; their variance in white noise is
+        20.
+        """
+        samples = NEIGHBOURS + at[:, None]
+        starts = np.clip(samples - REACH, 0, len(values) - 2 * REACH - 1)
+        around = values[starts + np.arange(2 * REACH + 1)]
+        around = _difference(around, values[samples], circular=self._circular)
+        sides = np.stack((around[:, :REACH], around[:, REACH + 1 :]))
+        differences = np.abs(np.diff(sides, 3, axis=2))
+        return np.asarray(1.4826 * np.median(differences, axis=2).max(axis=0) / np.sqrt(20))
 
     def result(self, interval_secs: float, *, rudder: bool = False) -> SpikeStats | None:
         """Return the spikes, or None; to be called once, after all samples.
@@ -149,6 +161,9 @@ class SpikeSearch:
         rudder
             Whether the channel is the angle of a rudder.
         """
+        if len(self._values) == 2 * MARGIN:
+            self._add_block(self._times, self._values, last=True)
+            self._keep_largest()
         enough = len(self._excesses.values) >= MIN_SAMPLES
         (candidates,) = self._candidates
         if not (len(candidates) and enough and 0 < interval_secs <= MAX_INTERVAL_SECS):
@@ -189,6 +204,14 @@ _CANDIDATE = np.dtype(
 )
 
 
+def _difference(values: FloatArray, sample: FloatArray, *, circular: bool) -> FloatArray:
+    """Return values relative to a sample, on the circle where they are angles that wrap."""
+    difference: FloatArray = values - sample
+    if circular:
+        difference = np.remainder(difference + np.pi, 2 * np.pi) - np.pi
+    return difference
+
+
 def _neighbourhood(values: FloatArray, *, circular: bool) -> tuple[FloatArray, FloatArray]:
     """Return the second lowest and the second highest of each sample's neighbours.
 
@@ -210,9 +233,7 @@ def _neighbourhood(values: FloatArray, *, circular: bool) -> tuple[FloatArray, F
     highest, high = np.full((2, count), -np.inf)
     for shift in range(2 * NEIGHBOURS + 1):
         if shift != NEIGHBOURS:
-            difference = values[shift : shift + count] - sample
-            if circular:
-                difference = np.remainder(difference + np.pi, 2 * np.pi) - np.pi
+            difference = _difference(values[shift : shift + count], sample, circular=circular)
             np.minimum(low, np.maximum(lowest, difference), out=low)
             np.minimum(lowest, difference, out=lowest)
             np.maximum(high, np.minimum(highest, difference), out=high)

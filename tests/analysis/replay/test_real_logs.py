@@ -52,6 +52,11 @@ def test_no_channel_of_real_runs_and_sample_data_is_stuck(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", LOGS, ids=lambda path: path.stem)
+def test_no_sample_of_real_runs_and_sample_data_is_a_spike(path: Path) -> None:
+    assert not [c.topic for c in compute_log_stats(log_of(path), strict=True) if c.spikes]
+
+
+@pytest.mark.parametrize("path", LOGS, ids=lambda path: path.stem)
 def test_the_disturbance_of_real_runs_and_sample_data_is_not_beyond_the_rudder(path: Path) -> None:
     assert not [text for text in analyse(log_of(path)).findings.warnings if EXCESS in text]
 

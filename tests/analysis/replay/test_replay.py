@@ -423,8 +423,8 @@ def test_smoothing_reduces_the_standard_deviations_and_takes_the_disturbance_fro
 def test_a_spike_at_the_end_is_rejected_by_the_filter_counted_and_harmless(
     zigzag_log: TrialLog, zigzag_analysis: Analysis
 ) -> None:
-    """The screening does not judge the last samples of a channel."""
-    spiked = spike("yaw_rate", 499.0, np.radians(1.0))(zigzag_log)
+    """The screening does not judge the last three samples of a channel."""
+    spiked = spike("yaw_rate", 499.9, np.radians(1.0))(zigzag_log)
     found = analyse(spiked)
     assert found.findings.residuals[0].rejected == 1
     away = np.abs(found.estimates.states - zigzag_analysis.estimates.states)
