@@ -23,8 +23,8 @@ class LinearRun:
     F: np.ndarray
     Q: np.ndarray
     P: np.ndarray
-    C: np.ndarray  # (2, s)
-    r: np.ndarray  # (2,) variances
+    C: np.ndarray  # (m, s)
+    r: np.ndarray  # (m,) variances
 
     def covariance(self) -> np.ndarray:
         """(n s, n s) of all states of the run."""
@@ -62,14 +62,14 @@ class LinearRun:
         return np.array(states), np.array(covariances)
 
     def drawn(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """True states (n, s) and what is measured of them, (n, 2), at every instant."""
+        """True states (n, s) and what is measured of them, (n, m), at every instant."""
         n, s = self.mean.shape
         deviation = np.empty((n, s))
         deviation[0] = draws(rng, self.P, 1)[0]
         for k, noise in enumerate(draws(rng, self.Q, n - 1)):
             deviation[k + 1] = self.F @ deviation[k] + noise
         states = self.mean + deviation
-        return states, states @ self.C.T + np.sqrt(self.r) * rng.standard_normal((n, 2))
+        return states, states @ self.C.T + np.sqrt(self.r) * rng.standard_normal((n, len(self.r)))
 
 
 def draws(rng: np.random.Generator, covariance: np.ndarray, count: int) -> np.ndarray:
