@@ -29,6 +29,7 @@ from shiplog.vessel.vessel_parser import parse_vessel
 
 pytestmark = pytest.mark.usefixtures("fit_alone")
 VESSEL, TOML = load_vessel("table1")
+RATES = {f"{name}.rate_hz": 5.0 for name in ("yaw_rate", "speed", "rudder", "rpm", "heading")}
 LONG = TOML.replace("angle_unit", "length = 200.0\nangle_unit", 1)
 
 
@@ -38,8 +39,9 @@ def a_log(
     toml: str | None = TOML,
 ) -> TrialLog:  # fmt: skip
     vessel = parse_vessel(toml, "here") if toml else VESSEL
+    sensors = suite(noise, RATES)
     trial = simulate(
-        vessel, manoeuvre, duration_secs=seconds, seed=seed, sensors=suite(noise), vessel_toml=toml
+        vessel, manoeuvre, duration_secs=seconds, seed=seed, sensors=sensors, vessel_toml=toml
     )
     return as_log(trial, f"{manoeuvre}-{seed}.mcap")
 
