@@ -5,7 +5,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from example_scripts import example_script
+from example_scripts import PAPER_SYSTEMS, example_script
 from places import PROJECT
 from stderr_lines import foreign_lines
 
@@ -49,3 +49,14 @@ def test_an_example_runs_from_the_command_line(
     assert "gyro bias" in out
     assert foreign_lines(err) == []  # a name with a blank is no fault of a path
     assert Path("loop.rrd").stat().st_size > 10_000
+
+
+def test_the_papers_examples_are_estimated_from_their_logs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    example_script("paper_logs").main(tmp_path)
+    printed = capsys.readouterr().out
+    for gain in ("1.9050562, -0.28749681", "disturbance[1]: 0.125", "yaw_rate: 0.41376579"):
+        assert gain in printed
+    logs = {path.stem for path in tmp_path.glob("*.mcap")}
+    assert logs == {path.stem for path in PAPER_SYSTEMS.glob("*.toml")}

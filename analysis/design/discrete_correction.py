@@ -79,6 +79,11 @@ def matched_correction(A: FloatArray, C: FloatArray, L: FloatArray, dt: float) -
         (n, m).
     dt
         Sampling interval, s.
+
+    Raises
+    ------
+    UsageError
+        The samples are too rare for these poles: the sampled observer would not be stable.
     """
     n, m = L.shape
     if m == 1:
@@ -86,6 +91,12 @@ def matched_correction(A: FloatArray, C: FloatArray, L: FloatArray, dt: float) -
     extended = np.zeros((n + m, n + m))
     extended[:n] = np.hstack((A - L @ C, L)) * dt
     M: FloatArray = expm(extended)[:n, n:]
+    if sampled_poles(expm(A * dt), C, M, dt)[-1].real >= 0:
+        fastest = np.abs(np.linalg.eigvals(A - L @ C)).max()
+        raise UsageError(
+            f"samples every {dt:g} s are too rare for poles of up to {fastest:.3g} 1/s; choose"
+            " slower poles or a shorter step"
+        )
     return M
 
 

@@ -35,11 +35,11 @@ def initial_estimate(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the state before the first sample, (N,), and its covariance, (N, N).
 
-    Shaping filters start with their stationary covariance. The standard deviation of another state
-    is that with which outputs, uncertain by their rms values, determine it in a short time: a
-    few samples, or the time constant of the estimator's fastest pole. It is large against all that
-    the state can be. The state is the smallest one, in these standard
-    deviations, that gives the first measured values. What the system states precedes both.
+    Shaping filters start at zero with their stationary covariance, states whose start the system
+    states with that, zero by default. The standard deviation of another state is that with which
+    outputs, uncertain by their rms values, determine it in a short time: a few samples, or the time
+    constant of the estimator's fastest pole. It is large against all that the state can be. These
+    states are the smallest ones, in their standard deviations, that give the first measured values.
 
     Parameters
     ----------
@@ -62,16 +62,18 @@ def initial_estimate(
     P = np.diag(_shown_variances(model, signals, names, frozenset(stated), poles))
     shaped = np.ix_(model.shaped, model.shaped)
     P[shaped] = solve_continuous_lyapunov(model.A[shaped], -model.W[shaped])
-    x = np.zeros(N)
     for state, std in stated.items():
         P[state, :] = P[:, state] = 0.0
         P[state, state] = std**2
+    values = {_first_state(name, names): value for name, value in system.initial.items()}
+    x = np.array([values.get(state, 0.0) for state in range(N)])
+    is_open = np.array([s not in {*stated, *values, *model.shaped} for s in range(N)])
+    spread = np.where(is_open, np.diag(P), 0.0)
     known = np.isfinite(signals.first)
-    C, y = model.C[known], (signals.first - model.D @ u)[known]
-    x = P @ C.T @ np.linalg.lstsq(C @ P @ C.T, y, rcond=None)[0]
-    for name, value in system.initial.items():
-        x[_first_state(name, names)] = value
-    return x, P
+    C = model.C[known]
+    y = (signals.first - model.D @ u)[known] - C @ x
+    weighted = spread[:, None] * C.T
+    return x + weighted @ np.linalg.lstsq(C @ weighted, y, rcond=None)[0], P
 
 
 def _shown_variances(

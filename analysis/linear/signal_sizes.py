@@ -91,12 +91,18 @@ def measurement_noise(
 ) -> tuple[FloatArray, tuple[bool, ...]]:
     """Return the noise (m,) of one measurement on the clock, stated or estimated from the log.
 
-    The mean of the samples within a step of the clock has less noise than one sample.
+    The mean of the samples within a step of the clock has less noise than one sample. Raises
+    `LogError` where a noise is not stated and the output never changes.
     """
     stds, measured = np.zeros(len(outputs)), []
     for k, (output, stats) in enumerate(zip(outputs, collected, strict=True)):
         channel = clock.channels[output.binding.channel]
         stated = output.binding.std
+        if stated is None and stats.moments.std == 0:
+            raise LogError(
+                f"channel {output.binding.channel!r} never changes, so that its noise cannot be"
+                f" estimated; state outputs.{output.binding.name}.std, or check the sensor"
+            )
         if stated is None:
             stds[k] = stats.noise_std
         else:

@@ -304,3 +304,40 @@ def test_a_channel_with_too_few_samples_is_refused_by_name() -> None:
     measured[3:, 1] = np.nan
     with pytest.raises(LogError, match=r"channel 'heel' has \d samples"):
         estimate(trial(u, measured), parse_system(SYSTEM, "roll.toml"))
+
+
+def test_a_dead_sensor_needs_a_stated_noise() -> None:
+    u, _, measured = record()
+    measured = np.column_stack((measured[:, 0], np.zeros(len(u))))
+    text = SYSTEM.replace("std = 0.01\n", "", 1)
+    with pytest.raises(LogError, match=r"'heel' never changes.*state outputs\.roll\.std"):
+        estimate(trial(u, measured), parse_system(text, "roll.toml"))
+
+
+def test_a_wave_on_a_sensor_is_the_conditional_mean_of_the_joint_system() -> None:
+    frequency, damping, std = 0.9, 0.1, 0.05
+    joint = np.zeros((4, 4))
+    joint[:2, :2] = A
+    joint[2:, 2:] = [[-2 * damping * frequency, -(frequency**2)], [1.0, 0.0]]
+    gain = 2 * std * np.sqrt(damping * frequency)
+    F, Q = held(joint, np.diag([1e-3, 0.0, 1.0, 0.0]), DT)
+    stationary = 1 / (4 * damping * frequency) * np.diag([1.0, frequency**-2])
+    P, C = block_diag(P0, stationary), np.eye(2, 4)
+    C[1, 2] = gain
+    u, r = np.zeros((50, 1)), np.array([0.02, 0.01]) ** 2
+    mean = response(joint, np.eye(4, 1), u, np.array([*X0, 0.0, 0.0]))
+    run = LinearRun(mean, F, Q, P, C, r)
+    measured = run.drawn(np.random.default_rng(6))[1]
+    text = f"""{SYSTEM}
+    [[coloured]]
+    name = "wave"
+    spectrum = "wave"
+    std = {std}
+    frequency = {frequency}
+    damping = {damping}
+    on_sensor = {{ roll = 1.0 }}
+    """
+    found = estimate(trial(u, measured), parse_system(text, "roll.toml"))
+    states, _ = run.filtered(measured)
+    assert found.chunk.values[:, :2] == pytest.approx(states[:, :2], rel=1e-8, abs=1e-9)
+    assert found["wave"] == pytest.approx(gain * states[:, 2], rel=1e-8, abs=1e-9)

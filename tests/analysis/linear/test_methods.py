@@ -295,3 +295,10 @@ def test_two_shifts_that_violate_their_bound_are_refused_with_the_pole() -> None
         run(text, log_of(roll=0.1 * noise()))
     once = run(text.replace("[6.0, 1.0]", "1.0").replace("border = 1.0", ""), log_of(roll=noise()))
     assert once.findings.plan.design.poles.real.max() < -0.5
+
+
+def test_a_gain_too_fast_for_the_samples_is_refused() -> None:
+    A, L = np.array([[-1.6, -0.9], [1.2, 3.1]]), np.array([[-1.3, 13.7], [-6.7, 3.5]])
+    assert np.linalg.eigvals(A - L).real.max() < 0
+    with pytest.raises(UsageError, match=r"samples every 1 s are too rare for poles"):
+        matched_correction(A, np.eye(2), L, 1.0)
