@@ -239,7 +239,8 @@ class PlacedMethod:
             L[gain] = placed.gain
             M[gain] = _sampled_for_noise(model, own, C, poles, model.r[sensors])
             first += len(states)
-            remarks.append(f"{placed.summary} at these poles")
+            if np.isfinite(placed.kalman_ratio).all():
+                remarks.append(f"{placed.summary} at these poles")
         return EstimatorDesign(L, M, observer.poles, remarks=tuple(remarks))
 
 

@@ -341,3 +341,23 @@ def test_a_wave_on_a_sensor_is_the_conditional_mean_of_the_joint_system() -> Non
     states, _ = run.filtered(measured)
     assert found.chunk.values[:, :2] == pytest.approx(states[:, :2], rel=1e-8, abs=1e-9)
     assert found["wave"] == pytest.approx(gain * states[:, 2], rel=1e-8, abs=1e-9)
+
+
+def test_three_outputs_are_smoothed_to_the_conditional_mean() -> None:
+    C, r = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]), np.array([0.02, 0.01, 0.03]) ** 2
+    F, Q = held(A, np.diag([1e-3, 0.0]), DT)
+    u = np.zeros((50, 1))
+    run = LinearRun(response(A, B, u, X0), F, Q, P0, C, r)
+    rng = np.random.default_rng(7)
+    measured = run.mean @ C.T + np.sqrt(r) * rng.standard_normal((50, 3))
+    measured[1:-1][rng.random((48, 3)) < 0.3] = np.nan
+    text = SYSTEM.replace("B = ", "C = [[1, 0], [0, 1], [1, 1]]\nB = ")
+    text = text.replace("[noise]", '[outputs.sum]\nchannel = "pitch"\nstd = 0.03\n[noise]')
+    log = log_of(
+        rudder=u[:, 0], roll_rate=measured[:, 0], heel=measured[:, 1], pitch=measured[:, 2]
+    )
+    found = estimate(log, parse_system(text, "roll.toml"), smoothed=True)
+    states, covariances = run.given(measured)
+    stds = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    assert found.chunk.values == pytest.approx(states, rel=1e-8, abs=1e-9)
+    assert found.chunk.stds == pytest.approx(stds, rel=1e-7)
