@@ -39,9 +39,12 @@ BODY = """
 model = "rigid-body"
 inertia = [2000, 3000, 2500]
 [outputs.roll]
+std = 1e-6
 [outputs.pitch]
+std = 1e-6
 [outputs.yaw]
 channel = "heading"
+std = 1e-6
 [method]
 """
 POINT = np.array([0.1, -0.2, 0.3, 0.05, -0.04, 0.06])
