@@ -9,8 +9,8 @@ from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray, Signals
 from shiplog.vessel.settings import DisturbanceSettings
 
+from .disturbances import RUDDER_MAX, Disturbance, DisturbanceCollector, DisturbanceSummary
 from .observer_design import SLOW_SETTLING
-from .summary import RUDDER_MAX, Disturbance, DisturbanceCollector, DisturbanceSummary
 
 # the names of `FurtherStates` by those of the disturbances
 STATES = {

@@ -26,15 +26,15 @@ from shiplog.vessel.settings import (
     settings_dict,
 )
 
-from .loop import initial_state, make_ship_observer, observe_chunk, surge_plant, yaw_plant
-from .observer_design import ForceModel, Sampling, force_observer
-from .summary import (
+from .disturbances import (
     DISTURBANCE_UNITS,
     RUDDER_MAX,
     Disturbance,
     DisturbanceCollector,
     DisturbanceSummary,
 )
+from .loop import initial_state, make_ship_observer, observe_chunk, surge_plant, yaw_plant
+from .observer_design import ForceModel, Sampling, force_observer
 
 DEFAULT_SETTINGS = DisturbanceSettings()
 MAX_POLE_TIMES_INTERVAL = 10.0  # beyond it the observer forgets a sample by the next one

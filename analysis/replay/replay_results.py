@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from analysis.disturbance.summary import Disturbance, DisturbanceSummary
+from analysis.disturbance.disturbances import Disturbance, DisturbanceSummary
 from analysis.filters.base import Estimates
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit

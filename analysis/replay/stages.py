@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from analysis.disturbance.disturbances import Disturbance
 from analysis.disturbance.filter_forces import FilterForces
-from analysis.disturbance.summary import Disturbance
 from analysis.filters.base import OUTPUT_STATES, Estimates
 from analysis.filters.factory import smoothable
 from analysis.filters.noise_model import FURTHER_OUTPUTS

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.disturbance.summary import DisturbanceSummary
+from analysis.disturbance.disturbances import DisturbanceSummary
 from analysis.filters.noise_model import NoiseModel, Wave
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit

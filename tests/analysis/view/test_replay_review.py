@@ -14,7 +14,7 @@ from rerun.chunk import RrdReader
 from stderr_lines import foreign_lines
 
 import shiplog
-from analysis.disturbance.summary import Disturbance
+from analysis.disturbance.disturbances import Disturbance
 from analysis.filters.base import Estimates
 from analysis.regression.sliding import CoefficientHistory
 from analysis.replay.replay import analyse
