@@ -424,4 +424,4 @@ def test_cascade_does_not_improve_a_first_stage_that_is_too_slow() -> None:
     first = quality_filter(SHIP, RATE, R1, 1e4 * R2).gain
     result = cascade(SHIP, RATE, R1, R2, first, stages=5, correlation_secs=10)
     assert result.best == 1
-    assert result.relative[0, 0] > 12
+    assert result.relative[:, 0] == pytest.approx([12.52, 14.87, 16.47, 17.47, 18.03], abs=5e-3)

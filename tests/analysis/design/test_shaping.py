@@ -121,7 +121,7 @@ def test_wave_in_the_output_gives_a_notch() -> None:
     def passed(A: np.ndarray, C: np.ndarray, gain: np.ndarray, omega: float) -> float:
         return float(abs(np.linalg.solve(1j * omega * np.eye(len(A)) - A + gain @ C, gain)[0, 0]))
 
-    assert passed(plant.A, plant.C, notch, OMEGA) < 0.015
+    assert passed(plant.A, plant.C, notch, OMEGA) == pytest.approx(0.0128, abs=5e-5)
     assert passed(YAW, RATE, plain, OMEGA) > 0.15
     assert passed(plant.A, plant.C, notch, 1e-3) == pytest.approx(0.60, abs=0.01)
 
