@@ -27,7 +27,9 @@ from .residuals import ResidualSummary
 MIN_HEADING_STD = radians(0.01)
 MIN_POSITION_STD = 0.5  # m
 MIN_SAMPLES = 20  # of a heading or a position, to be used
-MIN_COURSE_VARIANCE = 0.02  # 1 - R² of the headings, that of 8° rms
+# 1 - R² of the headings, as of a half circle: the sway of a zig-zag lags behind its yaw rate, which
+# looks like a smaller speed on a current
+MIN_COURSE_VARIANCE = 0.5
 MIN_SPEED_VARIATION = 0.05  # standard deviation of the speed over its median
 DETERMINED_SHARE = 1 / 3  # of the standard deviation at the start
 MAX_NIS = 2.0  # mean normalised innovation squared: above it the standard deviations are wrong
@@ -79,7 +81,8 @@ class Evidence:
     heading, position
         Whether these are measured.
     turned
-        Whether the course changes enough to separate the current from an error of the speed log.
+        Whether the course changes enough to separate the current from an error of the speed log;
+        else positions are not used.
     speed_varies
         Whether the speed varies enough to separate a bias from an error of scale.
     """
@@ -88,6 +91,11 @@ class Evidence:
     position: bool
     turned: bool
     speed_varies: bool
+
+    @property
+    def has_track(self) -> bool:
+        """Whether positions are measurements of the filter."""
+        return self.position and self.turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,9 +116,12 @@ class _Ship:
 REMEDIES = {
     "heading": "a heading",
     "position": "positions",
-    "turned": "more turning",
+    "turned": "a turn of half a circle",
     "speed_varies": "several speeds",
 }
+
+
+NEEDED = {"gyro": ("heading",), "log": ("position", "turned")}  # for auto to select an error
 
 
 def evidence_of(stats: SignalStats) -> Evidence:
@@ -165,14 +176,14 @@ def _choose_sensors(
     if "auto" not in requested:
         return named, {}
     chosen, omitted = named, {}
-    for name in ("gyro", "log"):
+    for name, flags in NEEDED.items():
         if name in chosen:
             continue
         candidate = tuple(each for each in SENSOR_ERRORS if each in (*chosen, name))
-        needed = "heading" if name == "gyro" else "position"
         found = _ambiguities(candidate, evidence, ship)
-        if not getattr(evidence, needed):
-            omitted[name] = f"it needs {REMEDIES[needed]}"
+        missing = [flag for flag in flags if not getattr(evidence, flag)]
+        if missing:
+            omitted[name] = f"it takes {' and '.join(REMEDIES[flag] for flag in missing)}"
         elif found:
             omitted[name] = _described(found[0], candidate, evidence, ship)
         else:
@@ -199,7 +210,7 @@ def sensor_model(
     evidence = evidence_of(stats)
     ship = _Ship(model, stats, disturbance)
     sensors, omitted = _choose_sensors(settings.sensors, evidence, ship)
-    outputs = FURTHER_OUTPUTS[: 3 if evidence.position else int(evidence.heading)]
+    outputs = FURTHER_OUTPUTS[: 3 if evidence.has_track else int(evidence.heading)]
     stds = [_output_std(stats, settings, name) for name in outputs]
     return FurtherModel(outputs, tuple(stds), sensors), omitted
 
@@ -262,7 +273,7 @@ def _yaw_ambiguities(
         inputs.append(DisturbanceInput("gyro bias", constant, on_sensor={"yaw rate": 1.0}))
     if "rudder" in sensors:
         inputs.append(DisturbanceInput("rudder zero", constant, {states[1]: 1.0}))
-    if "compass" in sensors and not (evidence.position and evidence.turned):
+    if "compass" in sensors and not evidence.has_track:
         if not evidence.heading:
             inputs.append(DisturbanceInput("compass bias", constant))
         else:
@@ -282,7 +293,7 @@ def _surge_ambiguities(
 ) -> tuple[Ambiguity, ...]:
     """Linearise the speed and the distance over ground, which the current changes too."""
     A = np.array([[2 * ship.model.g * ship.stats.median_speed, 0.0], [1.0, 0.0]])
-    measured = ("speed", "distance") if evidence.position else ("speed",)
+    measured = ("speed", "distance") if evidence.has_track else ("speed",)
     size = len(measured)
     constant = Exosystem.polynomial(0)
     inputs = []
@@ -294,8 +305,6 @@ def _surge_ambiguities(
         return ()
     if ship.slow is not None:
         inputs.append(DisturbanceInput("constant surge force", ship.slow, {"speed": 1.0}))
-    if evidence.position and not evidence.turned:
-        inputs.append(DisturbanceInput("current", constant, {"distance": 1.0}))
     plant = Plant(
         A[:size, :size], np.zeros((size, 1)), np.eye(size), ("speed", "distance")[:size], measured
     )
@@ -374,5 +383,5 @@ def _inconsistency(residuals: Sequence[ResidualSummary]) -> str:
         return ""
     return (
         f"the innovations of {' and '.join(wrong)} are larger than expected: the model or the noise"
-        " set does not fit; let the log determine the noise (filter.process_ratio=auto)"
+        " does not fit; set filter.process_ratio to auto, or the std of heading or position"
     )
