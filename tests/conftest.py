@@ -13,7 +13,7 @@ from analysis.replay.replay import analyse
 from analysis.replay.replay_results import Analysis
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
-from shiplog import TrialLog, Vessel, load_vessel
+from shiplog import TrialLog, Vessel, load_vessel, read
 from shiplog.compiled import is_compiled
 
 
@@ -86,3 +86,11 @@ def zigzag_log(zigzag: SimulatedTrial) -> TrialLog:
 def zigzag_analysis(zigzag_log: TrialLog) -> Analysis:
     """Return the replay of the zigzag, computed once."""
     return analyse(zigzag_log)
+
+
+@pytest.fixture(scope="session")
+def sensor_analysis() -> Analysis:
+    """Return the smoothed replay of the log of a biased gyro, with sensor errors as states."""
+    log = read(SAMPLE_DATA / "zigzag_10_10_dropouts.mcap").between(0, 300)
+    settings = {"filter.kind": "extended", "filter.smooth": True, "filter.sensor_bias": "auto"}
+    return analyse(log, settings=settings)

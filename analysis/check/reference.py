@@ -4,6 +4,7 @@ Series are means over blocks of time; each channel carries its own tolerance, in
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from analysis.replay.replay_results import Analysis
 from shiplog import Channel, TrialLog
 from shiplog.ships.paper import COEFFICIENT_UNITS, PAPER_OUTPUTS
 from shiplog.types import FloatArray, TimeArray
+from shiplog.vessel.settings import SENSOR_ERRORS
 
 BLOCK_SECS = 4.0
 WEIGHT_PERIOD = 97  # samples, a prime: two samples of a block that change places have other weights
@@ -99,6 +101,12 @@ def _model_and_noise(analysis: Analysis) -> Iterator[Channel]:
         std, ratio = float(noise.measurement_std[i]), float(noise.process_ratio[i])
         yield _single(analysis, f"{name}_measurement_std", "noise_model", std)
         yield _single(analysis, f"{name}_process_ratio", "noise_model", ratio)
+    further = noise.further
+    for name, std in zip(further.outputs, further.output_stds, strict=True):
+        yield _single(analysis, f"{name}_measurement_std", "noise_model", std)
+    for name, force in (("yaw_moment", further.yaw), ("surge_force", further.surge)):
+        if force is not None:
+            yield _single(analysis, f"{name}_frequency", "noise_model", force.frequency)
 
 
 def _estimates(analysis: Analysis) -> Iterator[Channel]:
@@ -106,12 +114,19 @@ def _estimates(analysis: Analysis) -> Iterator[Channel]:
     for i, name in enumerate(STATES):
         yield _blocks(analysis, name, "estimate", estimates.states[:, i])
         yield _blocks(analysis, name, "std", estimates.stds[:, i])
+    further = estimates.further
+    if further is None:
+        return
+    for i, (state, unit) in enumerate(zip(further.names, further.units, strict=True)):
+        name = f"{state}_error" if state in SENSOR_ERRORS else state
+        for kind, values in (("estimate", further.values), ("std", further.stds)):
+            yield replace(_blocks(analysis, name, kind, values[:, i]), unit=unit)
 
 
 def _residual_tests(analysis: Analysis) -> Iterator[Channel]:
-    for i, name in enumerate(PAPER_OUTPUTS):
+    for i, residuals in enumerate(analysis.findings.residuals):
+        name = residuals.name
         yield _blocks(analysis, name, "innovation", analysis.estimates.innovations[:, i])
-        residuals = analysis.findings.residuals[i]
         yield _single(analysis, f"{name}_rms", "residual_test", residuals.rms)
         yield _single(analysis, f"{name}_nis", "residual_test", residuals.mean_nis)
         yield _single(analysis, f"{name}_nis_limit", "residual_test", residuals.nis_band[1])
@@ -141,6 +156,8 @@ def _track_and_warnings(analysis: Analysis) -> Iterator[Channel]:
     track = analysis.track
     yield _blocks(analysis, "north", "track", track.north, track.time_secs)
     yield _blocks(analysis, "east", "track", track.east, track.time_secs)
+    for error in analysis.findings.sensor_errors:
+        yield _single(analysis, f"{error.name}_determined", "count", float(error.determined))
     yield _single(analysis, "warnings", "count", float(len(analysis.findings.warnings)))
 
 

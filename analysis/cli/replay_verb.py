@@ -1,7 +1,6 @@
 """The verb replay: estimate states, disturbances and coefficients from a log."""
 
 import argparse
-import sys
 import tomllib
 from pathlib import Path
 
@@ -112,8 +111,6 @@ def _replay(arguments: argparse.Namespace) -> ExitCode:
     if arguments.json:
         write_json(replay_json(findings), arguments.json)
     print_tables(replay_tables(findings), to_stderr=arguments.json == "-")
-    for error in findings.sensor_errors:
-        print(error, file=sys.stderr if arguments.json == "-" else sys.stdout)
     print_warnings(findings.warnings)
     show_review(output, view=arguments.view)
     return ExitCode.DATA_LOST if log.data_lost else ExitCode.OK
@@ -160,6 +157,7 @@ REPLAY = Verb(
         "shiplog replay trial.mcap",
         "shiplog replay trial.mcap --vessel my_ship.toml -o run.rrd --json run.json",
         "shiplog replay trial.mcap --filter extended --smooth --set filter.process_ratio=auto",
+        "shiplog replay trial.mcap --filter extended --smooth --sensor-bias auto",
     ),
     # pyarrow imports pandas to recognise data frames; scipy imports all names of numpy
     unneeded=("pandas", "numpy.f2py"),

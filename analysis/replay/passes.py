@@ -75,6 +75,8 @@ class SecondPass:
         Problems of the data, each in a sentence.
     contradictions
         Those of the warnings by which a unit or a sign is wrong.
+    gyro_warnings
+        Those of the warnings that report a bias of the gyro.
     """
 
     stats: SignalStats
@@ -82,6 +84,7 @@ class SecondPass:
     surge: WholeTrialRegression
     warnings: tuple[str, ...]
     contradictions: tuple[str, ...] = ()
+    gyro_warnings: tuple[str, ...] = ()
 
 
 def first_pass(
@@ -182,7 +185,8 @@ def second_pass(
         *equations.window_warnings(),
     ]
     wrong = tuple(finding.text for finding in findings if finding.kind in CONTRADICTIONS)
-    return SecondPass(stats, equations.yaw, equations.surge, tuple(warnings), wrong)
+    biases = tuple(finding.text for finding in findings if finding.kind == "bias")
+    return SecondPass(stats, equations.yaw, equations.surge, tuple(warnings), wrong, biases)
 
 
 def resampled_chunks(

@@ -156,6 +156,8 @@ def _plan(
         model_warnings = _other_model_warnings(vessel)
     warnings += [*model_warnings, *unused_setting_warnings(kind, vessel.filter, vessel.disturbance)]
     design = _design(vessel, kind, first.log_stats, second.stats)
+    if "gyro" in design.noise.further.sensors:  # the result states the bias that was estimated
+        warnings = [warning for warning in warnings if warning not in second.gyro_warnings]
     return Plan(
         screening=first.screening,
         clock=first.clock,

@@ -10,6 +10,7 @@ from analysis.regression.sliding import CoefficientHistory
 from shiplog import Signals
 from shiplog.types import Event
 
+from .current import Current
 from .plan import Plan
 from .residuals import ResidualSummary
 from .sensor_errors import SensorError
@@ -70,6 +71,8 @@ class Findings:
         The events of the log, in the order of time.
     sensor_errors
         The sensor errors that the filter estimates, and those that it was to and cannot.
+    current
+        The current at the end of the trial; None where the filter does not estimate it.
     """
 
     plan: Plan
@@ -83,6 +86,7 @@ class Findings:
     warnings: tuple[str, ...]
     events: tuple[Event, ...] = ()
     sensor_errors: tuple[SensorError, ...] = ()
+    current: Current | None = None
 
 
 @dataclass(frozen=True, eq=False)

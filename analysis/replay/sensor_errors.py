@@ -34,6 +34,26 @@ MIN_SPEED_VARIATION = 0.05  # standard deviation of the speed over its median
 DETERMINED_SHARE = 1 / 3  # of the standard deviation at the start
 MAX_NIS = 2.0  # mean normalised innovation squared: above it the standard deviations are wrong
 SLOW = ("constant", "ramp")
+# the channels in whose units further estimates are shown
+DISPLAYED_AS = {
+    "gyro": "yaw_rate", "log": "speed", "current_north": "speed", "current_east": "speed",
+}  # fmt: skip
+
+
+def further_display(name: str, unit: str) -> tuple[str, float]:
+    """Return the unit in which a further estimate of a filter is shown, and the factor to it.
+
+    Parameters
+    ----------
+    name, unit
+        As in `FurtherStates`.
+
+    Examples
+    --------
+    >>> further_display("log_scale", "1")
+    ('%', 100.0)
+    """
+    return ("%", 100.0) if unit == "1" else display_conversion(DISPLAYED_AS.get(name, name), unit)
 
 
 @dataclass(frozen=True)
@@ -65,10 +85,10 @@ class SensorError:
 
     def __str__(self) -> str:
         """Describe the error in one line."""
-        unit, factor = display_conversion(self.name, self.unit)
+        unit, factor = further_display(self.name, self.unit)
         if np.isnan(self.value):
             return f"{self.label}: not estimated: {self.reason}"
-        size = f"{self.value * factor:.4g} ± {self.std * factor:.2g} {unit}".rstrip(" 1")
+        size = f"{self.value * factor:.4g} ± {self.std * factor:.2g} {unit}"
         return f"{self.label}: {size}" + (f", not determined: {self.reason}" if self.reason else "")
 
 
@@ -365,7 +385,8 @@ def sensor_errors(
             value, std = last[name]
             reason = _inconsistency(residuals)
             if std >= DETERMINED_SHARE * walk.std:
-                reason = f"without this log it is 0 ± {walk.std:.2g} {walk.unit}"
+                unit, factor = further_display(name, walk.unit)
+                reason = f"without this log it is 0 ± {walk.std * factor:.2g} {unit}"
         elif name in omitted:
             value, std, reason = nan, nan, omitted[name]
         else:

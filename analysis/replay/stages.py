@@ -16,6 +16,7 @@ from shiplog import Signals
 from shiplog.screening import ScreenedLog
 from shiplog.ships.paper import PAPER_OUTPUTS
 
+from .current import current_of
 from .estimator_design import (
     diverged,
     make_estimators,
@@ -138,6 +139,7 @@ class Stages:
                 self._last,
                 residuals,
             ),
+            current=current_of(self._last),
         )
 
     def _disturbance(

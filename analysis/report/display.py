@@ -1,7 +1,9 @@
-"""Names and units in which disturbances are shown, and the width of every band."""
+"""Names, units and digits of what is shown, and the width of every band."""
 
-from math import degrees
+from math import degrees, floor, inf, log10
 
+NORMAL_95 = 1.96  # standard deviations: 95 % of a normal distribution lie within
+MAX_DECIMALS = 9
 BAND_STDS = 2.0  # standard deviations of every band and every ± that is shown
 
 # the name of a disturbance, the unit in which it is shown, and the factor from SI to that unit
@@ -12,3 +14,14 @@ DISTURBANCES = {
     "surge": ("surge", "mm/s²", 1e3),
     "surge_wave": ("surge, wave", "mm/s²", 1e3),
 }
+
+
+def decimals(std: float) -> int:
+    """Return the number of decimals that shows two digits of a standard deviation.
+
+    Examples
+    --------
+    >>> decimals(0.00321), decimals(12.0)
+    (4, 0)
+    """
+    return min(max(1 - floor(log10(std)), 0), MAX_DECIMALS) if 0 < std < inf else MAX_DECIMALS

@@ -11,13 +11,17 @@ from analysis.disturbance.disturbances import DisturbanceSummary
 from analysis.filters.noise_model import NoiseModel, Wave
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit
+from analysis.replay.current import Current
 from analysis.replay.replay_results import Findings
 from analysis.replay.residuals import ResidualSummary
+from analysis.replay.sensor_errors import SensorError
 from shiplog import __version__
 from shiplog.checks.channel_stats import ChannelStats
 from shiplog.checks.event_table import events_to_json
 from shiplog.ships.paper import COEFFICIENT_UNITS
 from shiplog.vessel.settings import settings_dict
+
+from .display import NORMAL_95
 
 JsonObject = dict[str, Any]
 
@@ -30,7 +34,12 @@ def replay_json(findings: Findings) -> JsonObject:
     Returns
     -------
     dict
-        ``log``, ``model``, ``settings``, ``residuals`` (by output), ``wave``, ``disturbances``,
+        ``log``, ``model``, ``settings``, ``residuals`` (by output: ``yaw_rate`` and ``speed``;
+        ``heading``, ``north`` and ``east`` where the filter uses them), ``wave``,
+        ``disturbances``, ``sensor_errors`` (by name: ``unit``, ``value``, ``std``,
+        ``interval_95``, ``prior_std``, ``determined``, ``reason``), ``current`` (``north`` and
+        ``east`` in m/s and ``drift_length`` in m, each with its ``std``; ``speed``,
+        ``direction``, into which it flows, and ``determined``; None where it is not estimated),
         ``coefficients``, ``changes``, ``windows`` (by equation), ``track_origin``, ``warnings``,
         ``events`` and ``events_omitted``, their number beyond those listed.
     """
@@ -60,6 +69,8 @@ def replay_json(findings: Findings) -> JsonObject:
             "yaw_as_rudder" if name == "rudder" else name: _disturbance(summary)
             for name, summary in findings.disturbances.items()
         },
+        "sensor_errors": {error.name: _sensor_error(error) for error in findings.sensor_errors},
+        "current": _current(findings.current),
         "coefficients": _coefficients(findings.yaw) | _coefficients(findings.surge),
         "changes": [_change(change) for change in findings.changes],
         "windows": {"yaw": _windows(findings.yaw), "surge": _windows(findings.surge)},
@@ -164,6 +175,26 @@ def _disturbance(summary: DisturbanceSummary) -> JsonObject:
         "sensor_noise_std": summary.noise_std,
         "settling_secs": summary.settling_secs,
     }
+
+
+def _sensor_error(error: SensorError) -> JsonObject:
+    half = NORMAL_95 * error.std
+    return {
+        "unit": error.unit,
+        "value": error.value,
+        "std": error.std,
+        "interval_95": [error.value - half, error.value + half],
+        "prior_std": error.prior_std,
+        "determined": error.determined,
+        "reason": error.reason or None,
+    }
+
+
+def _current(current: Current | None) -> JsonObject | None:
+    if current is None:
+        return None
+    derived = ("speed", "direction", "determined")
+    return asdict(current) | {name: getattr(current, name) for name in derived}
 
 
 def _coefficients(fit: CoefficientFit) -> JsonObject:

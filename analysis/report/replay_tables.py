@@ -1,6 +1,6 @@
 """The results of a replay as tables and sentences, for the terminal and for Rerun."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import degrees, isfinite, pi
 
 import numpy as np
@@ -8,10 +8,12 @@ import numpy as np
 from analysis.replay.replay_results import Findings
 from analysis.replay.residuals import MIN_CORRELATION, SIGNIFICANCE, ResidualSummary
 from shiplog.checks.event_table import event_table
+from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.text_table import TextTable
 from shiplog.units import display_conversion
 
 from .display import BAND_STDS, DISTURBANCES
+from .further_tables import further_tables
 from .markdown import markdown_page
 
 MIN_PRINTED_P = 1e-9  # below it the exact p-value is of no use
@@ -23,12 +25,14 @@ def replay_tables(findings: Findings) -> tuple[TextTable, ...]:
     Returns
     -------
     tuple of TextTable
-        The log, the filter's residuals, the disturbances and the coefficients; then the changes of
-        coefficients within the trial and the events, where there are any.
+        The log, the filter's residuals, the sensor errors and the current where they are
+        estimated, the disturbances and the coefficients; then the changes of coefficients within
+        the trial and the events, where there are any.
     """
     return (
         _log_table(findings),
         _residual_table(findings),
+        *further_tables(findings),
         _disturbance_table(findings),
         _coefficient_table(findings),
         *_change_tables(findings),
@@ -81,8 +85,37 @@ def _residual_table(findings: Findings) -> TextTable:
         "output", "rms", "mean\nNIS", "expected\n(99 %)",
         "white\np", "ρ", "lag\n[s]", "gated",
     )  # fmt: skip
-    remarks = (*_filter_remarks(findings), *map(residual_remark, findings.residuals))
+    judged = findings.residuals[: len(PAPER_OUTPUTS)], findings.residuals[len(PAPER_OUTPUTS) :]
+    remarks = (
+        *_filter_remarks(findings),
+        *map(residual_remark, judged[0]),
+        *_further_remarks(findings, judged[1]),
+    )
     return TextTable("Filter residuals", columns, tuple(rows), remarks)
+
+
+def _further_remarks(findings: Findings, residuals: Sequence[ResidualSummary]) -> Iterator[str]:
+    """Describe the innovations of heading and position.
+
+    Where they are smaller than expected, the noise assumed contains slow errors of the sensor that
+    its samples do not show: that is intended, and such innovations need not be white.
+    """
+    stds = findings.plan.noise.further.output_stds
+    small = [r.judged and r.mean_nis < r.nis_band[0] for r in residuals]
+    yield from (
+        residual_remark(r) for r, is_small in zip(residuals, small, strict=True) if not is_small
+    )
+    assumed = [
+        f"{_words(r.name)} {std * factor:.2g} {unit}"
+        for r, std, is_small in zip(residuals, stds, small, strict=True)
+        if is_small
+        for unit, factor in [display_conversion(r.name, r.unit)]
+    ]
+    if assumed:
+        yield (
+            f"Innovations smaller than the noise assumed, which allows for slow errors of the "
+            f"sensor: {', '.join(assumed)}; change it by filter.heading_std, filter.position_std."
+        )
 
 
 def whiteness_cells(residuals: ResidualSummary) -> tuple[str, str, str]:
@@ -92,7 +125,7 @@ def whiteness_cells(residuals: ResidualSummary) -> tuple[str, str, str]:
     return (
         f"{residuals.whiteness_p:.1g}" if residuals.whiteness_p > MIN_PRINTED_P else "<1e-9",
         f"{residuals.correlation:.2f}",
-        f"{residuals.correlation_lag_secs:.3g}",
+        f"{round(residuals.correlation_lag_secs, 2):g}",
     )
 
 
@@ -151,7 +184,9 @@ def _disturbance_table(findings: Findings) -> TextTable:
         values = (summary.mean, summary.rms, summary.at_end, summary.noise_std)
         cells = (f"{value * scale:.3g}" if isfinite(value) else "" for value in values)
         rows.append((f"{name} [{unit}]", *cells))
-    columns = ("disturbance of", "mean", "rms", "at the end", "std from\nsensor noise")
+    smoothed = findings.plan.noise.further.yaw is not None
+    std = "std" if smoothed else "std from\nsensor noise"
+    columns = ("disturbance of", "mean", "rms", "at the end", std)
     models = [model for model in dict.fromkeys(settings.models) if model != "wave"]
     if "wave" in settings.models and settings.wave_frequency is not None:
         models.append(f"wave of {settings.wave_frequency:.3g} rad/s")
@@ -159,7 +194,8 @@ def _disturbance_table(findings: Findings) -> TextTable:
         "Yaw, as rudder angle: the rudder that would have the same effect at the speed of that "
         "moment. Errors of the model count as disturbances."
     )
-    remarks = [f"Disturbance models: {', '.join(models)}.", explanation]
+    method = ", states of the filter and smoothed with them" if smoothed else ""
+    remarks = [f"Disturbance models: {', '.join(models)}{method}.", explanation]
     if findings.plan.model_is_fitted:
         remarks.append("The model was fitted to this log: this is what it does not explain.")
     return TextTable("Disturbances", columns, tuple(rows), tuple(remarks))

@@ -67,19 +67,19 @@ def _disturbance(findings: Findings, drawn: Drawn, name: str) -> Panel:
     """Draw a disturbance on an axis that leaves out the observer's own transient."""
     estimate, summary = drawn[f"disturbance_{name}/estimate"], findings.disturbances[name]
     _, unit, scale = DISTURBANCES[name]
-    values = estimate.lines[0].values
+    values = estimate.lines[-1].values
     settled = estimate.time_secs >= summary.settling_secs
     kept = values[settled] if settled.mean() > 0.5 else values
-    noise, waves = (
-        BAND_STDS * summary.noise_std * scale,
-        _optional(drawn, f"disturbance_{name}/wave"),
-    )
-    return Panel(
-        f"disturbance_{name}",
-        f"{name} disturbance [{unit}]",
-        (_guides(findings, "±2σ of sensor noise", noise, "bounds"), estimate, *waves),
-        limits(kept, np.array([-1.5, 1.5]) * noise, *(w.lines[0].values for w in waves)),
-    )
+    noise = BAND_STDS * summary.noise_std * scale
+    series = (estimate, *_optional(drawn, f"disturbance_{name}/wave"))
+    if len(estimate.lines) == 1:  # a state of the filter has a band of its own
+        series = (_guides(findings, "±2σ of sensor noise", noise, "bounds"), *series)
+        axis = [kept, np.array([-1.5, 1.5]) * noise]
+    else:
+        axis = [line.values for line in estimate.lines]
+    waves = [each.lines[0].values for each in series if each.name == "wave"]
+    title = f"{name} disturbance [{unit}]"
+    return Panel(f"disturbance_{name}", title, series, limits(*axis, *waves))
 
 
 def _innovation(findings: Findings, drawn: Drawn, name: str) -> Panel:

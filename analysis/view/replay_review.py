@@ -28,6 +28,7 @@ from .rerun_io import (
     send_style,
     send_text,
 )
+from .sensor_panels import sensor_panels
 from .series_builder import SeriesBuilder
 from .track_chart import TrackChart, draw_track
 
@@ -44,6 +45,11 @@ and after a change
 - **coefficients**: in the title, the value over the whole trial with ±2σ; as a curve, that of the \
 sliding window that ends there
 - **gap in a curve**: nothing measured, or a window that does not determine the coefficient
+"""
+SENSORS_NAME = "sensors"
+SENSORS_LEGEND = f"""\
+- **tab "{SENSORS_NAME}"**: sensor errors and current with ±2σ, as estimated with the states; the \
+heading, measured and estimated, and the innovations of heading and position
 """
 FURTHER_NAME = "further channels"
 FURTHER_LEGEND = f"""\
@@ -94,12 +100,14 @@ class ReplayReview:
         drawn = self._builder.result()
         yaw, surge = equation_panels(findings, drawn)
         coefficients, chart = history_panels(findings, drawn), draw_track(findings, drawn)
+        sensors = sensor_panels(findings, drawn)
         further, events = self._further.panels(), _events_with_changes(findings, start_ns)
         page = _replay_page(yaw, surge, coefficients, chart, has_events=bool(events))
-        rr.send_blueprint(_blueprint(page, further), recording=recording)
+        rr.send_blueprint(_blueprint(page, sensors, further), recording=recording)
         _send_properties(recording, findings)
-        send_text(recording, "summary", text + LEGEND + (FURTHER_LEGEND if further else ""))
-        for panel in (*yaw, *surge, *coefficients, *further):
+        legends = (SENSORS_LEGEND if any(sensors) else "") + (FURTHER_LEGEND if further else "")
+        send_text(recording, "summary", text + LEGEND + legends)
+        for panel in (*yaw, *surge, *coefficients, *sensors[0], *sensors[1], *further):
             for series in panel.series:
                 entity = f"{panel.name}/{series.name}"
                 send_style(recording, entity, series)
@@ -190,13 +198,21 @@ def _send_properties(recording: rr.RecordingStream, findings: Findings) -> None:
     recording.send_property("trial", trial)
 
 
-def _blueprint(page: rrb.Container, further: list[Panel]) -> rrb.Blueprint:
-    """Return a blueprint of the replay's page, with a tab for further channels if there are any."""
-    if not further:
-        return make_blueprint(page)
-    columns = 1 + (len(further) > 3) + (len(further) > 8)
-    grid = rrb.Grid(*map(plot_view, further), grid_columns=columns, name=FURTHER_NAME)
-    return make_blueprint(rrb.Tabs(page, grid, active_tab=0))
+def _blueprint(
+    page: rrb.Container, sensors: tuple[list[Panel], list[Panel]], further: list[Panel]
+) -> rrb.Blueprint:
+    """Return a blueprint of the page, with tabs for sensors and further channels if there are any.
+
+    Histories of sensor errors are on the left, heading and innovations on the right.
+    """
+    tabs = [page]
+    if any(sensors):
+        halves = (rrb.Vertical(*map(plot_view, panels)) for panels in sensors if panels)
+        tabs.append(rrb.Horizontal(*halves, name=SENSORS_NAME))
+    if further:
+        columns = 1 + (len(further) > 3) + (len(further) > 8)
+        tabs.append(rrb.Grid(*map(plot_view, further), grid_columns=columns, name=FURTHER_NAME))
+    return make_blueprint(rrb.Tabs(*tabs, active_tab=0) if len(tabs) > 1 else page)
 
 
 def _events_with_changes(findings: Findings, start_ns: int) -> tuple[Event, ...]:

@@ -11,6 +11,7 @@ from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
 from shiplog.units import CATALOGUE, conversion_factor
 
 from .decimation import Decimator, bucket_size, is_long
+from .sensor_panels import SensorSeries
 from .series import (
     BLUE,
     CYAN,
@@ -39,6 +40,7 @@ class SeriesBuilder:
     def __init__(self, clock: Clock, stats: SignalStats) -> None:
         self._clock, self._long = clock, is_long(clock.count)
         self._decimators: dict[str, Decimator] = {}
+        self._sensors = SensorSeries(clock)
         self._samples = {
             name: MeasuredSamples(longest)
             for name, longest in zip(PAPER_OUTPUTS, stats.gap_steps, strict=True)
@@ -47,6 +49,7 @@ class SeriesBuilder:
     def add(self, chunk: ReplayChunk) -> dict[str, Series]:
         """Add the next chunk; return its series over time, by entity, with every sample."""
         dense = self._outputs(chunk) | _inputs(chunk) | _disturbances(chunk)
+        dense |= self._sensors.step(chunk)
         for entity, series in (dense | _sparse(chunk)).items():
             if entity not in self._decimators:
                 size = bucket_size(self._clock.count, len(series.lines))
@@ -96,14 +99,20 @@ def _inputs(chunk: ReplayChunk) -> dict[str, Series]:
 
 
 def _disturbances(chunk: ReplayChunk) -> dict[str, Series]:
-    """The slow disturbances of yaw and surge, and their waves where they are estimated."""
+    """The slow disturbances of yaw and surge, and their waves where they are estimated.
+
+    Those that are states of the filter have bands.
+    """
     found, at = chunk.disturbance, chunk.signals.time_secs
     parts = (("yaw", found.yaw, found.yaw_wave), ("surge", found.surge, found.surge_wave))
     drawn = {}
-    for name, values, wave in parts:
+    for axis, (name, values, wave) in enumerate(parts):
         _, _, scale = DISTURBANCES[name]
-        line = Line("disturbance", values * scale, RED, 1.5)
-        drawn[f"disturbance_{name}/estimate"] = Series("estimate", at, (line,))
+        lines: tuple[Line, ...] = (Line("disturbance", values * scale, RED, 1.5),)
+        if found.stds is not None:
+            half_width = BAND_STDS * found.stds[:, axis] * scale
+            lines = banded("disturbance", values * scale, half_width, RED)
+        drawn[f"disturbance_{name}/estimate"] = Series("estimate", at, lines)
         if wave is not None:
             line = Line("wave", wave * scale, CYAN)
             drawn[f"disturbance_{name}/wave"] = Series("wave", at, (line,), spiky=True)

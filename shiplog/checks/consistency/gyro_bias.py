@@ -53,7 +53,7 @@ def bias_findings(signals: CoarseSignals) -> Iterator[Finding]:
     yield Finding(
         "bias",
         "yaw_rate",
-        f"{signals.topics['yaw_rate']}: bias of {bias_deg:+.4f} ± {2 * error_deg:.4f} deg/s "
+        f"{signals.topics['yaw_rate']}: bias of {bias_deg:+.4f} ± {2 * error_deg:.1g} deg/s "
         "against the heading; a bias acts like a yaw moment and distorts b1, b2, b3 and e: "
-        "calibrate the gyro or subtract the bias",
+        "calibrate the gyro, subtract the bias, or estimate it in a replay by --sensor-bias auto",
     )

@@ -288,3 +288,36 @@ def test_analyses_of_the_same_log_are_the_same_to_the_last_bit(
     again = make_reference(analyse(zigzag_log))
     for one, other in zip(reference, again, strict=True):
         assert np.array_equal(one.values, other.values, equal_nan=True)
+
+
+def test_sensor_errors_are_part_of_the_reference_where_they_are_estimated(
+    sensor_analysis: Analysis, reference: TrialLog
+) -> None:
+    known = make_reference(sensor_analysis)
+    topics = [channel.topic for channel in known]
+    assert len(set(topics)) == len(topics)
+    assert {
+        "/gyro_error/estimate", "/gyro_error/std", "/log_error/estimate", "/heading/innovation",
+        "/north_nis/residual_test", "/current_north/estimate", "/yaw_moment/std",
+        "/compass_measurement_std/noise_model", "/yaw_moment_frequency/noise_model",
+        "/gyro_determined/count",
+    } <= set(topics)  # fmt: skip
+    assert known["gyro_error/estimate"].unit == "rad/s"
+    assert not any(
+        "gyro" in channel.topic or "heading/inn" in channel.topic for channel in reference
+    )
+
+
+def test_a_change_of_a_sensor_error_fails_the_check(sensor_analysis: Analysis) -> None:
+    known = make_reference(sensor_analysis)
+    further = sensor_analysis.estimates.further
+    assert further is not None
+    values = further.values.copy()
+    values[:, further.names.index("gyro")] *= 1 + 1e-6
+    moved = replace(sensor_analysis.estimates, further=replace(further, values=values))
+    changed = [
+        c.topic
+        for c in make_reference(replace(sensor_analysis, estimates=moved))
+        if not _same(c.values, known, c.topic)
+    ]
+    assert changed == ["/gyro_error/estimate"]

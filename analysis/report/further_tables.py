@@ -1,0 +1,87 @@
+"""Sensor errors and current as tables, as far as the filter estimates them."""
+
+from collections.abc import Iterator
+from math import degrees, isnan
+
+from analysis.replay.current import Current
+from analysis.replay.replay_results import Findings
+from analysis.replay.sensor_errors import SensorError, further_display
+from shiplog.text_table import TextTable
+
+from .display import NORMAL_95, decimals
+
+COLUMNS = ("value", "std", "95 %\ninterval", "unit")
+
+
+def further_tables(findings: Findings) -> Iterator[TextTable]:
+    """Yield the tables of the sensor errors and of the current, as far as there are any."""
+    if findings.sensor_errors:
+        yield _sensor_error_table(findings)
+    if findings.current is not None:
+        yield _current_table(findings.current)
+
+
+def _sensor_error_table(findings: Findings) -> TextTable:
+    errors = findings.sensor_errors
+    rows = []
+    for error in errors:
+        cells = _cells(error.name, error.unit, error.value, error.std)
+        rows.append((error.label, *cells, "yes" if error.determined else "no"))
+    columns = ("sensor error", *COLUMNS, "determined")
+    return TextTable("Sensor errors", columns, tuple(rows), tuple(_sensor_remarks(findings)))
+
+
+def _sensor_remarks(findings: Findings) -> Iterator[str]:
+    for error in findings.sensor_errors:
+        if error.reason:
+            yield _reason(error)
+    if all(isnan(error.value) for error in findings.sensor_errors):
+        return
+    outputs = findings.plan.noise.further.outputs
+    measured = {0: "", 1: "The heading is a measurement of the filter. "}.get(
+        len(outputs), "Heading and position are measurements of the filter. "
+    )
+    yield (
+        f"{measured}Values at the end of the trial. States and disturbances are corrected for "
+        "these errors, coefficients are not."
+    )
+
+
+def _reason(error: SensorError) -> str:
+    state = "estimated" if isnan(error.value) else "determined"
+    return f"{error.label}: not {state}: {error.reason}."
+
+
+def _current_table(current: Current) -> TextTable:
+    rows = (
+        ("to north", *_cells("current_north", "m/s", current.north, current.north_std)),
+        ("to east", *_cells("current_east", "m/s", current.east, current.east_std)),
+        (
+            "drift length",
+            *_cells("drift_length", "m", current.drift_length, current.drift_length_std),
+        ),
+    )
+    return TextTable("Current", ("current", *COLUMNS), rows, tuple(_current_remarks(current)))
+
+
+def _current_remarks(current: Current) -> Iterator[str]:
+    unit, factor = further_display("current_north", "m/s")
+    if current.determined:
+        set_deg = round(degrees(current.direction)) % 360
+        yield f"Set {set_deg:03d}°, drift {current.speed * factor:.2f} {unit}, at the end."
+    else:
+        yield "No current: at the end it is less than two standard deviations."
+    yield (
+        "Drift length: the sway, positive to starboard, is minus this length times the yaw rate; "
+        "a leeway by wind counts as current."
+    )
+
+
+def _cells(name: str, unit: str, value: float, std: float) -> tuple[str, str, str, str]:
+    """Return value, standard deviation, half of the interval and unit, as they are shown."""
+    shown, factor = further_display(name, unit)
+    value, std = value * factor, std * factor
+    if isnan(value):
+        return "not estimated", "", "", shown
+    digits = decimals(std)
+    return f"{value:.{digits}f}", f"{std:.{digits}f}", f"± {NORMAL_95 * std:.{digits}f}", shown

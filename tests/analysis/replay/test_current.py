@@ -1,0 +1,25 @@
+from math import radians
+
+import pytest
+
+from analysis.replay.current import Current, current_of
+
+
+@pytest.mark.parametrize(
+    ("north", "east", "direction_deg"),
+    [(0.5, 0.0, 0.0), (0.0, 0.5, 90.0), (-0.5, 0.0, 180.0), (0.0, -0.5, 270.0), (0.3, -0.3, 315.0)],
+)
+def test_the_direction_is_the_one_into_which_the_current_flows(
+    north: float, east: float, direction_deg: float
+) -> None:
+    current = Current(north, east, 0.01, 0.01, 0.0, 1.0)
+    assert current.direction == pytest.approx(radians(direction_deg))
+
+
+def test_a_current_within_its_uncertainty_has_no_direction() -> None:
+    assert not Current(0.1, 0.0, 0.01, 0.06, 0.0, 1.0).determined
+    assert Current(0.1, 0.1, 0.06, 0.06, 0.0, 1.0).determined
+
+
+def test_without_positions_there_is_no_current() -> None:
+    assert current_of({"gyro": (1e-4, 1e-5), "heading": (0.1, 1e-3)}) is None

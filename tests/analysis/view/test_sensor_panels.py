@@ -1,0 +1,108 @@
+from dataclasses import replace
+from math import degrees
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from analysis.replay.replay_results import Analysis
+from analysis.view.panels import Panel
+from analysis.view.replay_panels import equation_panels
+from analysis.view.replay_review import write_replay_review
+from analysis.view.sensor_panels import sensor_panels
+from analysis.view.series import Series
+from analysis.view.series_builder import SeriesBuilder
+
+
+@pytest.fixture(scope="module")
+def drawn(sensor_analysis: Analysis) -> dict[str, Series]:
+    plan = sensor_analysis.findings.plan
+    builder = SeriesBuilder(plan.clock, plan.stats)
+    builder.add(sensor_analysis.as_chunk())
+    return builder.result()
+
+
+@pytest.fixture(scope="module")
+def panels(sensor_analysis: Analysis, drawn: dict[str, Series]) -> dict[str, Panel]:
+    histories, others = sensor_panels(sensor_analysis.findings, drawn)
+    return {panel.name: panel for panel in (*histories, *others)}
+
+
+def test_each_sensor_error_has_its_history_with_a_band(
+    sensor_analysis: Analysis, panels: dict[str, Panel]
+) -> None:
+    (series,) = panels["sensor_gyro"].series
+    further = sensor_analysis.estimates.further
+    assert further is not None
+    found = further.of("gyro")
+    assert found is not None
+    value, std = np.degrees(found)
+    high, low, middle = (line.values for line in series.lines)
+    np.testing.assert_allclose(middle, value)
+    np.testing.assert_allclose(high - low, 4 * std)
+    assert panels["sensor_gyro"].title.startswith("gyro bias = 0.0")
+    assert panels["sensor_gyro"].limits[0] < value[-1] < panels["sensor_gyro"].limits[1]
+
+
+def test_an_error_that_is_not_determined_has_no_number_in_its_title(
+    sensor_analysis: Analysis, drawn: dict[str, Series]
+) -> None:
+    errors = [replace(e, determined=False) for e in sensor_analysis.findings.sensor_errors]
+    findings = replace(sensor_analysis.findings, sensor_errors=tuple(errors))
+    histories, _ = sensor_panels(findings, drawn)
+    assert histories[0].title == "gyro bias = not determined [deg/s]"
+
+
+def test_the_heading_is_drawn_as_measured_and_as_estimated(
+    sensor_analysis: Analysis, panels: dict[str, Panel]
+) -> None:
+    measured, state = panels["sensor_heading"].series
+    known = np.isfinite(sensor_analysis.signals["compass"])
+    assert len(measured.time_secs) == known.sum()
+    at_samples = np.interp(measured.time_secs, state.time_secs, state.lines[-1].values)
+    assert np.abs(at_samples - measured.lines[0].values).max() < 0.1  # deg
+
+
+def test_innovations_of_heading_and_position_are_over_their_std(
+    sensor_analysis: Analysis, panels: dict[str, Panel]
+) -> None:
+    estimates = sensor_analysis.estimates
+    for i, name in enumerate(("compass", "north", "east"), 2):
+        normalised = estimates.innovations[:, i] / estimates.innovation_stds[:, i]
+        drawn = panels[f"innovation_{name}"].series[0].lines[0].values
+        np.testing.assert_allclose(drawn, normalised[np.isfinite(normalised)])
+
+
+def test_smoothed_disturbances_have_bands(
+    sensor_analysis: Analysis, drawn: dict[str, Series]
+) -> None:
+    yaw, surge = equation_panels(sensor_analysis.findings, drawn)
+    for axis, (column, scale) in enumerate(((yaw, degrees(1) * 1e6), (surge, 1e3))):
+        panel = column[2]
+        (series,) = panel.series  # no line of the observer's noise
+        high, low, _ = (line.values for line in series.lines)
+        stds = sensor_analysis.disturbance.stds
+        assert stds is not None
+        np.testing.assert_allclose(high - low, 4 * stds[:, axis] * scale, rtol=1e-6)
+
+
+def test_a_replay_without_further_states_has_no_sensors(zigzag_analysis: Analysis) -> None:
+    plan = zigzag_analysis.findings.plan
+    builder = SeriesBuilder(plan.clock, plan.stats)
+    builder.add(zigzag_analysis.as_chunk())
+    assert sensor_panels(zigzag_analysis.findings, builder.result()) == ([], [])
+
+
+def test_the_review_has_a_tab_of_the_sensors(sensor_analysis: Analysis, tmp_path: Path) -> None:
+    path = tmp_path / "review.rrd"
+    write_replay_review(sensor_analysis, path, text="")
+    reader = RrdReader(path)
+    batches = [c.to_record_batch() for c in reader.stream(store=reader.blueprints()[0])]
+    column = "ContainerBlueprint:display_name"
+    names = [row[0] for b in batches if column in b.schema.names for row in b[column].to_pylist()]
+    assert {"replay", "sensors"} <= set(names)
+    entities = {chunk.entity_path for chunk in reader.stream()}
+    assert {"/sensor_gyro/state", "/sensor_heading/measured", "/innovation_north/normalised"} <= (
+        entities
+    )
