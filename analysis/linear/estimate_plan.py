@@ -133,42 +133,27 @@ def plan_estimate(
         )  # fmt: skip
 
     screened = screen_without_delays(log, options.sensor_delays, screen)
-    stats = screened.screening.stats
-    step = system.step_secs or _step_secs(system, screened)
-    clock = choose_clock(screened, stats, step, channels=names)
-    bound = bind_signals(system.bindings, stats)
-    m, r = len(system.outputs), len(system.inputs)
-    outputs = tuple(with_stride(signal, clock) for signal in bound[:m])
-    schedule = bound[m + r :]
-    sizes = signal_sizes(screened, clock, outputs, bound[m:], on_progress)
-    collected, typical = sizes.outputs, sizes.rms[r:]
-    stds, measured = measurement_noise(outputs, collected, clock)
-    intervals = np.array([measurement_interval(each, clock) for each in outputs])
-    start = StartSignals(
-        np.array([each.first for each in collected]),
-        np.sqrt([each.moments.mean_square for each in collected]),
-    )
-    sampling = OutputSampling(stds**2, intervals, clock.dt_secs)
-    there = system.linearised_at(typical)
+    signals = _measured_signals(screened, system, names, on_progress)
+    sampling, there = signals.sampling, system.linearised_at(signals.typical)
     require_distinguishable(system, estimator_model(system, sampling, there), there)
     _require_method(system, smooth=smooth)
     fitted: tuple[FittedParameter, ...] = ()
     if any(noise.fit for noise in system.shaped):
-        signals = _fit_signals(screened, clock, outputs, bound[m : m + r], start, on_progress)
-        system, fitted = fit_spectra(system, sampling, signals, log.name)
+        recorded = _fit_signals(screened, signals, on_progress)
+        system, fitted = fit_spectra(system, sampling, recorded, log.name)
     model = estimator_model(system, sampling, there)
     design = system.method.design(model)
     return EstimatePlan(
         name=log.name,
         system=system,
         screening=screened.screening,
-        clock=clock,
-        outputs=outputs,
-        inputs=bound[m : m + r],
-        schedule=schedule,
-        stds=stds,
-        measured=measured,
-        start=start,
+        clock=signals.clock,
+        outputs=signals.outputs,
+        inputs=signals.inputs,
+        schedule=signals.schedule,
+        stds=signals.stds,
+        measured=signals.measured,
+        start=signals.start,
         model=model,
         design=design,
         feedback=design_feedback(system, model, design),
@@ -178,6 +163,46 @@ def plan_estimate(
         fitted=fitted,
         warnings=_warnings(system),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _MeasuredSignals:
+    """The signals of a system on the clock of a log, with their noise and their sizes."""
+
+    clock: Clock
+    outputs: tuple[BoundSignal, ...]
+    inputs: tuple[BoundSignal, ...]
+    schedule: tuple[BoundSignal, ...]
+    stds: FloatArray
+    measured: tuple[bool, ...]
+    start: StartSignals
+    typical: FloatArray  # rms values of the schedule
+
+    @property
+    def sampling(self) -> OutputSampling:
+        """How the outputs are measured."""
+        intervals = np.array([measurement_interval(each, self.clock) for each in self.outputs])
+        return OutputSampling(self.stds**2, intervals, self.clock.dt_secs)
+
+
+def _measured_signals(
+    log: ScreenedLog, system: LinearSystem, names: tuple[str, ...], on_progress: ProgressCallback
+) -> _MeasuredSignals:
+    """Choose the clock and measure the signals of a system in a pass over the log."""
+    stats = log.screening.stats
+    step = system.step_secs or _step_secs(system, log)
+    clock = choose_clock(log, stats, step, channels=names)
+    bound = bind_signals(system.bindings, stats)
+    m, r = len(system.outputs), len(system.inputs)
+    outputs = tuple(with_stride(signal, clock) for signal in bound[:m])
+    sizes = signal_sizes(log, clock, outputs, bound[m:], on_progress)
+    stds, measured = measurement_noise(outputs, sizes.outputs, clock)
+    start = StartSignals(
+        np.array([each.first for each in sizes.outputs]),
+        np.sqrt([each.moments.mean_square for each in sizes.outputs]),
+    )
+    inputs, schedule, typical = bound[m : m + r], bound[m + r :], sizes.rms[r:]
+    return _MeasuredSignals(clock, outputs, inputs, schedule, stds, measured, start, typical)
 
 
 def _step_secs(system: LinearSystem, log: ScreenedLog) -> float | None:
@@ -202,25 +227,20 @@ def _warnings(system: LinearSystem) -> tuple[str, ...]:
 
 
 def _fit_signals(
-    log: ScreenedLog,
-    clock: Clock,
-    outputs: tuple[BoundSignal, ...],
-    inputs: tuple[BoundSignal, ...],
-    start: StartSignals,
-    on_progress: ProgressCallback,
+    log: ScreenedLog, bound: _MeasuredSignals, on_progress: ProgressCallback
 ) -> FitSignals:
     """Return the first `MAX_FITTED` instants of the signals at which the inputs are known."""
-    held, y, u, count = HeldSignals(inputs, clock), [], [], 0
-    for signals in resampled_chunks(log, clock, on_progress, "fit"):
+    held, y, u, count = HeldSignals(bound.inputs, bound.clock), [], [], 0
+    for signals in resampled_chunks(log, bound.clock, on_progress, "fit"):
         if count < MAX_FITTED:
             part = signals.part(0, MAX_FITTED - count)
-            y.append(np.column_stack([output.measured(part) for output in outputs]))
+            y.append(np.column_stack([output.measured(part) for output in bound.outputs]))
             u.append(held.step(part))
             count += len(part)
     measured, known = np.concatenate(y), np.concatenate(u)
     first = int(np.argmax(np.isfinite(known).all(axis=1)))
     return FitSignals(
-        np.ascontiguousarray(measured[first:]), np.ascontiguousarray(known[first:]), start
+        np.ascontiguousarray(measured[first:]), np.ascontiguousarray(known[first:]), bound.start
     )
 
 

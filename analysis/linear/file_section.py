@@ -155,6 +155,10 @@ class FileSection:
             return None
         return array
 
+    def section(self, key: str) -> "FileSection":
+        """Return the section below this one, such as ``[noise]``; an empty one without the key."""
+        return FileSection(self.table[key] if key in self else {}, self.name(key), self.errors)
+
     def sections(self, key: str) -> dict[str, "FileSection"]:
         """Return the named sections below this one, such as those of ``[outputs.NAME]``."""
         value = self.table[key] if key in self else {}

@@ -26,7 +26,7 @@ def parse_method(top: FileSection, states: Sequence[str]) -> Method:
     """Parse ``[method]``; the Kalman filter by default."""
     if "method" not in top:
         return KalmanMethod()
-    section = FileSection(top.table["method"], "method", top.errors)
+    section = top.section("method")
     name = section.text("name", choices=tuple(METHODS))
     method = METHODS[name](section, states) if name in METHODS else KalmanMethod()
     section.finish()
@@ -39,7 +39,7 @@ def parse_regulator(
     """Parse ``[regulator]``; None where the file has none."""
     if "regulator" not in top:
         return None
-    section = FileSection(top.table["regulator"], "regulator", top.errors)
+    section = top.section("regulator")
     P, R = (
         _diagonal(section.by_name("P", states, least=0.0), states),
         _diagonal(section.by_name("R", inputs, least=0.0), inputs),

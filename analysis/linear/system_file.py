@@ -68,11 +68,7 @@ def parse_system(text: str, where: str) -> LinearSystem:
 
 
 def _system(top: FileSection, where: Path) -> LinearSystem:
-    plant = FileSection(top.table.get("plant", {}), "plant", top.errors)
-    if "plant" not in top:
-        top.errors.append("[plant] is missing")
-    form = _plant(plant, where.parent)
-    plant.finish()
+    form = _plant(top.section("plant"), where.parent)
     outputs, inputs = _bindings(top, "outputs"), _bindings(top, "inputs")
     if not outputs:
         top.errors.append("[outputs.NAME] is missing: name the channels that are measured")
@@ -80,21 +76,16 @@ def _system(top: FileSection, where: Path) -> LinearSystem:
     form = _bound(form, outputs, inputs, top.errors)
     states, sensors = tuple(form.states), tuple(each.name for each in outputs)
     names = tuple(each.name for each in inputs)
-    noise = FileSection(top.table.get("noise", {}), "noise", top.errors)
-    W = _process_noise(noise, form) if "noise" in top else np.zeros((len(states),) * 2)
-    noise.finish()
     disturbances = [
         parse_disturbance(each, states, names, sensors) for each in top.items("disturbance")
     ]
     shaped = [parse_shaped(each, states, sensors) for each in top.items("coloured")]
     extra = [each.name for each in disturbances] + [each.name for each in shaped]
     _require_different([*states, *extra], top.errors)
-    initial = FileSection(top.table.get("initial", {}), "initial", top.errors)
+    initial = top.section("initial")
     known = [*states, *(d.name for d in disturbances)]
     x0, stds = initial.by_name("state", known), initial.by_name("std", known, least=0.0)
-    if "initial" in top:
-        initial.finish()
-    method = parse_method(top, states)
+    initial.finish()
     return LinearSystem(
         name=top.text("name", where.stem),
         plant=Plant(form.A, form.B, _given(form.C), states, sensors),
@@ -102,8 +93,8 @@ def _system(top: FileSection, where: Path) -> LinearSystem:
         units=tuple(form.states.values()),
         inputs=inputs,
         outputs=outputs,
-        W=W,
-        method=method,
+        W=_process_noise(top.section("noise"), form),
+        method=parse_method(top, states),
         disturbances=tuple(disturbances),
         shaped=tuple(shaped),
         initial=x0,
@@ -126,7 +117,14 @@ def _optional(section: FileSection, key: str) -> float | None:
 
 
 def _plant(section: FileSection, folder: Path) -> PlantForm:
-    """Parse ``[plant]``: a model by name, a transfer function, or matrices."""
+    """Parse ``[plant]``."""
+    form = _plant_form(section, folder)
+    section.finish()
+    return form
+
+
+def _plant_form(section: FileSection, folder: Path) -> PlantForm:
+    """Parse a model by name, a transfer function, or matrices."""
     if "model" in section:
         name = section.text("model", choices=tuple(BUILT_IN))
         if name in BUILT_IN:
@@ -251,7 +249,13 @@ def _with_inputs(linearise: Linearise | None, chosen: list[int]) -> Linearise | 
 
 
 def _process_noise(section: FileSection, form: PlantForm) -> FloatArray:
-    """Parse the intensity (n, n) of the process noise: by state, or Q for the columns of G."""
+    """Parse ``[noise]``: the intensity (n, n) by state, or Q for the columns of G."""
+    W = _intensity(section, form)
+    section.finish()
+    return W
+
+
+def _intensity(section: FileSection, form: PlantForm) -> FloatArray:
     states, n = list(form.states), len(form.A)
     by_state = section.by_name("process", states, least=0.0)
     W = np.diag([by_state.get(name, 0.0) for name in states])

@@ -57,7 +57,7 @@ def test_all_errors_of_a_file_are_reported_at_once_with_the_nearest_name() -> No
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("", "[plant] is missing"),
+        ("", "[plant] needs a square A, or num and den, or model"),
         ("[plant]\nA = [[1, 2]]", "a square A"),
         ("[plant]\nA = [[1, 2], [3]]", "rows of equal length"),
         ("[plant]\nA = [[nan]]", "list of rows"),
