@@ -26,6 +26,7 @@ STARTS = 4  # of the search; the first is the gain of `place_multilevel`
 MAX_ITERATIONS = 200  # of each search
 GRADIENT_TOLERANCE = 1e-3  # of the logarithm of a variance
 STEP = 1e-6  # of a central difference
+ROUNDING = 1e-20  # of the sensors' noise: a smaller variance is zero
 VARIANCE_FLOOR = 1e-8  # of the sensors' noise: an error that can be zero is no further reward
 
 Objective = Callable[[FloatArray], tuple[float, FloatArray]]
@@ -54,7 +55,10 @@ class NoisePlacement:
     @property
     def summary(self) -> str:
         """The price of the poles in one line."""
-        least, most = np.nanmin(self.kalman_ratio), np.nanmax(self.kalman_ratio)
+        known = self.kalman_ratio[~np.isnan(self.kalman_ratio)]
+        if not len(known):
+            return "no state has an error, nor has it one in the Kalman filter"
+        least, most = known.min(), known.max()
         return f"errors {least:.3g} to {most:.3g} times those of the Kalman filter"
 
 
@@ -103,13 +107,15 @@ def place_for_noise(
     system = _NoisySystem(gains.A, gains.C, W / scales / gains.rate, R * gains.rate)
     L = _least_noise(system, gains.levels)
     try:
-        covariance = scales * system.covariance(L)
+        own = system.covariance(L)
     except RuntimeWarning as warning:
         raise UsageError(
             f"poles {gains.poles.shape}: the covariance of the errors is lost in rounding"
             f" ({warning}); with A {gains.A.shape} and C {gains.C.shape} a mode is almost"
             " unobservable: measure more states, or use a Kalman gain"
         ) from None
+    exact = np.diag(own) < ROUNDING * np.diag(system.R).min()
+    covariance = np.where(exact | exact[:, None], 0.0, scales * own)
     return NoisePlacement(gains.placed(L), covariance, _kalman_ratio(A, C, W, R, covariance))
 
 
@@ -182,7 +188,7 @@ def _lyapunov(F: FloatArray, noise: FloatArray) -> FloatArray:
 def _kalman_ratio(
     A: ArrayLike, C: ArrayLike, W: FloatArray, R: FloatArray, covariance: FloatArray
 ) -> FloatArray:
-    """Compute σ of each state's error over that of the Kalman filter, (n,)."""
+    """Compute σ of each state's error over that of the Kalman filter, (n,), from the covariance."""
     try:
         optimum = np.diag(kalman_gain(A, np.eye(len(W)), C, W, R).covariance)
     except UsageError:  # no noise drives a mode that does not decay: it is known exactly in the end

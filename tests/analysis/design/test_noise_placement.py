@@ -193,6 +193,18 @@ def test_without_state_noise_the_price_is_infinite() -> None:
     assert result.summary == "errors inf to inf times those of the Kalman filter"
 
 
+def test_a_state_without_error_has_no_price() -> None:
+    """No noise drives the actuator, whose pole is kept."""
+    A = np.array([[-1.0, 0.9, -0.1], [0.8, -1.1, -0.2], [0, 0, -20]])
+    C, W, R = np.eye(3)[:2], np.diag([0.1, 0.1, 0]), np.eye(2)
+    poles = kalman_gain(A, np.eye(3), C, W, R).poles
+    result = place_for_noise(A, C, poles, W, R)
+    assert result.kalman_ratio == pytest.approx([1, 1, np.nan], abs=2e-3, nan_ok=True)
+    assert result.covariance[2].tolist() == [0, 0, 0]
+    kept = place_for_noise(np.diag([-1.0, -2]), np.eye(2), [-1, -2], np.zeros((2, 2)), R)
+    assert kept.summary == "no state has an error, nor has it one in the Kalman filter"
+
+
 def test_search_is_repeatable() -> None:
     A, C, poles = random_system(0, 4, 2)
     again = place_for_noise(A, C, poles, np.eye(4), np.eye(2))
