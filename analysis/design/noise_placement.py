@@ -44,8 +44,8 @@ class NoisePlacement:
         P, (n, n): the covariance of the error.
     kalman_ratio
         (n,): standard deviation of each state's error over that of the Kalman filter, which is free
-        to choose its poles. Infinite where the error of the Kalman filter is zero, as without state
-        noise, and NaN where both errors are.
+        to choose its poles. Infinite where only the error of the Kalman filter is zero; NaN where
+        both are, or where it has no steady state: no noise drives a mode that does not decay.
     """
 
     gain: FloatArray
@@ -57,7 +57,7 @@ class NoisePlacement:
         """The price of the poles in one line."""
         known = self.kalman_ratio[~np.isnan(self.kalman_ratio)]
         if not len(known):
-            return "no state has an error, nor has it one in the Kalman filter"
+            return "no price: the Kalman filter has no steady state, or no state has an error"
         least, most = known.min(), known.max()
         return f"errors {least:.3g} to {most:.3g} times those of the Kalman filter"
 
@@ -191,7 +191,7 @@ def _kalman_ratio(
     """Compute σ of each state's error over that of the Kalman filter, (n,), from the covariance."""
     try:
         optimum = np.diag(kalman_gain(A, np.eye(len(W)), C, W, R).covariance)
-    except UsageError:  # no noise drives a mode that does not decay: it is known exactly in the end
-        optimum = np.zeros(len(W))
+    except UsageError:  # no steady state, as where no noise drives a constant
+        return np.full(len(W), np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.sqrt(np.diag(covariance) / optimum)

@@ -185,12 +185,12 @@ def test_price_of_the_poles_does_not_depend_on_the_units_of_the_states() -> None
     assert scaled.kalman_ratio == pytest.approx(placed(0, 4, 2).kalman_ratio, rel=1e-3)
 
 
-def test_without_state_noise_the_price_is_infinite() -> None:
-    """The Kalman filter then knows a constant exactly in the end."""
+def test_without_noise_of_a_constant_there_is_no_price() -> None:
+    """The Kalman filter then has no steady state: its gain decreases for ever."""
     result = place_for_noise([[0, 1], [0, 0]], np.eye(2), [-1, -2], np.zeros((2, 2)), np.eye(2))
-    assert np.all(np.isinf(result.kalman_ratio))
+    assert np.all(np.isnan(result.kalman_ratio))
     assert np.all(np.diag(result.covariance) > 0)
-    assert result.summary == "errors inf to inf times those of the Kalman filter"
+    assert result.summary.startswith("no price: the Kalman filter has no steady state")
 
 
 def test_a_state_without_error_has_no_price() -> None:
@@ -202,7 +202,9 @@ def test_a_state_without_error_has_no_price() -> None:
     assert result.kalman_ratio == pytest.approx([1, 1, np.nan], abs=2e-3, nan_ok=True)
     assert result.covariance[2].tolist() == [0, 0, 0]
     kept = place_for_noise(np.diag([-1.0, -2]), np.eye(2), [-1, -2], np.zeros((2, 2)), R)
-    assert kept.summary == "no state has an error, nor has it one in the Kalman filter"
+    assert (
+        kept.summary == "no price: the Kalman filter has no steady state, or no state has an error"
+    )
 
 
 def test_search_is_repeatable() -> None:
