@@ -1,6 +1,8 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
+from math import radians
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported: small matrices
@@ -90,7 +92,10 @@ def zigzag_analysis(zigzag_log: TrialLog) -> Analysis:
 
 @pytest.fixture(scope="session")
 def sensor_analysis() -> Analysis:
-    """Return the smoothed replay of the log of a biased gyro, with sensor errors as states."""
-    log = read(SAMPLE_DATA / "zigzag_10_10_dropouts.mcap").between(0, 300)
+    """Return the smoothed replay of a turning circle, whose gyro has a bias of 0.02 deg/s."""
+    log = read(SAMPLE_DATA / "turning_circle_35.mcap").between(0, 300)
+    gyro = log["yaw_rate"]
+    biased = replace(gyro, values=gyro.values + radians(0.02))
+    channels = (biased, *(channel for channel in log if channel is not gyro))
     settings = {"filter.kind": "extended", "filter.smooth": True, "filter.sensor_bias": "auto"}
-    return analyse(log, settings=settings)
+    return analyse(replace(log, channels=channels), settings=settings)

@@ -4,13 +4,16 @@ from math import nan, radians
 
 import numpy as np
 import pytest
+from places import SAMPLE_DATA
 
 from analysis.replay.current import Current
+from analysis.replay.plan import plan_replay
 from analysis.replay.replay_results import Analysis, Findings
 from analysis.replay.sensor_errors import SensorError
 from analysis.report.further_tables import further_tables
 from analysis.report.replay_json import replay_json
 from analysis.report.replay_tables import replay_markdown, replay_tables
+from shiplog import read
 from shiplog.cli.console import print_tables
 
 GYRO = SensorError("gyro", "gyro bias", "rad/s", radians(0.02), radians(1e-4), radians(0.1), True)
@@ -116,8 +119,12 @@ def test_a_replay_shows_the_error_it_was_given(sensor_analysis: Analysis) -> Non
     assert all(each["count"] > 100 for each in residuals.values())
 
 
-def test_where_the_bias_is_estimated_it_is_no_warning(sensor_analysis: Analysis) -> None:
-    assert not any("bias of" in warning for warning in sensor_analysis.findings.warnings)
+def test_where_the_bias_is_estimated_it_is_no_warning() -> None:
+    log = read(SAMPLE_DATA / "zigzag_10_10_dropouts.mcap")
+    for settings, warned in (({}, True), ({"filter.sensor_bias": "auto"}, False)):
+        warnings = [w for w in plan_replay(log, settings=settings).warnings if "bias of" in w]
+        assert len(warnings) == warned
+        assert all("estimate it in a replay by --sensor-bias auto" in w for w in warnings)
 
 
 def test_small_innovations_of_heading_and_position_are_explained(
