@@ -119,12 +119,9 @@ def _request(entry: SourceEntry, folder: Path) -> StreamRequest:
     own = entry.format.open_transport(address, ReceptionClock()) is not None
     if not own and not is_live(address) and address != "-":
         address = os.fspath(folder / address)
-    options = argparse.Namespace(
-        **{
-            key: folder / value if isinstance(value, Path) else value
-            for key, value in vars(entry.options).items()
-        }
-    )
+    options = argparse.Namespace()
+    for key, value in vars(entry.options).items():
+        setattr(options, key, folder / value if isinstance(value, Path) else value)
     return StreamRequest(
         entry.name, entry.format, address, options, entry.keep_raw, f"{entry.name}."
     )
