@@ -2,9 +2,10 @@
 
 import re
 from typing import NamedTuple
-from urllib.parse import parse_qsl, urlsplit
 
 from shiplog.errors import UsageError
+
+from .device_address import parse_device_address
 
 INTERFACES = ("socketcan", "slcan", "pcan", "kvaser", "ixxat", "gs_usb", "vector", "virtual")
 DEFAULT_BITRATE = 250_000  # of NMEA 2000
@@ -49,14 +50,12 @@ def parse_can_address(address: str) -> CanAddress | None:
     scheme, separator, _ = address.partition("://")
     if not separator or scheme not in INTERFACES:
         return None
-    parts = urlsplit(address)
-    options = dict(parse_qsl(parts.query, keep_blank_values=True))
-    bitrate = options.pop("bitrate", "")
-    channel = parts.netloc + parts.path
-    if not channel or options or (bitrate and not (bitrate.isdecimal() and int(bitrate))):
-        raise UsageError(f"the address of a CAN bus is {_FORM}: {address}")
+    try:
+        channel, bitrate = parse_device_address(address, "bitrate")
+    except ValueError:
+        raise UsageError(f"the address of a CAN bus is {_FORM}: {address}") from None
     if scheme in ("socketcan", "virtual"):
         if bitrate:
             raise UsageError(f"the system sets the bit rate of {channel}; omit it: {address}")
         return CanAddress(scheme, channel, None)
-    return CanAddress(scheme, channel, int(bitrate or DEFAULT_BITRATE))
+    return CanAddress(scheme, channel, bitrate or DEFAULT_BITRATE)

@@ -1,11 +1,12 @@
 """The Actisense NGT-1, a gateway that sends binary messages over a serial line."""
 
 from typing import Any
-from urllib.parse import parse_qsl, urlsplit
 
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.transports.serial_line import SerialTransport
 from shiplog.errors import UsageError
+
+from .device_address import parse_device_address
 
 SCHEME = "ngt1"
 DEFAULT_BAUD = 115_200
@@ -51,17 +52,16 @@ def ngt1_transport(address: str, clock: ReceptionClock) -> SerialTransport | Non
     """
     if not address.startswith(f"{SCHEME}:"):
         return None
-    parts = urlsplit(address)
-    options = dict(parse_qsl(parts.query, keep_blank_values=True))
-    baud, device = options.pop("baud", str(DEFAULT_BAUD)), parts.netloc + parts.path
-    if not device or options or not (baud.isdecimal() and int(baud)):
-        raise UsageError(f"the address of an NGT-1 is {_FORM}: {address}")
+    try:
+        device, baud = parse_device_address(address, "baud")
+    except ValueError:
+        raise UsageError(f"the address of an NGT-1 is {_FORM}: {address}") from None
     from .canboat_library import ngt1_codec  # noqa: PLC0415 - the library is of an extra
 
     return SerialTransport(
         address,
         device,
-        int(baud),
+        baud or DEFAULT_BAUD,
         clock,
         make_splitter=lambda: NgtSplitter(ngt1_codec()),
         greeting=bytes(ngt1_codec().open()),

@@ -9,7 +9,7 @@ from shiplog.errors import UsageError
 from shiplog.units import did_you_mean
 
 from .pipe import PipeTransport
-from .serial_line import DEFAULT_BAUD, SerialTransport
+from .serial_line import DEFAULT_BAUD, SerialTransport, is_bit_rate
 from .tcp import TcpTransport
 from .transport import Transport
 from .udp import UdpTransport
@@ -115,6 +115,6 @@ def _serial(
     address: str, device: str, options: Mapping[str, str], clock: ReceptionClock
 ) -> SerialTransport:
     baud = options.get("baud", str(DEFAULT_BAUD))
-    if not device or not baud.isdecimal() or int(baud) == 0:
+    if not device or not is_bit_rate(baud):
         raise UsageError(f"device or baud rate is missing; an address is {FORMS}: {address}")
     return SerialTransport(address, device, int(baud), clock)

@@ -1,5 +1,6 @@
 """Lines over a serial port, by pyserial."""
 
+import re
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
@@ -12,6 +13,9 @@ if TYPE_CHECKING:
     import serial
 
 DEFAULT_BAUD = 4800  # of NMEA 0183; 38400 at high speed
+
+is_bit_rate = re.compile(r"[1-9][0-9]{0,8}").fullmatch
+"""Whether a text is a rate in bit/s."""
 
 
 class Splitter(Protocol):

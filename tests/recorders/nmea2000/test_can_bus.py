@@ -37,7 +37,14 @@ def test_addresses_of_can_buses_are_recognised(address: str, parsed: CanAddress 
 
 @pytest.mark.parametrize(
     "address",
-    ["slcan://", "slcan:///dev/ttyACM0?bitrate=0", "virtual://a?b=c", "socketcan://can0?bitrate=1"],
+    [
+        "slcan://",
+        "slcan://[",
+        "slcan:///dev/ttyACM0?bitrate=0",
+        f"slcan:///dev/ttyACM0?bitrate={'9' * 5000}",
+        "virtual://a?b=c",
+        "socketcan://can0?bitrate=1",
+    ],
 )
 def test_a_wrong_address_of_a_can_bus_is_refused(address: str) -> None:
     with pytest.raises(UsageError, match="can0"):

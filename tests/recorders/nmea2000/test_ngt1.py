@@ -74,7 +74,15 @@ def test_random_bytes_raise_nothing_and_need_no_memory() -> None:
 
 
 @pytest.mark.parametrize(
-    "address", ["ngt1://", "ngt1:///dev/ttyUSB0?baud=fast", "ngt1:///dev/ttyUSB0?bits=8"]
+    "address",
+    [
+        "ngt1://",
+        "ngt1://[",
+        "ngt1:///dev/ttyUSB0?baud=fast",
+        "ngt1:///dev/ttyUSB0?baud=",
+        f"ngt1:///dev/ttyUSB0?baud={'9' * 5000}",
+        "ngt1:///dev/ttyUSB0?bits=8",
+    ],
 )
 def test_a_wrong_address_is_refused_with_the_form(address: str) -> None:
     with pytest.raises(UsageError, match=r"the address of an NGT-1 is ngt1:///dev/ttyUSB0"):
