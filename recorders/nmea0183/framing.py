@@ -24,7 +24,7 @@ _TAG_PARAMETER = re.compile(r"([a-z]):([ -~]+)")
 _SOURCE = re.compile(r"[A-Za-z0-9_-]{1,15}")
 _GROUP = re.compile(r"([0-9]{1,2})-([0-9]{1,2})-([0-9]{1,9})")
 _HEX_BYTE = re.compile(rb"[0-9A-Fa-f]{2}")
-_MAX_TAG_NUMBER = 10**15
+_MAX_TAG_DIGITS = 15
 _PRINTABLE = bytes(range(0x20, 0x7F))
 _REASONS = {
     "missing_checksum_delimiter": "no checksum",
@@ -210,9 +210,9 @@ def _parse_tag(content: bytes) -> TagBlock:
 def _tag_number(text: str | None) -> int | None:
     if text is None:
         return None
-    if not text.isdecimal() or int(text[:16]) >= _MAX_TAG_NUMBER:
+    if not text.isdecimal() or len(text) > _MAX_TAG_DIGITS:
         raise FramingError("malformed TAG block")
-    return int(text[:16])
+    return int(text)
 
 
 def _epoch_ns(number: int) -> int:

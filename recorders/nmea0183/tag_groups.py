@@ -28,7 +28,7 @@ class TagGroups:
     """Completion of the TAG blocks of groups.
 
     A sentence whose predecessor in the group was lost is not completed: the code of a group is used
-    again for a later one.
+    again for a later one. Neither is one of two groups that two senders begin under the same code.
     """
 
     def __init__(self) -> None:
@@ -41,6 +41,8 @@ class TagGroups:
         number, total, code = tag.group
         before = self._begun.pop(code, None)
         if number == 1:
+            if before is not None and before.first.source != tag.source:
+                return tag  # whose the next sentences are is not known
             first = tag
         elif before is not None and (before.number + 1, before.total) == (number, total):
             first = before.first

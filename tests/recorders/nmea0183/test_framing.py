@@ -69,6 +69,7 @@ def test_a_checksum_in_small_letters_is_read() -> None:
         (tagged("c:1e9", "HEHDT,1,T"), "malformed TAG block"),
         (tagged("c:99999999999999", "HEHDT,1,T"), "malformed TAG block"),  # of the year 5138
         (tagged("n:" + "9" * 30, "HEHDT,1,T"), "malformed TAG block"),
+        (tagged("c:" + "0" * 16 + "1401836000", "HEHDT,1,T"), "malformed TAG block"),
         (tagged("x", "HEHDT,1,T"), "malformed TAG block"),
     ],
 )

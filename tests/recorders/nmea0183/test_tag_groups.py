@@ -70,6 +70,20 @@ def test_the_code_of_a_group_is_used_again_for_a_later_one() -> None:
     assert groups.complete(alone) == alone
 
 
+def test_a_sentence_of_two_groups_with_one_code_is_given_to_neither_sender() -> None:
+    lines = [
+        tagged("g:1-2-34,s:GR0001", "HEHDT,1,T"),
+        tagged("g:1-2-34,s:GR0002", "HEHDT,2,T"),
+        tagged("g:2-2-34", "TIROT,6.0,A"),
+        tagged("g:2-2-34", "TIROT,9.0,A"),
+    ]
+    assert set(decode_live(NMEA0183, lines).channels) == {
+        "/heading/GR0001.HE",
+        "/heading/GR0002.HE",
+        "/yaw_rate/TI",
+    }
+
+
 def test_groups_that_are_never_complete_need_bounded_memory() -> None:
     groups = TagGroups()
     for code in range(10_000):
