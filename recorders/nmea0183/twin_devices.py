@@ -82,8 +82,9 @@ class _Changes:
         """Add the changes up to the last value to the sums."""
         values = np.array(self.values)
         new = values[1:] if self.count else values  # the change before it is in the sum
-        self.step += self._size(np.diff(new))
-        self.double_step += self._size(values[2:] - values[:-2])
+        with np.errstate(over="ignore", invalid="ignore"):  # numbers from the wire have any size
+            self.step += self._size(np.diff(new))
+            self.double_step += self._size(values[2:] - values[:-2])
         self.count += max(len(new) - 1, 0)
         self.values = self.values[-2:]
 
@@ -91,5 +92,4 @@ class _Changes:
         """Return the sum of the sizes of changes."""
         if self.circular:
             changes = (changes + pi) % (2 * pi) - pi
-        with np.errstate(over="ignore"):  # numbers from the wire may be of any size
-            return float(np.abs(changes).sum())
+        return float(np.abs(changes).sum())

@@ -27,7 +27,8 @@ def why_undecoded(counts: StreamCounts) -> str:
         most = max(counts.rejected, key=lambda reason: counts.rejected[reason])
         return (
             f"{rejected} of {rejected + unused} packets cannot be read (most: {most}); the format "
-            "is another one, or its options are: without a format `shiplog record` detects it"
+            "is another one, or its options are: without a format `shiplog record` detects it, "
+            "except csv-lines"
         )
     named = ", ".join(sorted(counts.unused, key=lambda kind: -counts.unused[kind])[:_MAX_NAMED])
     more = ", ..." if len(counts.unused) > _MAX_NAMED else ""

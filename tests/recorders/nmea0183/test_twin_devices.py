@@ -34,3 +34,10 @@ def test_two_compasses_that_alternate_are_found_across_north() -> None:
 )
 def test_a_single_device_is_not_found(values: np.ndarray) -> None:
     assert _findings(values.tolist()) == []
+
+
+def test_numbers_too_large_to_subtract_raise_no_warning() -> None:
+    values = [1.7e308, -1.7e308] * 30
+    assert _findings(values, "heading") == []
+    [finding] = _findings(values, "rpm")
+    assert finding.startswith("rpm of HC alternates")
