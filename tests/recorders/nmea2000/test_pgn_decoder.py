@@ -85,7 +85,7 @@ def test_what_is_not_decoded_or_without_a_value_is_counted_as_unused() -> None:
     lines = [
         candump(60928, bytes(8)),
         candump(127251, bytes.fromhex("ffffffff7fffffff")),
-        candump(130306, bytes.fromhex("ff00010001fbffff")),
+        candump(130306, bytes.fromhex("ff00010001f9ffff")),
     ]
     decoded = decode_file(NMEA2000, lines)
     assert decoded.channels == {}
