@@ -346,8 +346,8 @@ def _described(
             continue
         better = replace(better, **{name: True})
         cures.append(words)
-        left = _ambiguities(sensors, better, ship)
-        if not any(each.disturbances == names for each in left):
+        remaining = _ambiguities(sensors, better, ship)
+        if not any(each.disturbances == names for each in remaining):
             break
     else:
         cures = []
