@@ -15,7 +15,7 @@ from pathlib import Path
 from random import Random
 
 from recorders.nmea0183.framing import DATAGRAM_HEADER, split_packet
-from recorders.streams.packets import MAX_PACKET_BYTES
+from recorders.streams.packets import MAX_PACKET_BYTES, packet_lines
 
 LAYOUT = Path(__file__).parents[1] / "sample_data" / "layouts" / "weather_lines.toml"
 
@@ -229,7 +229,7 @@ def _path_value(rng: Random) -> object:
 
 def count_values(data: bytes) -> int:
     """Count the values of a packet of deltas, a line or an update without any as one."""
-    return sum(map(_count_in_delta, data.splitlines() or [b""]))
+    return sum(map(_count_in_delta, packet_lines(data)))
 
 
 def _count_in_delta(line: bytes) -> int:
@@ -286,11 +286,7 @@ class FuzzedStream:
     format: str
     packet: Callable[[Random], bytes]
     options: tuple[str, ...] = ()
-    count: Callable[[bytes], int] = lambda data: len(data.splitlines()) or 1
-
-
-def _count_bus_lines(data: bytes) -> int:
-    return len(data.splitlines()) if b"\n" in data else 1
+    count: Callable[[bytes], int] = lambda data: len(packet_lines(data))
 
 
 def _bus(
@@ -301,7 +297,7 @@ def _bus(
     assembled: bool = False,
 ) -> FuzzedStream:
     packet = _of_bus(line, assembled=assembled)
-    return FuzzedStream(f"nmea2000 {name}", "nmea2000", packet, options, _count_bus_lines)
+    return FuzzedStream(f"nmea2000 {name}", "nmea2000", packet, options)
 
 
 STREAMS = (

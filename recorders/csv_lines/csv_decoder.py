@@ -7,7 +7,7 @@ from math import degrees, isfinite, nan
 from operator import xor
 
 from recorders.streams.counts import StreamCounts
-from recorders.streams.packets import Packet
+from recorders.streams.packets import Packet, packet_lines
 from recorders.streams.sample_buffer import SampleBuffer
 from shiplog.tables.layout import DEGREES_MINUTES, HEMISPHERES, Column
 from shiplog.units import CATALOGUE, conversion_factor
@@ -51,7 +51,7 @@ class CsvDecoder:
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
         """Decode lines; a datagram may hold several."""
         for packet in batch:
-            for line in packet.data.splitlines() or [b""]:  # an empty datagram is counted
+            for line in packet_lines(packet.data):
                 try:
                     self._add_line(line.decode("ascii"), packet.received_ns, samples)
                 except UnicodeDecodeError:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from marlin.envelope import EnvelopeError, parse
 
-from recorders.streams.packets import END_NS, MAX_PACKET_BYTES
+from recorders.streams.packets import END_NS, MAX_PACKET_BYTES, has_too_many, packet_lines
 
 DATAGRAM_HEADER = b"UdPbC\0"
 _PIECE = re.compile(rb"(?:\\[^\\]*\\)?[$!][^$!\\]*|[^$!]+")  # a sentence with its TAG block
@@ -95,8 +95,8 @@ def split_packet(data: bytes) -> list[bytes]:
     A line into which another sentence was cut is returned in parts, of which the last may be whole.
     """
     data = data.removeprefix(DATAGRAM_HEADER).strip(b"\r\n\0 \t")
-    lines = data.splitlines() if b"\n" in data or b"\r" in data else [data]
-    if len(lines) == 1 and data.count(b"$") + data.count(b"!") == 1:
+    lines, starts = packet_lines(data), data.count(b"$") + data.count(b"!")
+    if (len(lines) == 1 and starts == 1) or has_too_many(starts, data):
         return lines
     return [piece for line in lines for piece in _PIECE.findall(line)]
 

@@ -5,7 +5,7 @@ from functools import partial
 
 from recorders.streams.counts import StreamCounts
 from recorders.streams.gnss_clock import GnssClock, Utc
-from recorders.streams.packets import Packet
+from recorders.streams.packets import Packet, packet_lines
 from recorders.streams.sample_buffer import SampleBuffer
 
 from .canboat_library import FrameError, fields, is_fast
@@ -66,8 +66,7 @@ class PgnDecoder:
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
         """Decode lines; a datagram may hold several."""
         for packet in batch:
-            lines = packet.data.splitlines() if b"\n" in packet.data else [packet.data]
-            for line in lines:
+            for line in packet_lines(packet.data):
                 self._decode_line(line, packet.received_ns, samples)
 
     def finish(self, samples: SampleBuffer) -> None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from recorders.streams.counts import StreamCounts
 from recorders.streams.gnss_clock import GnssClock, Utc
-from recorders.streams.packets import END_NS, MAX_PACKET_BYTES, Packet
+from recorders.streams.packets import END_NS, MAX_PACKET_BYTES, Packet, packet_lines
 from recorders.streams.sample_buffer import SampleBuffer
 from shiplog.tables.printed_times import DAY_NS
 
@@ -70,7 +70,7 @@ class DeltaDecoder:
     def decode(self, batch: Sequence[Packet], samples: SampleBuffer) -> None:
         """Decode lines with one delta each."""
         for packet in batch:
-            for line in packet.data.splitlines() or [b""]:  # an empty datagram is counted
+            for line in packet_lines(packet.data):
                 try:
                     self._add_delta(parse_delta(line), packet.received_ns, samples)
                 except DeltaError as error:

@@ -20,6 +20,7 @@ from places import LAYOUTS, SAMPLE_DATA
 from recorders.csv_lines.cli import CSV_LINES
 from recorders.csv_lines.csv_decoder import CsvDecoder
 from recorders.csv_lines.device import parse_device
+from recorders.streams.packets import packet_lines
 from shiplog.errors import LogError, UsageError
 
 WEATHER = LAYOUTS / "weather_lines.toml"
@@ -180,7 +181,7 @@ def test_no_damaged_line_raises_an_exception_and_each_is_counted() -> None:
     packets = list(damaged([WIND, b"AIR,19.1,63.9,1013.2"], 20_000, seed=4))
     counts = decode_live(CSV_LINES, packets, "--layout", str(WEATHER)).counts
     counted = sum(sum(c.values()) for c in (counts.accepted, counts.rejected, counts.unused))
-    assert counted == sum(len(packet.splitlines()) or 1 for packet in packets)
+    assert counted == sum(len(packet_lines(packet)) for packet in packets)
     assert len(counts.rejected) <= 6
     assert len(counts.unused) <= 257
 

@@ -10,6 +10,7 @@ from nmea2000 import NMEA2000Decoder, _canboat
 
 from recorders.nmea2000.cli import NMEA2000
 from recorders.nmea2000.pgn_decoder import FAST_PGNS
+from recorders.streams.packets import packet_lines
 from shiplog.errors import LogError, UsageError
 
 FIX = (
@@ -246,7 +247,7 @@ def test_no_damaged_frame_raises_an_exception_and_every_line_is_counted() -> Non
     decoded = decode_live(NMEA2000, packets, "--line-format", "candump")
     counts = decoded.counts
     counted = sum(sum(c.values()) for c in (counts.accepted, counts.rejected, counts.unused))
-    lines_of_packets = sum(len(p.splitlines()) if b"\n" in p else 1 for p in packets)
+    lines_of_packets = sum(len(packet_lines(p)) for p in packets)
     assert counted == lines_of_packets
     assert counts.rejected["malformed line"] > 1000
     assert len(counts.rejected) < 12
