@@ -16,6 +16,7 @@ import numpy as np
 from papers.markdown_page import BLUE, RED, number, paragraph, picture, start_page, table
 from scipy.signal import tf2ss
 from scipy.stats import chi2
+from sensor_states import sensor_states
 
 from analysis.design.discrete import discretise
 from analysis.design.shaping import wave_filter
@@ -90,7 +91,15 @@ ADVICE = (
         "the yaw rate of the ship without that of the waves",
         "`--wave`, with any filter but `pseudo-input`",
     ),
+    (
+        "no influence of a biased gyro or speed log",
+        "`--sensor-bias auto`, with any filter: needs a heading; for the speed log positions",
+    ),
     ("a disturbance, or an error of the model", "`--disturbance constant`, the default"),
+    (
+        "a disturbance without delay, after the trial",
+        "`--smooth`: the disturbance is a state, with its σ",
+    ),
     (
         "a disturbance that grows linearly",
         "`--disturbance ramp`: twice as noisy, and it overshoots after a step",
@@ -99,8 +108,8 @@ ADVICE = (
 )
 CAUTION = """\
 The noise settings matter more than the choice of the filter. A small `process_ratio` in the vessel
-file states that the model is accurate. Where the model is inaccurate or a gyro is biased, omit the
-setting: the process noise is then estimated from the log. Innovations larger than expected and many
+file states that the model is accurate. Where the model is inaccurate, omit the setting: the process
+noise is then estimated from the log. Innovations larger than expected and many
 rejected samples show that the process noise is set too small."""
 
 
@@ -115,6 +124,7 @@ def main() -> None:
     wrong_model()
     waves()
     disturbances()
+    sensor_states()
     if KVLCC2.is_dir():
         kvlcc2_tests()
 
@@ -224,7 +234,8 @@ def sample_data() -> None:
         "After the transient the steady-state gain is the best: to the filter a ship is nearly"
         " linear. The quality filter forgets its initial error faster than is optimal for this"
         " noise, and is less accurate for it. The gyro of the last log has a bias of 0.02 °/s, five"
-        " times its noise; no filter of yaw rate and speed alone can detect it. The more a filter"
+        " times its noise; no filter of yaw rate and speed alone can detect it (with a heading see"
+        " below). The more a filter"
         " relies on the model, the more it attributes the bias to the gyro, and the larger is its"
         " error in speed. The noise of the paper contains a sine with a period of 63 s. Filters"
         " take it for motion as far as their bandwidth allows, and so does the smoother: where the"

@@ -82,6 +82,6 @@ def unused_setting_warnings(
         return []
     warning = (
         f"settings without effect: {names}; the filter is {kind.name!r}: remove them or choose"
-        " another filter or disturbance model"
+        " another filter, disturbance model or filter.sensor_bias"
     )
     return [warning]

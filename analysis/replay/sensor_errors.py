@@ -72,6 +72,12 @@ class SensorError:
         Whether the log determines it: its standard deviation has fallen below a third.
     reason
         Why it is not determined; empty where it is.
+
+    Examples
+    --------
+    >>> value, std, prior_std = 3.5e-4, 1.7e-6, 1.7e-3
+    >>> print(SensorError("gyro", "gyro bias", "rad/s", value, std, prior_std, True))
+    gyro bias: 0.02005 ± 9.7e-05 deg/s
     """
 
     name: str

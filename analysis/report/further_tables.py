@@ -84,4 +84,5 @@ def _cells(name: str, unit: str, value: float, std: float) -> tuple[str, str, st
     if isnan(value):
         return "not estimated", "", "", shown
     digits = decimals(std)
+    value = round(value, digits) + 0.0  # no minus before a zero
     return f"{value:.{digits}f}", f"{std:.{digits}f}", f"± {NORMAL_95 * std:.{digits}f}", shown
