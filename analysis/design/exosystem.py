@@ -181,8 +181,8 @@ def _requested_poles(
         poles = np.asarray(spectrum)
         if poles.shape != (sum(sizes),):
             raise UsageError(
-                f"spectrum is of shape {poles.shape}; expected ({sum(sizes)},), a pole for each"
-                " state of plant and exosystems"
+                f"{poles.size} poles are given; expected {sum(sizes)}, one for each state of the"
+                " plant and of the disturbances"
             )
         parts = np.split(poles, np.cumsum(sizes)[:-1])
         return [

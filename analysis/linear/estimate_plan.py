@@ -32,7 +32,7 @@ from .signal_sizes import (
 )
 from .spectrum_fit import MAX_FITTED, FitSignals, FittedParameter, fit_spectra
 from .system import LinearSystem
-from .system_signals import BoundSignal, HeldSignals, bind_signals
+from .system_signals import BoundSignal, HeldSignals, bind_signals, require_same_units
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +195,7 @@ def _measured_signals(
     bound = bind_signals(system.bindings, stats)
     m, r = len(system.outputs), len(system.inputs)
     outputs = tuple(with_stride(signal, clock) for signal in bound[:m])
+    require_same_units(system, outputs)
     sizes = signal_sizes(log, clock, outputs, bound[m:], on_progress)
     stds, measured = measurement_noise(outputs, sizes.outputs, clock)
     start = StartSignals(

@@ -143,7 +143,9 @@ class FileSection:
             isinstance(row, list) and all(map(_is_number, row)) for row in value
         )
         if not is_matrix or len({len(row) for row in value}) != 1:
-            self.errors.append(f"{self.name(key)} must be a list of rows of equal length")
+            self.errors.append(
+                f"{self.name(key)} must be a list of rows of numbers, all of equal length"
+            )
             return None
         array = np.array(value, dtype=np.float64)
         expected = (rows or array.shape[0], columns or array.shape[1])

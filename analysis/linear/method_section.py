@@ -28,7 +28,9 @@ def parse_method(top: FileSection, states: Sequence[str]) -> Method:
         return KalmanMethod()
     section = top.section("method")
     name = section.text("name", choices=tuple(METHODS))
-    method = METHODS[name](section, states) if name in METHODS else KalmanMethod()
+    if name not in METHODS:  # refused already; which keys it has is not known
+        return KalmanMethod()
+    method = METHODS[name](section, states)
     section.finish()
     return method
 

@@ -1,7 +1,7 @@
 """Parser of system files; reports all errors of a file at once."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -142,15 +142,17 @@ def _plant_form(section: FileSection, folder: Path) -> PlantForm:
 
 
 def _matrices(section: FileSection) -> PlantForm:
+    states = section.texts("states")
     A = section.matrix("A", None, None)
-    if A is None or A.shape[0] != A.shape[1]:
+    if "A" not in section or (A is not None and A.shape[0] != A.shape[1]):
         section.errors.append("[plant] needs a square A, or num and den, or model")
-        A = np.zeros((1, 1))
+    if A is None or A.shape[0] != A.shape[1]:
+        A = np.zeros((len(states) or 1,) * 2)  # refused already; no errors that follow from it
     n = len(A)
     B, C = section.matrix("B", n, None), section.matrix("C", None, n)
     B = np.zeros((n, 0)) if B is None else B
     D = section.matrix("D", None if C is None else len(C), B.shape[1])
-    states = section.texts("states") or {f"x{k}": "1" for k in range(1, n + 1)}
+    states = states or {f"x{k}": "1" for k in range(1, n + 1)}
     if len(states) != n:
         section.errors.append(f"plant.states has {len(states)} names, A has {n} rows")
         states = {f"x{k}": "1" for k in range(1, n + 1)}
@@ -188,10 +190,25 @@ def _schedule(top: FileSection, form: PlantForm) -> tuple[ChannelBinding, ...]:
         if name not in form.schedule:
             known = ", ".join(form.schedule) or "none"
             top.errors.append(f"schedule.{name} is not a signal of the plant; it has {known}")
-    return tuple(
+    bindings = tuple(
         _binding(name, sections[name]) if name in sections else ChannelBinding(name, name, unit)
         for name, unit in form.schedule.items()
     )
+    _require_units(bindings, form.schedule, "schedule", top.errors)
+    return bindings
+
+
+def _require_units(
+    bindings: Sequence[ChannelBinding], units: Mapping[str, str], key: str, errors: list[str]
+) -> None:
+    """Refuse a signal in another unit than its plant has, unless it has a scale."""
+    errors += [
+        f"{key}.{each.name}.unit is {each.unit}, the plant takes {units[each.name]}; omit the unit,"
+        " or give the scale from it"
+        for each in bindings
+        if each.unit and each.scale == 1.0 and each.name in units
+        if UNITS.get(each.unit, UNITS[units[each.name]]) != UNITS[units[each.name]]
+    ]
 
 
 def _bound(
@@ -224,6 +241,7 @@ def _bound(
             for each in inputs
             if each.name not in known
         ]
+        _require_units(inputs, form.inputs, "inputs", errors)
         chosen = [known.index(each.name) for each in inputs if each.name in known]
         B, linearise = B[:, chosen], _with_inputs(linearise, chosen)
     elif B.shape[1] != len(inputs):

@@ -11,9 +11,9 @@ from shiplog.checks.channel_stats import ChannelStats, LogStats, gap_threshold_s
 from shiplog.errors import UsageError
 from shiplog.resampling import Clock
 from shiplog.types import FloatArray, Signals
-from shiplog.units import CATALOGUE, conversion_factor
+from shiplog.units import CATALOGUE, UNITS, conversion_factor
 
-from .system import ChannelBinding
+from .system import ChannelBinding, LinearSystem
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,35 @@ def bind_signals(bindings: Sequence[ChannelBinding], stats: LogStats) -> tuple[B
                 raise UsageError(f"{binding.name}, channel {binding.channel!r}: {error}") from None
         bound.append(BoundSignal(binding, factor, binding.unit or unit))
     return tuple(bound)
+
+
+def require_same_units(system: LinearSystem, outputs: Sequence[BoundSignal]) -> None:
+    """Refuse an output that is a state by itself and is taken in another unit than the state.
+
+    An output with a scale has the unit that its scale gives; a state of unit 1 has none to compare.
+
+    Raises
+    ------
+    UsageError
+        The units differ; the message names the keys to change.
+    """
+    for output, row, direct in zip(outputs, system.plant.C, system.D, strict=True):
+        is_state = np.count_nonzero(row) == 1 and row.sum() == 1.0 and not direct.any()
+        if not is_state or output.binding.scale != 1.0:
+            continue
+        k = int(np.argmax(row))
+        name, unit = system.plant.states[k], system.units[k]
+        if unit != "1" and _plain_unit(unit) != _plain_unit(output.channel_unit):
+            raise UsageError(
+                f"the output {output.binding.name!r} is in {output.channel_unit}, its state"
+                f" {name!r} in {unit}; state one unit for both, or the scale of the output"
+            )
+
+
+def _plain_unit(unit: str) -> tuple[str, float]:
+    """Return the SI unit and the factor to it; of a unit that shiplog does not know, itself."""
+    plain = unit.replace("²", "2").replace("^", "")
+    return UNITS.get(plain, (plain, 1.0))
 
 
 def is_interpolated(channel: ChannelStats) -> bool:

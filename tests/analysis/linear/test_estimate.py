@@ -121,6 +121,28 @@ def test_a_missing_channel_and_a_wrong_unit_are_refused_by_name() -> None:
         estimate(log, parse_system(text, "roll.toml"))
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('"heel"', '"heel"\nunit = "deg"', "output 'roll' is in deg, its state 'roll' in rad"),
+        ('roll = "rad" }', 'roll = "deg" }', "output 'roll' is in rad, its state 'roll' in deg"),
+        ('"rad/s"', '"furlong"', "is in rad/s, its state 'roll_rate' in furlong; state one unit"),
+    ],
+)
+def test_an_output_that_is_a_state_has_its_unit(old: str, new: str, expected: str) -> None:
+    u, _, measured = record()
+    with pytest.raises(UsageError, match=expected):
+        estimate(trial(u, measured), parse_system(SYSTEM.replace(old, new), "roll.toml"))
+
+
+def test_a_state_without_a_unit_takes_its_output_in_any() -> None:
+    u, _, measured = record()
+    plain = estimate(trial(u, measured), parse_system(SYSTEM, "roll.toml"))
+    text = SYSTEM.replace('roll = "rad" }', 'roll = "1" }')
+    same = estimate(trial(u, measured), parse_system(text, "roll.toml"))
+    assert np.array_equal(same.chunk.values, plain.chunk.values)
+
+
 def test_states_without_a_stated_start_are_uncertain_beyond_all_they_can_be() -> None:
     u, states, measured = record(600)
     text = SYSTEM[: SYSTEM.index("[initial]")]

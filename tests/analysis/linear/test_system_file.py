@@ -27,6 +27,21 @@ state = 3
 """
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "A = [[1, 2], [3]]",
+        "A = [['1', 2], [3, 4]]",
+        "A = [[1, 2], [3, 4]]\n[method]\nname = 'luenburger'\nfrequency = 1",
+    ],
+)
+def test_an_error_is_reported_without_those_that_follow_from_it(text: str) -> None:
+    plant = "[plant]\nstates = { a = 'm', b = 'm' }\nB = [[1], [0]]\n"
+    signals = "\n[inputs.u]\n[outputs.a]\n[outputs.b]\n[noise]\nprocess = { b = 1 }"
+    with pytest.raises(SystemFileError, match=r"^one error"):
+        parse_system(plant + text + signals, "bad.toml")
+
+
 def test_all_errors_of_a_file_are_reported_at_once_with_the_nearest_name() -> None:
     with pytest.raises(SystemFileError) as error:
         parse_system(BAD, "bad.toml")
@@ -59,7 +74,15 @@ def test_all_errors_of_a_file_are_reported_at_once_with_the_nearest_name() -> No
     [
         ("", "[plant] needs a square A, or num and den, or model"),
         ("[plant]\nA = [[1, 2]]", "a square A"),
-        ("[plant]\nA = [[1, 2], [3]]", "rows of equal length"),
+        ("[plant]\nA = [[1, 2], [3]]", "rows of numbers, all of equal length"),
+        (
+            "[plant]\nmodel = 'surge'\nT = 9\nK = 1\n[outputs.speed]\n[inputs.rpm]\nunit = 'Hz'",
+            "inputs.rpm.unit is Hz, the plant takes rpm; omit the unit, or give the scale",
+        ),
+        (
+            "plant = { model = 'yaw', vessel = 'table1' }\n[schedule.speed]\nunit = 'kn'",
+            "schedule.speed.unit is kn, the plant takes m/s",
+        ),
         ("[plant]\nA = [[nan]]", "list of rows"),
         ("[plant]\nA = [[1]]\nB = [[1], [2]]", "plant.B has 2 × 1 numbers, expected 1 × 1"),
         ("[plant]\nnum = [1, 2]\nden = [1]", "plant.den must be longer"),
