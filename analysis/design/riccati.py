@@ -191,8 +191,9 @@ def _require_solvable(
             )
     for mode in unobservable_eigenvalues(drift.T, drive):
         if abs(mode.real) <= AXIS_TOLERANCE * np.linalg.norm(drift):
+            on_axis = complex(0.0, mode.imag)
             raise UsageError(
-                f"{words.A} {A.shape} and {words.noise}: the mode at {format_eigenvalue(mode)}"
+                f"{words.A} {A.shape} and {words.noise}: the mode at {format_eigenvalue(on_axis)}"
                 f" neither grows nor decays and {words.undriven}"
             )
 

@@ -27,6 +27,11 @@ from shiplog.types import FloatArray
 
 from .estimator_model import EstimatorModel
 
+NO_STEADY_STATE = (
+    "No poles and no gain are listed, because the gain does not become constant, as with a constant"
+    " disturbance without an intensity: {}."
+)
+
 
 @dataclass(frozen=True, eq=False)
 class EstimatorDesign:
@@ -99,7 +104,7 @@ class KalmanMethod:
         except UsageError as error:
             if self.steady_state:
                 raise
-            return EstimatorDesign(None, None, remarks=(f"no steady-state gain: {error}",))
+            return EstimatorDesign(None, None, remarks=(NO_STEADY_STATE.format(error),))
         step = model.step
         M = optimal_correction(step.F, model.C, step.Q, model.r) if self.steady_state else None
         return EstimatorDesign(steady.gain, M, steady.poles)

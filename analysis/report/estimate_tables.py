@@ -55,8 +55,9 @@ def _design_tables(findings: EstimateFindings) -> Iterator[TextTable]:
     design, system = plan.design, plan.system
     remarks = (*_method_remarks(findings), *design.remarks)
     if design.poles is None or design.gain is None:
-        states = tuple((name,) for name in plan.states)
-        yield TextTable(f"Estimator of {system.name!r}", ("state",), states, remarks)
+        row = (system.method.name, str(len(plan.states)), f"{plan.clock.dt_secs:g}")
+        columns: tuple[str, ...] = ("method", "number of states", "step [s]")
+        yield TextTable(f"Estimator of {system.name!r}", columns, (row,), remarks)
         return
     poles = np.sort_complex(design.poles)
     rows = [(_complex(pole), *_time_cells(pole)) for pole in poles]
