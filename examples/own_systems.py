@@ -190,6 +190,7 @@ def accuracies(simulated: Simulated, found: SystemEstimate) -> Iterator[Accuracy
 
 def main(folder: Path) -> None:
     """Simulate, write, estimate and print."""
+    folder.mkdir(parents=True, exist_ok=True)
     for simulate in SIMULATIONS:
         simulated = simulate(np.random.default_rng(1))
         write(simulated.log, folder / simulated.log.name)

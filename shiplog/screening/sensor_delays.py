@@ -114,7 +114,7 @@ def _estimated(
     late = [lag for lag in lags.values() if abs(lag.secs) > MIN_ERRORS * lag.error_secs]
     warnings = [
         f"{lag.channel}: its times are as recorded: against the {lag.reference.replace('_', ' ')} "
-        f"they are {lag.secs:.2f} ± {lag.error_secs:.2f} s late (standard error), no certain delay"
+        f"they are {lag.secs:.2g} ± {lag.error_secs:.2g} s late (standard error), no certain delay"
         for lag in lags.values()
         if lag not in late
     ]
