@@ -140,7 +140,7 @@ def parse_sentence(line: bytes, *, require_checksum: bool = True) -> Sentence:
         parsed = parse(line)
     except EnvelopeError as error:
         raise FramingError(_REASONS.get(error.variant, "malformed address")) from error
-    if line.translate(None, _PRINTABLE):  # what is left without them
+    if line.translate(None, _PRINTABLE):  # what remains without them
         raise FramingError("characters that are not printable")
     talker, formatter = _address(line[:1], parsed.talker, parsed.sentence_type)
     return Sentence(talker, formatter, parsed.fields, tag)
