@@ -19,6 +19,8 @@ class Current:
         Standard deviations, m/s.
     drift_length, drift_length_std
         The sway to port over the yaw rate, and its standard deviation, m.
+    reason
+        Why the standard deviations are too small; empty where they are right.
     """
 
     north: float
@@ -27,6 +29,7 @@ class Current:
     east_std: float
     drift_length: float
     drift_length_std: float
+    reason: str = ""
 
     @property
     def speed(self) -> float:
@@ -41,13 +44,14 @@ class Current:
     @property
     def determined(self) -> bool:
         """Whether it differs from none, so that it has a direction."""
-        return self.speed > MIN_STDS * max(self.north_std, self.east_std)
+        least = MIN_STDS * max(self.north_std, self.east_std)
+        return not self.reason and self.speed > least
 
 
-def current_of(last: Mapping[str, tuple[float, float]]) -> Current | None:
+def current_of(last: Mapping[str, tuple[float, float]], reason: str = "") -> Current | None:
     """Return the current, from value and standard deviation of each further estimate at the end.
 
-    None where the filter has no current.
+    None where the filter has no current; `reason` is that of the `Current`.
 
     Examples
     --------
@@ -59,4 +63,4 @@ def current_of(last: Mapping[str, tuple[float, float]]) -> Current | None:
     if "current_north" not in last:
         return None
     (north, north_std), (east, east_std) = last["current_north"], last["current_east"]
-    return Current(north, east, north_std, east_std, *last["drift_length"])
+    return Current(north, east, north_std, east_std, *last["drift_length"], reason)

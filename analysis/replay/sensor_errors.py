@@ -389,7 +389,7 @@ def sensor_errors(
     for name, walk in SENSOR_WALKS.items():
         if name in sensors:
             value, std = last[name]
-            reason = _inconsistency(residuals)
+            reason = inconsistency(residuals)
             if std >= DETERMINED_SHARE * walk.std:
                 unit, factor = further_display(name, walk.unit)
                 reason = f"without this log it is 0 ± {walk.std * factor:.2g} {unit}"
@@ -403,7 +403,7 @@ def sensor_errors(
     return tuple(found)
 
 
-def _inconsistency(residuals: Sequence[ResidualSummary]) -> str:
+def inconsistency(residuals: Sequence[ResidualSummary]) -> str:
     """Return why the standard deviations are too small; empty where they are right."""
     wrong = [residual.name for residual in residuals if residual.mean_nis > MAX_NIS]
     if not wrong:

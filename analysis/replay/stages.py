@@ -28,7 +28,7 @@ from .passes import weak_form_on_clock
 from .plan import Plan
 from .replay_results import Findings, ReplayChunk
 from .residuals import ResidualTest
-from .sensor_errors import sensor_errors
+from .sensor_errors import inconsistency, sensor_errors
 from .track import Tracker
 
 MIN_EXCESS_SHARE = 0.5  # of the trial, with a disturbance beyond the rudder: the model is wrong
@@ -139,7 +139,7 @@ class Stages:
                 self._last,
                 residuals,
             ),
-            current=current_of(self._last),
+            current=current_of(self._last, inconsistency(residuals)),
         )
 
     def _disturbance(

@@ -66,7 +66,9 @@ def _current_table(current: Current) -> TextTable:
 
 def _current_remarks(current: Current) -> Iterator[str]:
     unit, factor = further_display("current_north", "m/s")
-    if current.determined:
+    if current.reason:
+        yield f"Not determined: {current.reason}."
+    elif current.determined:
         set_deg = round(degrees(current.direction)) % 360
         yield f"Set {set_deg:03d}°, drift {current.speed * factor:.2f} {unit}, at the end."
     else:

@@ -39,9 +39,9 @@ def replay_json(findings: Findings) -> JsonObject:
         ``disturbances``, ``sensor_errors`` (by name: ``unit``, ``value``, ``std``,
         ``interval_95``, ``prior_std``, ``determined``, ``reason``), ``current`` (``north`` and
         ``east`` in m/s and ``drift_length`` in m, each with its ``std``; ``speed``,
-        ``direction``, into which it flows, and ``determined``; None where it is not estimated),
-        ``coefficients``, ``changes``, ``windows`` (by equation), ``track_origin``, ``warnings``,
-        ``events`` and ``events_omitted``, their number beyond those listed.
+        ``direction``, into which it flows, ``determined`` and ``reason``; None where it is not
+        estimated), ``coefficients``, ``changes``, ``windows`` (by equation), ``track_origin``,
+        ``warnings``, ``events`` and ``events_omitted``, their number beyond those listed.
     """
     plan = findings.plan
     result = {
@@ -194,7 +194,8 @@ def _current(current: Current | None) -> JsonObject | None:
     if current is None:
         return None
     derived = ("speed", "direction", "determined")
-    return asdict(current) | {name: getattr(current, name) for name in derived}
+    values = asdict(current) | {name: getattr(current, name) for name in derived}
+    return values | {"reason": current.reason or None}
 
 
 def _coefficients(fit: CoefficientFit) -> JsonObject:

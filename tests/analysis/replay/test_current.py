@@ -21,5 +21,14 @@ def test_a_current_within_its_uncertainty_has_no_direction() -> None:
     assert Current(0.1, 0.1, 0.06, 0.06, 0.0, 1.0).determined
 
 
+def test_where_the_innovations_are_too_large_no_current_is_determined() -> None:
+    last = {"current_north": (0.5, 0.01), "current_east": (0.0, 0.01), "drift_length": (60.0, 4.0)}
+    found, unsure = current_of(last), current_of(last, "the innovations are larger than expected")
+    assert found is not None
+    assert unsure is not None
+    assert found.determined
+    assert not unsure.determined
+
+
 def test_without_positions_there_is_no_current() -> None:
     assert current_of({"gyro": (1e-4, 1e-5), "heading": (0.1, 1e-3)}) is None

@@ -85,6 +85,13 @@ def test_a_current_within_its_uncertainty_has_neither(zigzag_analysis: Analysis)
     assert "Set" not in remarks
 
 
+def test_a_current_that_is_not_determined_has_its_reason(zigzag_analysis: Analysis) -> None:
+    unsure = replace(CURRENT, reason="the innovations of north are larger than expected")
+    remarks = remarks_of(with_errors(zigzag_analysis, current=unsure))
+    assert "Not determined: the innovations of north" in remarks
+    assert "Set" not in remarks
+
+
 @pytest.fixture(params=["long reasons", "a replay"])
 def widest(
     request: pytest.FixtureRequest, zigzag_analysis: Analysis, sensor_analysis: Analysis
