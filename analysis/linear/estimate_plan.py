@@ -25,6 +25,7 @@ from .joined_system import (
 )
 from .methods import EstimatorDesign, KalmanMethod
 from .signal_sizes import (
+    MIN_STRIDE,
     measurement_interval,
     measurement_noise,
     signal_sizes,
@@ -137,6 +138,7 @@ def plan_estimate(
     sampling, there = signals.sampling, system.linearised_at(signals.typical)
     require_distinguishable(system, estimator_model(system, sampling, there), there)
     _require_method(system, smooth=smooth)
+    _require_every_step(system, signals)
     fitted: tuple[FittedParameter, ...] = ()
     if any(noise.fit for noise in system.shaped):
         recorded = _fit_signals(screened, signals, on_progress)
@@ -216,8 +218,25 @@ def _step_secs(system: LinearSystem, log: ScreenedLog) -> float | None:
     intervals = [each for each in intervals if each > 0]
     if not intervals:
         return None
-    is_optimal = isinstance(system.method, KalmanMethod) and not system.method.steady_state
-    return min(intervals) if is_optimal else max(intervals)
+    return min(intervals) if _is_optimal(system) else max(intervals)
+
+
+def _is_optimal(system: LinearSystem) -> bool:
+    return isinstance(system.method, KalmanMethod) and not system.method.steady_state
+
+
+def _require_every_step(system: LinearSystem, signals: _MeasuredSignals) -> None:
+    """Refuse a constant gain on a stated step of the clock in which an output is not measured."""
+    if _is_optimal(system):
+        return
+    dt = signals.clock.dt_secs
+    for output, interval in zip(signals.outputs, signals.sampling.intervals, strict=True):
+        if interval > MIN_STRIDE * dt:
+            raise UsageError(
+                f"{output.binding.name!r} is measured every {interval:.3g} s, but the method"
+                f" {system.method.name!r} needs it at every step, of {dt:.3g} s; remove step_secs,"
+                " or use kalman with a time-varying gain"
+            )
 
 
 def _warnings(system: LinearSystem) -> tuple[str, ...]:
@@ -258,8 +277,7 @@ def _require_method(system: LinearSystem, *, smooth: bool) -> None:
             "spectra are fitted for a constant plant, and this one varies along its trajectory;"
             " state their parameters"
         )
-    is_optimal = isinstance(method, KalmanMethod) and not method.steady_state
-    if smooth and not is_optimal:
+    if smooth and not _is_optimal(system):
         raise UsageError(
             f"the method {method.name!r} cannot be smoothed: the smoother assumes the optimal gain;"
             " use kalman with a time-varying gain"

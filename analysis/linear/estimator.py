@@ -11,8 +11,14 @@ from shiplog.types import FloatArray
 from .estimate_plan import EstimatePlan
 from .initial_estimate import initial_estimate
 from .joined_system import OutputSampling, estimator_model
-from .linear_loop import StretchModel, StretchResult, combine, run_stretch, stretch_model
-from .methods import EstimatorDesign
+from .linear_loop import (
+    StretchModel,
+    StretchResult,
+    cascade_model,
+    combine,
+    run_stretch,
+    stretch_model,
+)
 from .system import Linearisation
 
 MAX_RATE_PER_STEP = 1e3  # of an entry of A: near a singular point they grow without bound
@@ -59,11 +65,12 @@ class Estimator:
         ticks = (system.tick_secs or plan.clock.dt_secs) / plan.clock.dt_secs
         self._tick = None if system.linearise is None else max(1, round(ticks))
         self._design, self._model = plan.design, stretch_model(plan.model, plan.design)
+        if plan.design.stages > 1:
+            self._model = cascade_model(self._model, plan.design)
         self._started, self._count, self._skipped = False, 0, 0
         self._x: FloatArray = np.zeros(0)
         self._P: FloatArray = np.zeros((0, 0))
         self._before: FloatArray = np.zeros(0)
-        self._stages: list[FloatArray] = []
         self._rows = np.array([quantity.row for quantity in plan.quantities])
 
     def step(self, y: FloatArray, u: FloatArray, at: FloatArray) -> EstimatorRun:
@@ -85,7 +92,7 @@ class Estimator:
             self._skipped += first
             if known.any():
                 self._start(u[first], at[first])
-        parts, k = [_not_estimated(first, len(self._rows), len(self._model.r))], first
+        parts, k = [_not_estimated(first, len(self._rows), len(self._sampling.r))], first
         results: list[StretchResult] = []
         transitions: list[FloatArray] = []
         while k < len(y):
@@ -129,7 +136,8 @@ class Estimator:
             plan.system, plan.model, plan.start, u, plan.design.poles
         )
         self._before = u.copy()
-        self._stages = [self._x.copy() for _ in range(plan.design.stages - 1)]
+        stages = plan.design.stages
+        self._x, self._P = np.tile(self._x, stages), np.kron(np.ones((stages, stages)), self._P)
         if self._tick:
             self._linearise(at)
 
@@ -154,31 +162,23 @@ class Estimator:
         self._model = stretch_model(model, self._design)
 
     def _run(self, y: FloatArray, u: FloatArray) -> StretchResult:
-        before = self._before.copy()
+        m, N = len(self._sampling.r), len(self._plan.model.A)
+        zeros = np.zeros((len(y), len(self._model.r) - m))  # the further outputs of a cascade
         result = run_stretch(
-            self._model, self._x, self._P, self._before, np.ascontiguousarray(y),
+            self._model, self._x, self._P, self._before, np.hstack((y, zeros)),
             np.ascontiguousarray(u), not self._started,
         )  # fmt: skip
-        states = result.states
-        for stage in self._stages:
-            states = self._run_stage(stage, before.copy(), states, u)
         self._started = True
         self._count += len(y)
-        covariance = self._design.stage_covariance
-        if covariance is None:
+        if self._design.stages == 1:
             return result
-        covariances = np.broadcast_to(covariance, result.covariances.shape)
-        return result._replace(states=states, covariances=covariances)
-
-    def _run_stage(
-        self, x: FloatArray, before: FloatArray, measured: FloatArray, u: FloatArray
-    ) -> FloatArray:
-        """Run a stage of a cascade whose measurements are the states of the stage before."""
-        model, N = stage_model(self._model, self._design), len(x)
-        result = run_stretch(
-            model, x, np.zeros((N, N)), before, measured, np.ascontiguousarray(u), not self._started
+        return result._replace(
+            states=np.ascontiguousarray(result.states[:, -N:]),
+            covariances=np.ascontiguousarray(result.covariances[:, -N:, -N:]),
+            predicted=result.predicted[:, :m],
+            innovations=result.innovations[:, :m],
+            variances=result.variances[:, :m],
         )
-        return result.states
 
 
 def _require_regular(there: Linearisation, dt: float) -> None:
@@ -187,19 +187,6 @@ def _require_regular(there: Linearisation, dt: float) -> None:
         raise UsageError(
             "the plant is singular there (Euler angles are where cos θ = 0); use other coordinates"
         )
-
-
-def stage_model(model: StretchModel, design: EstimatorDesign) -> StretchModel:
-    """Return the model of a stage of a cascade, whose output is the whole state."""
-    N, inputs = model.G0.shape
-    assert design.stage_correction is not None  # noqa: S101 - of a cascade
-    return model._replace(
-        C=np.eye(N),
-        D=np.zeros((N, inputs)),
-        r=np.ones(N),
-        M=np.ascontiguousarray(design.stage_correction),
-        optimal=False,
-    )
 
 
 def _not_estimated(count: int, quantities: int, outputs: int) -> tuple[FloatArray, ...]:

@@ -45,8 +45,8 @@ class FeedbackDesign:
         Gain L (inputs, n) and poles of A + B L.
     predicted
         Mean cost of the loop closed by the estimate, from the process and measurement noise; NaN
-        where the loop has no stationary state: a disturbance does not decay, or the gain of the
-        estimator is not constant.
+        where it is not known: a disturbance does not decay, the plant varies, or the
+        estimator is of another form than x̂' = A x̂ + B u + K (y - C x̂): a cascade, a reduced order.
     """
 
     weights: RegulatorWeights
@@ -99,9 +99,9 @@ def design_feedback(
         G=weights.G,
         shift=weights.shift,
     )[-1]
-    is_stationary = not system.disturbances and design.gain is not None
+    is_stationary = not system.disturbances and system.linearise is None
     predicted = MeanCost(np.nan, np.nan)
-    if is_stationary and design.gain is not None:
+    if is_stationary and design.gain is not None and design.is_luenberger:
         predicted = closed_loop_cost(model, design.gain, regulator.gain, weights)
     return FeedbackDesign(weights, regulator, predicted)
 

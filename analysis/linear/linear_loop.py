@@ -80,6 +80,35 @@ def stretch_model(model: EstimatorModel, design: EstimatorDesign) -> StretchMode
     )  # fmt: skip
 
 
+def cascade_model(model: StretchModel, design: EstimatorDesign) -> StretchModel:
+    """Return the model of all stages of a cascade as one, of stages · N states.
+
+    Each stage after the first has N further outputs: its states minus those of the stage before,
+    measured as zero. So that all are corrected at once, M contains the product of the corrections
+    from an output to a stage.
+    """
+    count, (m, N) = design.stages, model.C.shape
+    K = design.stage_correction
+    assert K is not None  # noqa: S101 - of a cascade
+    powers = [np.linalg.matrix_power(K, s) for s in range(count)]
+    C, M = np.zeros((m + (count - 1) * N, count * N)), np.zeros((count * N, m + (count - 1) * N))
+    C[:m, :N] = model.C
+    C[m:] = np.eye((count - 1) * N, count * N, N) - np.eye((count - 1) * N, count * N)
+    for stage in range(count):
+        own = slice(stage * N, (stage + 1) * N)
+        M[own, :m] = powers[stage] @ model.M
+        for source in range(1, stage + 1):
+            first = m + (source - 1) * N
+            M[own, first : first + N] = powers[stage - source] @ K
+    return StretchModel(
+        np.kron(np.eye(count), model.F), np.tile(model.G0, (count, 1)),
+        np.tile(model.G1, (count, 1)), np.tile(model.g, count),
+        np.kron(np.ones((count, count)), model.Q), C,
+        np.vstack((model.D, np.zeros((len(C) - m, model.D.shape[1])))),
+        np.append(model.r, np.zeros(len(C) - m)), M, optimal=False,
+    )  # fmt: skip
+
+
 @compiled
 def run_stretch(
     model: StretchModel,

@@ -6,7 +6,6 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import solve_discrete_lyapunov
 
 from analysis.design.augmentation import Plant
 from analysis.design.cascade import cascade
@@ -44,13 +43,12 @@ class EstimatorDesign:
     correction
         M (N, m) of x̂ = x⁻ + M (y - C x⁻) at each sample; None for the optimal one of each instant.
     poles
-        (N,), 1/s: eigenvalues of A - L C; None without L.
+        (N,), 1/s: eigenvalues of A - L C, of a reduced order those of the states that are not
+        measured; None without L.
     stages
         Number of stages of a cascade; 1 otherwise.
     stage_correction
         (N, N): correction of every stage after the first by the estimate of the one before.
-    stage_covariance
-        (N, N): stationary covariance of the last stage's error; None without stages.
     remarks
         What the design found, each in a sentence.
     """
@@ -60,8 +58,14 @@ class EstimatorDesign:
     poles: ComplexArray | None = None
     stages: int = 1
     stage_correction: FloatArray | None = None
-    stage_covariance: FloatArray | None = None
     remarks: tuple[str, ...] = ()
+
+    @property
+    def is_luenberger(self) -> bool:
+        """Whether x̂ follows from the gain alone: there is one stage, and it is of full order."""
+        if self.gain is None or self.poles is None:
+            return False
+        return self.stages == 1 and len(self.poles) == len(self.gain)
 
 
 class Method(Protocol):
@@ -185,20 +189,14 @@ class CascadeMethod:
         N, A, C = len(model.A), model.A, model.C
         tuned = replace(model, r=model.r * self.noise_factor)
         first = KalmanMethod(steady_state=True).design(tuned)
-        assert first.gain is not None and first.correction is not None  # noqa: S101, PT018
+        assert first.gain is not None  # noqa: S101 - of the steady state
         found = cascade(
             A, C, model.W, model.R, first.gain,
             stages=self.stages, correlation_secs=self.correlation_secs,
         )  # fmt: skip
         K = matched_correction(A, np.eye(N), found.gain, model.dt)
         remarks = (found.summary, "more than one stage after the first improves no filter")
-        return replace(
-            first,
-            stages=self.stages,
-            stage_correction=K,
-            stage_covariance=_stage_covariance(model, first.correction, K, self.stages),
-            remarks=remarks,
-        )
+        return replace(first, stages=self.stages, stage_correction=K, remarks=remarks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,27 +319,6 @@ def _sampled_for_noise(
     L = place_for_noise(A, S, (z - 1) / (z + 1), model.step.Q[own] / 2, np.diag(r) / 2).gain / 2
     M: FloatArray = np.linalg.solve(F, (F + one) @ np.linalg.solve(one + L @ C, L))
     return M
-
-
-def _stage_covariance(
-    model: EstimatorModel, M: FloatArray, K: FloatArray, stages: int
-) -> FloatArray:
-    """Compute the stationary covariance (N, N) of the error of the last stage of a cascade.
-
-    The errors of all stages form one linear system: the noise of the plant drives each, that of the
-    measurements the first, and each corrected error the next.
-    """
-    N, step = len(model.A), model.step
-    T, noise = np.zeros((stages * N, stages * N)), np.zeros((stages * N, len(model.C)))
-    T[:N, :N], noise[:N] = np.eye(N) - M @ model.C, -M
-    for k in range(N, stages * N, N):
-        own, before = slice(k, k + N), slice(k - N, k)
-        T[own], noise[own] = K @ T[before], K @ noise[before]
-        T[own, own] += np.eye(N) - K
-    Q = np.kron(np.ones((stages, stages)), step.Q)
-    driven = T @ Q @ T.T + noise @ np.diag(model.r) @ noise.T
-    P = solve_discrete_lyapunov(T @ np.kron(np.eye(stages), step.F), driven)
-    return np.asarray(P[-N:, -N:])
 
 
 def _sampled(F: FloatArray, C: FloatArray, poles: ComplexArray, dt: float) -> FloatArray:

@@ -87,6 +87,19 @@ def test_no_cost_is_predicted_with_a_disturbance_that_does_not_decay() -> None:
     assert np.isfinite(costs.recorded.total)
 
 
+@pytest.mark.parametrize(
+    "method",
+    ['"reduced-order"\npoles = [-0.5]', '"cascade"\nstages = 2\ncorrelation_secs = 10\n'],
+)
+def test_no_cost_is_predicted_of_an_estimator_that_its_gain_does_not_describe(method: str) -> None:
+    """That of A - L C alone was four times, and a 250th, of the cost of the loop in samples."""
+    found = run(SYSTEM.replace('"kalman"\ngain = "steady-state"', method))
+    costs, design = found.findings.costs, found.findings.plan.design
+    assert costs is not None
+    assert design.gain is not None
+    assert np.isnan(costs.predicted.total)
+
+
 def test_a_mode_that_no_input_moves_is_refused() -> None:
     text = SYSTEM.replace("[[-0.2, 0.0], [1.0, 0.0]]", "[[-0.2, 0.0], [0.0, 0.1]]")
     with pytest.raises(UsageError, match="cannot be moved by B"):

@@ -123,6 +123,39 @@ def test_cascade_repairs_a_first_stage_that_is_too_fast_with_errors_as_stated() 
     assert errors[3] > errors[2]
 
 
+def test_uncertainty_of_a_cascade_grows_in_a_gap_as_its_errors_do() -> None:
+    """The oracle propagates the errors of both stages as one, from the gains of the plan."""
+    measured = 1e-4 * noise(6000)
+    measured[5400:] = np.nan
+    measured[-1] = 0.0
+    text = f'{YAW}\n[method]\nname = "cascade"\nstages = 2\ncorrelation_secs = 10\n'
+    found = run(text, log_of(yaw_rate=measured))
+    plan = found.findings.plan
+    F, Q, C = plan.model.step.F, plan.model.step.Q, plan.model.C
+    M, K = plan.design.correction, plan.design.stage_correction
+    corrected = np.eye(2) - M @ C
+    both = np.block([[corrected, np.zeros((2, 2))], [K @ corrected, np.eye(2) - K]])
+    unmeasured = np.block([[np.eye(2), np.zeros((2, 2))], [K, np.eye(2) - K]])
+    noisy = np.vstack((M, K @ M))
+    F2, Q2, R = np.kron(np.eye(2), F), np.kron(np.ones((2, 2)), Q), np.diag(plan.model.r)
+    P = solve_discrete_lyapunov(both @ F2, both @ Q2 @ both.T + noisy @ R @ noisy.T)
+    stds = [np.sqrt(P[2, 2])]
+    for _ in range(599):
+        P = unmeasured @ (F2 @ P @ F2.T + Q2) @ unmeasured.T
+        stds.append(np.sqrt(P[2, 2]))
+    assert found.std("yaw_rate")[5399:-1] == pytest.approx(np.array(stds), rel=1e-3)
+    assert stds[-1] > 1.2 * stds[0]
+
+
+@pytest.mark.parametrize("method", ['"per-tick"\npoles = [-0.5, -0.6]', '"quality"'])
+def test_a_constant_gain_on_a_step_without_measurements_is_refused(method: str) -> None:
+    text = f"step_secs = 0.02\n{YAW}\n[method]\nname = {method}\n"
+    with pytest.raises(
+        UsageError, match=r"'yaw_rate' is measured every 0\.1 s, .* remove step_secs"
+    ):
+        run(text, log_of(yaw_rate=1e-4 * noise()))
+
+
 @pytest.mark.parametrize(
     ("pattern", "gain"), [("butterworth", [0.1, 5, 0.125]), ("binomial", [0.15, 7.5, 0.125])]
 )
