@@ -184,7 +184,21 @@ def _entity(kind: str, name: str) -> str:
 
 
 def _panel(name: str, title: str, *series: Series) -> Panel:
-    """Return a panel whose axis fits the last line of the first series, and all others."""
-    lines = series[0].lines
+    """Return a panel whose axis fits the values, a band of typical width, and the guides.
+
+    The band of a filter is wide at first: all of it would squeeze the rest.
+    """
+    lines, *guides = (each.lines for each in series)
     shown = [line for line in lines if line.name != "±2σ"]
-    return Panel(name, title, series, limits(*(line.values for line in shown)), len(shown) > 1)
+    last = shown[-1].values
+    bands = [_typical_band(last, line.values) for line in lines if line.name == "±2σ"]
+    levels = [np.full(len(last), line.values[0]) for each in guides for line in each]
+    axis = limits(*(line.values for line in shown), *bands, *levels)
+    return Panel(name, title, series, axis, len(shown) > 1)
+
+
+def _typical_band(values: FloatArray, band: FloatArray) -> FloatArray:
+    """Return the values (n,) shifted by the median distance of a line (n,) from them."""
+    distances = band - values
+    known = distances[np.isfinite(distances)]
+    return values + (np.median(known) if len(known) else 0.0)
