@@ -101,6 +101,7 @@ SIMULATIONS = (gust, roll_moment, spacecraft, quality)
 
 def main(folder: Path) -> None:
     """Simulate, write, estimate and print."""
+    folder.mkdir(parents=True, exist_ok=True)
     for simulate in SIMULATIONS:
         log, _ = simulate(np.random.default_rng(5))
         write(log, folder / log.name)
