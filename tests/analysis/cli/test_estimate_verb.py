@@ -95,7 +95,8 @@ def test_json_has_poles_gains_and_costs(capsys: pytest.CaptureFixture[str]) -> N
     [
         ("[plant]\nmodel = 'yow'", ExitCode.FAILURE, "did you mean 'yaw'?"),
         (SURGE.replace("[outputs.speed]", "[outputs.speed]\nchannel = 'sped'"), 1, "no channel"),
-        (SURGE.replace("[inputs.rpm]", "[inputs.rpm]\nunit = 'deg'"), 2, "cannot convert 'rpm'"),
+        (SURGE.replace("[inputs.rpm]", "[inputs.rpm]\nunit = 'deg'"), 1, "the plant takes rpm"),
+        (SURGE.replace("speed]", "speed]\nunit = 'deg'"), 2, "cannot convert 'm/s'"),
         (SURGE + '[method]\nname = "quality"\n', 2, "use kalman, per-tick or reduced-order"),
     ],
 )
