@@ -14,7 +14,7 @@ from analysis.design.augmentation import DisturbanceInput, Exosystem, Plant
 from analysis.design.distinguishability import Ambiguity, ambiguities
 from analysis.design.placement import format_mode
 from analysis.disturbance.observer import force_models
-from analysis.filters.further_states import SENSOR_WALKS
+from analysis.filters.further_states import HOUR, SENSOR_WALKS
 from analysis.filters.noise_model import FURTHER_OUTPUTS, NO_FURTHER, ForceNoise, FurtherModel
 from analysis.signals.signal_stats import MAX_NOISE_DEVIATION, STD_PER_MAD, SignalStats
 from shiplog.errors import UsageError
@@ -33,6 +33,7 @@ MIN_COURSE_VARIANCE = 0.5
 MIN_SPEED_VARIATION = 0.05  # standard deviation of the speed over its median
 DETERMINED_SHARE = 1 / 3  # of the standard deviation at the start
 MAX_NIS = 2.0  # mean normalised innovation squared: above it the standard deviations are wrong
+MAX_CHANGE_STDS = 5.0  # of an error in half a trial, in the standard deviations stated for it
 SLOW = ("constant", "ramp")
 # the channels in whose units further estimates are shown
 DISPLAYED_AS = {
@@ -96,6 +97,22 @@ class SensorError:
             return f"{self.label}: not estimated: {self.reason}"
         size = f"{self.value * factor:.4g} ± {self.std * factor:.2g} {unit}"
         return f"{self.label}: {size}" + (f", not determined: {self.reason}" if self.reason else "")
+
+
+@dataclass(frozen=True)
+class Middle:
+    """Value and standard deviation of each further estimate, `secs` before the end of a trial."""
+
+    values: Mapping[str, tuple[float, float]]
+    secs: float
+
+    def change(self, name: str, value: float, std: float) -> float:
+        """Return the change since then over the standard deviation stated for it; 0 if unknown."""
+        if name not in self.values:
+            return 0.0
+        walk, (before, std_before) = SENSOR_WALKS[name], self.values[name]
+        variance = std**2 + std_before**2 + walk.hourly_std**2 / HOUR * self.secs
+        return float(abs(value - before) / np.sqrt(variance))
 
 
 @dataclass(frozen=True)
@@ -371,6 +388,7 @@ def sensor_errors(
     omitted: Mapping[str, str],
     last: Mapping[str, tuple[float, float]],
     residuals: Sequence[ResidualSummary],
+    middle: Middle,
 ) -> tuple[SensorError, ...]:
     """Return the sensor errors found.
 
@@ -384,12 +402,21 @@ def sensor_errors(
         Value and standard deviation of each at the end of the trial.
     residuals
         The tests of the innovations: where these are much larger than expected, so are the errors.
+    middle
+        The same at half time: an error that has changed by more than its standard deviations allow
+        follows errors of model or heading that are not white.
     """
     found = []
     for name, walk in SENSOR_WALKS.items():
         if name in sensors:
             value, std = last[name]
             reason = inconsistency(residuals)
+            if middle.change(name, value, std) > MAX_CHANGE_STDS:
+                unit, factor = further_display(name, walk.unit)
+                reason = (
+                    f"it was {middle.values[name][0] * factor:.4g} {unit} at half time: heading or"
+                    " model have slow errors; state a larger filter.heading_std"
+                )
             if std >= DETERMINED_SHARE * walk.std:
                 unit, factor = further_display(name, walk.unit)
                 reason = f"without this log it is 0 ± {walk.std * factor:.2g} {unit}"

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.disturbance.disturbances import Disturbance
 from analysis.disturbance.filter_forces import FilterForces
-from analysis.filters.base import OUTPUT_STATES, Estimates
+from analysis.filters.base import OUTPUT_STATES, Estimates, FurtherStates
 from analysis.filters.factory import smoothable
 from analysis.filters.noise_model import FURTHER_OUTPUTS
 from analysis.filters.smoother import Adjoint, smoothed
@@ -28,7 +28,7 @@ from .passes import weak_form_on_clock
 from .plan import Plan
 from .replay_results import Findings, ReplayChunk
 from .residuals import ResidualTest
-from .sensor_errors import inconsistency, sensor_errors
+from .sensor_errors import Middle, inconsistency, sensor_errors
 from .track import Tracker
 
 MIN_EXCESS_SHARE = 0.5  # of the trial, with a disturbance beyond the rudder: the model is wrong
@@ -58,6 +58,7 @@ class Stages:
             else None
         )
         self._last: dict[str, tuple[float, float]] = {}
+        self._middle: dict[str, tuple[float, float]] = {}
         self._residual_tests = [
             *(_residual_test(plan, i) for i in range(len(PAPER_OUTPUTS))),
             *(_further_residual_test(plan, name) for name in further.outputs),
@@ -138,6 +139,7 @@ class Stages:
                 self._plan.omitted_sensors,
                 self._last,
                 residuals,
+                Middle(self._middle, self._plan.clock.count * self._plan.clock.dt_secs / 2),
             ),
             current=current_of(self._last, inconsistency(residuals)),
         )
@@ -147,9 +149,10 @@ class Stages:
     ) -> Disturbance:
         """Take the disturbance from the filter, or estimate it by the observer."""
         if estimates.further is not None:
-            rows = zip(estimates.further.values[-1], estimates.further.stds[-1], strict=True)
-            pairs = [(float(value), float(std)) for value, std in rows]
-            self._last = dict(zip(estimates.further.names, pairs, strict=True))
+            self._last = _values_at(estimates.further, -1)
+            middle = self._plan.clock.count // 2 - held.first
+            if 0 <= middle < len(held):
+                self._middle = _values_at(estimates.further, middle)
         if self._forces is not None:
             return self._forces.step(held, estimates)
         corrected = without_sensor_errors(without_rejected(held, estimates), estimates)
@@ -175,6 +178,13 @@ class Stages:
         if not np.all(np.isfinite(estimates.states)):
             raise diverged(self._plan)
         return estimates
+
+
+def _values_at(further: FurtherStates, instant: int) -> dict[str, tuple[float, float]]:
+    """Return value and standard deviation of each further estimate at an instant, by name."""
+    rows = zip(further.values[instant], further.stds[instant], strict=True)
+    pairs = [(float(value), float(std)) for value, std in rows]
+    return dict(zip(further.names, pairs, strict=True))
 
 
 def _excess_warnings(plan: Plan, share: float) -> list[str]:
