@@ -198,6 +198,24 @@ def smoothed_run(
     return estimates, trace, smooth(trace, end)
 
 
+def smoothed_in_chunks(
+    filters: tuple[SmoothableFilter, SmoothableFilter], signals: Signals, cuts: list[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Smoothed states and covariances of a run in chunks, in two passes of two equal filters."""
+    first, second = filters
+    going = SmoothingPass()
+    for chunk, following in in_chunks(signals, cuts):
+        going.add(first.trace(chunk, following)[1])
+    ends = going.result()
+    assert len(ends) == len(cuts) + 1
+    parts = [
+        smooth(second.trace(chunk, following)[1], end)
+        for (chunk, following), end in zip(in_chunks(signals, cuts), ends, strict=True)
+    ]
+    states, covariances = zip(*parts, strict=True)
+    return np.concatenate(states), np.concatenate(covariances)
+
+
 def together(parts: list[Estimates] | list[Trace]) -> Estimates | Trace:
     """Estimates or traces of chunks as one."""
     values = {field.name: [getattr(p, field.name) for p in parts] for field in fields(parts[0])}

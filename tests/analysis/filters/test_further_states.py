@@ -5,19 +5,31 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from filter_runs import in_chunks, signals_of, smoothed_run, steered, straight
+from filter_runs import (
+    SMOOTHABLE,
+    five_states,
+    in_chunks,
+    signals_of,
+    smoothed_in_chunks,
+    smoothed_run,
+    steered,
+    straight,
+    three_states,
+)
 from gaussian import LinearRun, apart, band, held, normalised_squared
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, expm
 
 from analysis.filters.factory import make_filter
 from analysis.filters.further_states import (
     FIRST_HEADING_STD,
+    FORCE_SHARE,
     HOUR,
     MIN_FORCE,
     MOMENT_RUDDER,
     SENSOR_WALKS,
+    WAVE_DECAY,
 )
-from analysis.filters.noise_model import ForceNoise, FurtherModel, NoiseModel
+from analysis.filters.noise_model import FURTHER_OUTPUTS, ForceNoise, FurtherModel, NoiseModel
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import Signals, Vessel
@@ -181,3 +193,165 @@ def test_a_heading_that_passes_north_is_no_innovation(vessel: Vessel) -> None:
     assert not estimates.rejected[:, 2].any()
     found, _ = estimates.further.of("heading")
     assert found[-1] == pytest.approx(heading[-1], abs=0.05)
+
+
+# ---- ramps and waves as states, of both filters that are smoothed
+
+RAMP_AND_WAVE = replace(
+    FURTHER, yaw=ForceNoise(1, 0.08, wave=0.7), surge=ForceNoise(1, 0.05, wave=0.5)
+)
+NOISES = {
+    "extended": replace(NOISE, further=RAMP_AND_WAVE),
+    "pseudo-input": NoiseModel(STDS, np.array([1e-2, 1e-3]), further=RAMP_AND_WAVE),
+}
+# dynamics, intensity of the noise, covariance at the start; the first state acts on the ship
+Force = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def ramp_and_wave(c: Coefficients, stats: SignalStats, noise: NoiseModel, axis: int) -> list[Force]:
+    """The states of the yaw moment (0) or the surge force (1) of a straight ship."""
+    force = (noise.further.yaw, noise.further.surge)[axis]
+    R = (noise.measurement_std**2 * stats.interval_secs)[axis]
+    std = (MOMENT_RUDDER * abs(c.d) * stats.max_rudder_effect, FORCE_SHARE * abs(c.h) * 80.0)[axis]
+    std += MIN_FORCE
+    slow, fast = force.frequency, force.wave
+    integrators = 4 - axis  # from the noise of the slope to the output
+    ramp = (
+        np.array([[0.0, 1.0], [0.0, 0.0]]),
+        np.diag([0.0, slow ** (2 * integrators) * R]),
+        np.diag([std, std * slow]) ** 2,
+    )
+    s = 1j * fast
+    plant = abs(s**2 - c.a * s - c.b1 if axis == 0 else s)  # from the output to the force
+    intensity = 2 * R * (plant * WAVE_DECAY * fast) ** 2
+    harmonic = np.array([[0.0, fast], [-fast, 0.0]])
+    return [ramp, (harmonic, intensity * np.eye(2), std**2 * np.eye(2))]
+
+
+def ship_of(
+    kind: str, c: Coefficients, stats: SignalStats, inputs: np.ndarray
+) -> tuple[LinearRun, np.ndarray, np.ndarray, np.ndarray]:
+    """A filter's own states, their dynamics, their noise, and columns of moment and force."""
+    noise = NOISES[kind]
+    q = noise.process_ratio * STDS**2 * stats.interval_secs
+    yaw = np.array([[0, 1], [c.b1, c.a]])
+    if kind == "extended":
+        run, intensity = three_states(c, noise, stats, *inputs.T), np.diag([0.0, *q])
+        return run, block_diag(yaw, 0.0), intensity, np.array([[0.0, 0], [1, 0], [0, 1]])
+    A = np.zeros((5, 5))
+    A[:2, :2], A[2, 1:3] = yaw, yaw[1]
+    pushed = np.array([[0.0, 0], [1, 0], [c.a, 0], [0, 1], [0, 0]])
+    return five_states(c, noise, stats, *inputs.T), A, np.diag(np.repeat(q, (3, 2))), pushed
+
+
+def by_mean_force(A: np.ndarray, pushed: np.ndarray, dynamics: np.ndarray) -> np.ndarray:
+    """The change of a system in a step by the mean of a force, per state of the force."""
+    driven = np.zeros((len(A) + 1, len(A) + 1))
+    driven[:-1, :-1], driven[:-1, -1] = A, pushed
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    means = [expm(dynamics * DT / 2 * (1 + t))[0] for t in nodes]
+    return np.outer(expm(driven * DT)[:-1, -1], weights / 2 @ means)
+
+
+def forced_run(
+    c: Coefficients, stats: SignalStats, inputs: np.ndarray, kind: str, heading: float
+) -> LinearRun:
+    """The ship's states, four pairs of force states, heading, gyro bias, log bias, in this order.
+
+    A force acts in a step by its mean, as in the filter; its noise acts at every moment.
+    """
+    run, A, intensity, pushed = ship_of(kind, c, stats, inputs)
+    forces = [
+        (axis, *force) for axis in (0, 1) for force in ramp_and_wave(c, stats, NOISES[kind], axis)
+    ]
+    own, psi = len(A), len(A) + 8
+    A = block_diag(A, *(force[1] for force in forces), np.zeros((3, 3)))
+    A[psi, 0] = 1.0
+    moved = [*range(own), psi]
+    of_ship, pushed = A[np.ix_(moved, moved)], np.vstack((pushed, np.zeros(2)))
+    places = [[own + 2 * i, own + 2 * i + 1] for i in range(4)]
+    for place, (axis, *_) in zip(places, forces, strict=True):
+        A[moved, place[0]] = pushed[:, axis]
+    walks = [SENSOR_WALKS[name] for name in ("gyro", "log")]
+    walking = np.diag([0.0, *(walk.hourly_std**2 / HOUR for walk in walks)])
+    F, Q = held(A, block_diag(intensity, *(force[2] for force in forces), walking), DT)
+    for place, (axis, dynamics, *_) in zip(places, forces, strict=True):
+        F[np.ix_(moved, place)] = by_mean_force(of_ship, pushed[:, axis], dynamics)
+    priors = np.diag([FIRST_HEADING_STD, *(walk.std for walk in walks)]) ** 2
+    P = block_diag(run.P, *(force[3] for force in forces), priors)
+    C = np.zeros((3, len(P)))
+    C[:2, :own] = run.C
+    C[0, psi + 1], C[1, psi + 2], C[2, psi] = 1.0, 1.0, 1.0
+    mean = np.zeros((len(inputs), len(P)))
+    mean[:, :own], mean[:, psi] = run.mean, sailed_with_heading(c, inputs)[:, 3] + heading
+    return LinearRun(mean, F, Q, P, C, np.array([*STDS**2, HEADING_STD**2]))
+
+
+@pytest.mark.parametrize("kind", SMOOTHABLE)
+def test_ramps_and_waves_agree_with_a_joint_gaussian(vessel: Vessel, kind: str) -> None:
+    c, inputs = straight(vessel.paper_coefficients), np.column_stack(steered(16, DT))
+    stats = stats_of(c, inputs)
+    _, measured = forced_run(c, stats, inputs, kind, 0.0).drawn(np.random.default_rng(2))
+    measured[[3, 4, 9], 0], measured[1::3, 1], measured[[1, 2, 7], 2] = np.nan, np.nan, np.nan
+    signals = measured_signals(measured, inputs)
+    filter_ = make_filter(
+        c, NOISES[kind], replace(stats, head=signals), FilterSettings(kind=kind, gate=1e6)
+    )
+    _, trace, smoothed = smoothed_run(filter_, signals)
+    run = forced_run(c, stats, inputs, kind, measured[0, 2])
+    # the batch rounds more, as the heading is at first known to half a radian only
+    assert max(apart((trace.states, trace.covariances), run.filtered(measured))) < 1e-7
+    assert max(apart(smoothed, run.given(measured))) < 1e-7
+
+
+def test_the_errors_of_the_enlarged_pseudo_input_filter_are_as_its_covariance_states(
+    vessel: Vessel,
+) -> None:
+    """Where the process noise drives all states, as the paper assumes."""
+    kind = "pseudo-input"
+    c, inputs = straight(vessel.paper_coefficients), np.column_stack(steered(200, DT))
+    stats = stats_of(c, inputs)
+    run = forced_run(c, stats, inputs, kind, 0.0)
+    size = run.mean.shape[1]
+    head = measured_signals(run.mean @ run.C.T, inputs)
+    new = make_filter(
+        c, NOISES[kind], replace(stats, head=head), FilterSettings(kind=kind, gate=1e6)
+    )
+    squares = np.zeros((2, 3))
+    for seed in range(SEEDS):
+        true, measured = run.drawn(np.random.default_rng(seed))
+        _, trace, smoothed = smoothed_run(deepcopy(new), measured_signals(measured, inputs))
+        for way, (x, P) in enumerate(((trace.states, trace.covariances), smoothed)):
+            for i, at in enumerate((20, 90, 199)):
+                squares[way, i] += normalised_squared(x[at] - true[at], P[at])
+    low, high = band(SEEDS * size)
+    assert low < squares.min(), squares
+    assert squares.max() < high, squares
+
+
+@pytest.mark.parametrize("kind", SMOOTHABLE)
+def test_where_chunks_are_cut_changes_smoothed_further_states_by_rounding_alone(
+    vessel: Vessel, kind: str
+) -> None:
+    """All sensor errors, heading, position, current, and both forces with ramp and wave."""
+    c, count, rng = vessel.paper_coefficients, 120, np.random.default_rng(5)
+    inputs = np.column_stack(steered(count, DT))
+    psi = 2e-3 * DT * np.arange(count)
+    track = np.cumsum(8 * DT * np.column_stack((np.cos(psi), np.sin(psi))), axis=0)
+    true = np.column_stack((np.full(count, 2e-3), np.full(count, 8.0), psi, track))
+    measured = true + np.array([*STDS, HEADING_STD, 1.0, 1.0]) * rng.standard_normal((count, 5))
+    measured[30:50, 0], measured[1::2, 3:] = np.nan, np.nan
+    signals = measured_signals(measured[:, :3], inputs)
+    position = {"north": measured[:, 3], "east": measured[:, 4]}
+    signals = replace(signals, values=dict(signals.values) | position)
+    further = replace(
+        RAMP_AND_WAVE,
+        outputs=FURTHER_OUTPUTS, output_stds=(HEADING_STD, 1.0, 1.0), sensors=tuple(SENSOR_WALKS),
+    )  # fmt: skip
+    noise, stats = replace(NOISES[kind], further=further), stats_of(c, inputs)
+    stats = replace(stats, head=signals)
+    new = make_filter(c, noise, stats, FilterSettings(kind=kind))
+    whole = smoothed_run(deepcopy(new), signals)[2]
+    for cuts in ([1, 17, 40, 80], list(range(1, count))):
+        cut = smoothed_in_chunks((deepcopy(new), deepcopy(new)), signals, cuts)
+        assert max(apart(cut, whole)) < 1e-9

@@ -10,6 +10,7 @@ from filter_runs import (
     measured_as,
     pushes,
     signals_of,
+    smoothed_in_chunks,
     smoothed_run,
     steered,
     straight,
@@ -21,7 +22,7 @@ from gaussian import apart
 from analysis.filters.base import Filter, Trace
 from analysis.filters.factory import filter_states, make_filter
 from analysis.filters.noise_model import NoiseModel, Wave
-from analysis.filters.smoother import SmoothingPass, smooth, smoothed
+from analysis.filters.smoother import SmoothingPass, smoothed
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import signal_stats
 from recorders.simulated.sensors import suite
@@ -110,24 +111,6 @@ def test_rauch_tung_and_striebel_agree_on_a_nonlinear_run(
     else:
         Q = five_states(c, noise, stats, np.zeros(1), np.zeros(1)).Q
     assert max(apart(computed, by_rauch_tung_striebel(trace, Q))) < 1e-8
-
-
-def smoothed_in_chunks(
-    filters: tuple[Filter, Filter], signals: Signals, cuts: list[int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Gone through twice, as a trial longer than memory is."""
-    first, second = filters
-    going = SmoothingPass()
-    for chunk, following in in_chunks(signals, cuts):
-        going.add(first.trace(chunk, following)[1])
-    ends = going.result()
-    assert len(ends) == len(cuts) + 1
-    parts = [
-        smooth(second.trace(chunk, following)[1], end)
-        for (chunk, following), end in zip(in_chunks(signals, cuts), ends, strict=True)
-    ]
-    states, covariances = zip(*parts, strict=True)
-    return np.concatenate(states), np.concatenate(covariances)
 
 
 @of_each_run
