@@ -132,7 +132,11 @@ def test_what_the_log_does_not_determine_is_omitted_with_the_reason() -> None:
 
 
 def test_a_biased_speed_log_is_found_with_positions_in_a_turn() -> None:
-    """The bias is added to the log of a turning circle."""
+    """The bias is added to the log of a turning circle.
+
+    The accuracy is bounded by the current, which the filter assumes to change by 0.2 m/s in the
+    square root of an hour: with 0.002 m/s the error of the speed is 0.0014 instead of 0.0049 m/s.
+    """
     log = read(SAMPLE_DATA / "turning_circle_35.mcap")
     channels = [replace(c, values=c.values + 0.119) if c.name == "speed" else c for c in log]
     biased_log = replace(log, channels=tuple(channels))
