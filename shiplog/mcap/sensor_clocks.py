@@ -97,9 +97,12 @@ def _steps(measured: TimeArray, received: TimeArray) -> list[_Step]:
 def _forward_rows(measured: TimeArray, received: TimeArray) -> NDArray[np.intp]:
     """Return the rows after gaps in the measured times that the times of reception do not have.
 
-    None where the intervals differ: a logger that repeats the last known value has such gaps.
+    None where the times of reception are not steady, and where the intervals differ: a logger that
+    repeats the last known value has such gaps.
     """
-    interval, _ = sampling_interval(received)
+    interval, spread = sampling_interval(received)
+    if spread > MAX_INTERVAL_SPREAD * interval:
+        return np.empty(0, np.intp)
     if abs(sampling_interval(measured)[0] - interval) > MAX_INTERVAL_SPREAD * interval:
         return np.empty(0, np.intp)
     gaps = np.diff(measured)

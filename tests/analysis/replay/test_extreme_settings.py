@@ -102,7 +102,7 @@ def test_a_number_at_the_end_of_its_range_is_named_or_gives_a_finite_result(
 
 
 @pytest.mark.parametrize("key", OTHERS)
-@pytest.mark.parametrize("value", ["", "none", [], ["none"], 1, nan])
+@pytest.mark.parametrize("value", ["", "nothing", [], ["nothing"], 1, nan])
 def test_what_is_no_choice_is_refused_by_the_name_of_the_setting(key: str, value: object) -> None:
     with pytest.raises(UsageError, match=key):
         analyse(short_log(), settings={key: value})

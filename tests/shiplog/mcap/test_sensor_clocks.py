@@ -66,3 +66,11 @@ def test_a_pause_and_a_stalled_reception_are_no_steps() -> None:
     stalled[200:260] = received[260]
     for times, of_reception in ((measured + gap, received + gap), (measured, stalled)):
         assert without_steps("/rudder/test", times, of_reception)[1] == []
+
+
+def test_times_of_reception_that_are_not_steady_show_no_step_forward() -> None:
+    measured = 10**9 * np.array([0, 0, 170, 3053, 3053, 3054])
+    received = 10**9 * np.array([0, 0, 1, 1, 2551, 2665])
+    times, warnings = without_steps("/vibration", measured, received)
+    assert np.array_equal(times, measured)
+    assert warnings == []
