@@ -18,6 +18,7 @@ from .clock_steps import (
 )
 from .forward_steps import MIN_FORWARD_NS, MIN_PAUSE_INTERVALS
 
+MIN_STEADY_INTERVALS = 16  # of times of reception; fewer may be alike by chance
 LAG_SAMPLES = 32  # on each side of a step, for the time from measurement to reception
 _SECOND_NS = 1e9
 
@@ -101,7 +102,8 @@ def _forward_rows(measured: TimeArray, received: TimeArray) -> NDArray[np.intp]:
     repeats the last known value has such gaps.
     """
     interval, spread = sampling_interval(received)
-    if spread > MAX_INTERVAL_SPREAD * interval:
+    has_few = np.count_nonzero(np.diff(received)) < MIN_STEADY_INTERVALS
+    if has_few or spread > MAX_INTERVAL_SPREAD * interval:
         return np.empty(0, np.intp)
     if abs(sampling_interval(measured)[0] - interval) > MAX_INTERVAL_SPREAD * interval:
         return np.empty(0, np.intp)

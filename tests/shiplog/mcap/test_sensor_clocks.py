@@ -74,3 +74,11 @@ def test_times_of_reception_that_are_not_steady_show_no_step_forward() -> None:
     times, warnings = without_steps("/vibration", measured, received)
     assert np.array_equal(times, measured)
     assert warnings == []
+
+
+def test_a_few_times_of_reception_show_no_step_forward() -> None:
+    measured = 10**9 * np.array([0, 0, 0, 0, 0, 0, 2568, 2675, 2825])
+    received = 10**9 * np.array([571, 973, 973, 973, 973, 973, 973, 973, 1172])
+    times, warnings = without_steps("/vibration", measured, received)
+    assert np.array_equal(times, measured)
+    assert warnings == []
