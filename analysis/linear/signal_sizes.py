@@ -16,7 +16,7 @@ from shiplog.types import FloatArray, Signals
 from .system_signals import BoundSignal, OutputStats, is_interpolated
 
 MIN_MEASUREMENTS = 4  # the noise is estimated from third differences
-MIN_STRIDE = 1.5  # steps between samples from which an interpolated output is thinned
+MIN_STRIDE = 1.5  # steps between samples from which an interpolated output is decimated
 # angles from one north, which a system may subtract from each other
 HEADINGS = ("heading", "heading_order", "magnetic_heading", "course_over_ground")
 
@@ -41,8 +41,8 @@ def with_stride(signal: BoundSignal, clock: Clock) -> BoundSignal:
     """Return an output with its stride on the clock."""
     channel = clock.channels[signal.binding.channel]
     ratio = channel.interval_secs / clock.dt_secs
-    thinned = is_interpolated(channel) and not channel.hold and ratio > MIN_STRIDE
-    return replace(signal, stride=round(ratio)) if thinned else signal
+    is_decimated = is_interpolated(channel) and not channel.hold and ratio > MIN_STRIDE
+    return replace(signal, stride=round(ratio)) if is_decimated else signal
 
 
 def measurement_interval(output: BoundSignal, clock: Clock) -> float:
