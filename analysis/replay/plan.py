@@ -30,7 +30,7 @@ from shiplog.vessel.vessel_parser import parse_vessel
 
 from .passes import FirstPass, SecondPass, first_pass, second_pass
 from .reading_options import DEFAULT_OPTIONS, ReadingOptions
-from .sensor_errors import sensor_model, with_forces
+from .sensor_model import sensor_model, with_forces
 
 GIVEN_MODEL = "given"
 ATTACHED_MODEL = "attached to the log"
