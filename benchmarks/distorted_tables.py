@@ -8,8 +8,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from shiplog import TrialLog
+from shiplog.layouts.layout_parser import parse_layout
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout_parser import parse_layout
 from shiplog.types import FloatArray, TimeArray
 
 from .distorted_values import DEG, KNOT

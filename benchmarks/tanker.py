@@ -17,8 +17,8 @@ from analysis.identification.runs import run_from_log
 from analysis.identification.validation import Validation, validate
 from analysis.replay.reading_options import ReadingOptions
 from shiplog import TrialLog, Vessel
+from shiplog.layouts.layout import load_layout
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 
 PROJECT = Path(__file__).resolve().parents[1]
 KVLCC2 = PROJECT.parent / "shared" / "data" / "kvlcc2"

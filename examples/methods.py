@@ -31,9 +31,9 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
 from recorders.simulated.trajectory import Gust, RandomForcing, WaveMoment
 from shiplog import Channel, TrialLog, Vessel, load_vessel, read
+from shiplog.layouts.layout import load_layout
 from shiplog.ships.paper import rudder_effect
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 from shiplog.types import FloatArray
 from shiplog.vessel.settings import FilterSettings
 from shiplog.vessel.vessel import with_settings

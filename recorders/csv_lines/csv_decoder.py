@@ -9,7 +9,7 @@ from operator import xor
 from recorders.streams.counts import StreamCounts
 from recorders.streams.packets import Packet, packet_lines
 from recorders.streams.sample_buffer import SampleBuffer
-from shiplog.tables.layout import DEGREES_MINUTES, HEMISPHERES, Column
+from shiplog.layouts.layout import DEGREES_MINUTES, HEMISPHERES, Column
 from shiplog.units import CATALOGUE, conversion_factor
 
 from .device import Device, LineKind

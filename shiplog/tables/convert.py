@@ -11,6 +11,7 @@ from shiplog.checks.consistency.consistency_check import COMPARED_CHANNELS, cons
 from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.checks.data_quality import times_in_words
 from shiplog.errors import LogError, UsageError
+from shiplog.layouts.layout import load_layout
 from shiplog.mcap.clock_repair import refuse_mixed_times
 from shiplog.mcap.raw_reader import raw_groups
 from shiplog.mcap.reader import read_unchecked
@@ -21,7 +22,6 @@ from shiplog.types.time_cut import resolve_cut
 
 from .csv_form import CSV_MARK, read_csv, write_csv
 from .foreign import read_table
-from .layout import load_layout
 from .parquet_form import read_parquet, write_parquet
 
 SUFFIXES = (".mcap", ".csv", ".parquet")

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shiplog.errors import LayoutError
-
-from .header_words import is_units_row
-from .layout import DELIMITERS, Layout
+from shiplog.layouts.header_words import is_units_row
+from shiplog.layouts.layout import DELIMITERS, Layout
 
 
 @dataclass(frozen=True)

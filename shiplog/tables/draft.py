@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from shiplog.errors import LayoutError
+from shiplog.layouts.header_words import named_unit, recognise, split_header
+from shiplog.layouts.layout import HEMISPHERES
+from shiplog.layouts.layout_parser import parse_layout
 from shiplog.units import CATALOGUE, UNITS
 
 from .draft_sample import read_sample, sample_numbers
 from .draft_times import draft_times
 from .foreign import read_table
-from .header_words import named_unit, recognise, split_header
-from .layout import HEMISPHERES
-from .layout_parser import parse_layout
 from .printed_positions import looks_packed
 
 POSITION = ("latitude", "longitude", *HEMISPHERES)

@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from shiplog.errors import LayoutError
+from shiplog.layouts.header_words import is_units_row
+from shiplog.layouts.layout import DELIMITERS
 from shiplog.types import FloatArray
-
-from .header_words import is_units_row
-from .layout import DELIMITERS
 
 SAMPLE_LINES = 5000  # of the table, from which a layout is drafted
 ENCODINGS = ("utf-8", "cp1252")

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from shiplog.errors import LayoutError
+from shiplog.layouts.header_words import bracketed_unit, named_unit
+from shiplog.layouts.layout import DEGREES_MINUTES, HEMISPHERES, ROLES, VELOCITIES, Layout
 from shiplog.types import Channel, FloatArray, TimeArray, TrialLog
 from shiplog.units import CATALOGUE, GEOGRAPHIC, UNITS, conversion_factor, did_you_mean
 
 from .delimited import CellTable, read_cells
-from .header_words import bracketed_unit, named_unit
-from .layout import DEGREES_MINUTES, HEMISPHERES, ROLES, VELOCITIES, Layout
 from .printed_positions import PositionTextError, looks_packed, parse_degrees
 from .printed_times import TimeTextError, excel_ns, is_time_text, looks_hhmmss, parse_times
 from .rebuild import rebuilt_heading, uniform_times

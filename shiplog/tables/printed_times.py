@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shiplog.layouts.layout import TimeForm
 from shiplog.types import FloatArray, TimeArray
-
-from .layout import TimeForm
 
 if TYPE_CHECKING:  # slow to import: only printed times wait for it
     import pandas as pd

@@ -1,7 +1,7 @@
 """A minimal layout file, and a function that parses layouts from text."""
 
-from shiplog.tables.layout import Layout
-from shiplog.tables.layout_parser import parse_layout
+from shiplog.layouts.layout import Layout
+from shiplog.layouts.layout_parser import parse_layout
 
 MINIMAL = """
 [time]

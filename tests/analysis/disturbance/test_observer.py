@@ -31,10 +31,10 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import Gust, WaveMoment
 from shiplog import Signals, TrialLog, UsageError, Vessel, read, resample
+from shiplog.layouts.layout import load_layout
 from shiplog.resampling import resample_chunks
 from shiplog.ships.paper import Coefficients
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import DISTURBANCES, DisturbanceSettings
 

@@ -24,9 +24,9 @@ from analysis.manoeuvres.turning_circle import turning_circle
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, UsageError, load_vessel, resample
+from shiplog.layouts.layout import load_layout
 from shiplog.ships import ship_model
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 
 LENGTH = 320.0
 CHANNELS, OPTIONAL = ("yaw_rate", "speed", "rudder", "rpm"), ("sway", "heading")

@@ -18,9 +18,9 @@ from analysis.manoeuvres.zigzag import switch_heading
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, load_vessel
+from shiplog.layouts.layout import load_layout
 from shiplog.ships import ship_model
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 
 VESSEL, TOML = load_vessel("table1")
 NOISE_DEG = 0.5

@@ -14,8 +14,8 @@ from analysis.replay.replay import analyse
 from shiplog import Channel, LogError, TrialLog, Vessel, read
 from shiplog.checks.consistency.consistency_check import consistency_findings
 from shiplog.checks.log_stats import compute_log_stats
+from shiplog.layouts.layout import load_layout
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 
 EXCESS = "worth more than the largest rudder angle"
 BIASED = ("MARIN_FREE", "zigzag_10_10_dropouts")  # 0.005 deg/s in each of MARIN's runs; simulated

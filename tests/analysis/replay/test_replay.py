@@ -22,8 +22,8 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import START_NS, SimulatedTrial, simulate
 from shiplog import Channel, LogError, TrialLog, Vessel, VesselError, read, write
 from shiplog.errors import UsageError
+from shiplog.layouts.layout import load_layout
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 from shiplog.units import GEOGRAPHIC
 
 

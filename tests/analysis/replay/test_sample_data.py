@@ -12,8 +12,8 @@ from places import KVLCC2, SAMPLE_DATA
 from analysis.check.compare import compare, logs_in
 from analysis.replay.replay import analyse
 from shiplog import TrialLog, load_vessel, read
+from shiplog.layouts.layout import load_layout
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import DISTURBANCES
 

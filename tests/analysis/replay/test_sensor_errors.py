@@ -17,8 +17,8 @@ from analysis.replay.replay_results import Analysis
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, UsageError, load_vessel, read
+from shiplog.layouts.layout import load_layout
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 
 BIASED = SAMPLE_DATA / "zigzag_10_10_dropouts.mcap"  # a gyro with a bias of 0.02 deg/s
 TRANSIENT_SECS = 60.0

@@ -10,10 +10,10 @@ from places import SAMPLE_DATA
 from shiplog.cli.core_verbs import LAYOUT
 from shiplog.cli.main import main
 from shiplog.errors import LayoutError
+from shiplog.layouts.layout import load_layout
+from shiplog.layouts.layout_parser import parse_layout
 from shiplog.tables.draft import draft_layout
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
-from shiplog.tables.layout_parser import parse_layout
 from shiplog.types import TrialLog
 
 

@@ -13,13 +13,13 @@ from recorders.simulated.simulate import simulate
 from shiplog import load_vessel
 from shiplog.checks.info import read_log_info
 from shiplog.errors import LayoutError
+from shiplog.layouts.layout import Layout, load_layout
+from shiplog.layouts.layout_parser import parse_layout
 from shiplog.mcap.reader import read
 from shiplog.mcap.writer import write
 from shiplog.tables.convert import convert
 from shiplog.tables.csv_form import write_csv
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import Layout, load_layout
-from shiplog.tables.layout_parser import parse_layout
 from shiplog.tables.parquet_form import write_parquet
 from shiplog.tables.rebuild import rebuilt_heading, uniform_times
 from shiplog.types import TrialLog

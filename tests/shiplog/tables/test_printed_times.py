@@ -6,7 +6,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 
-from shiplog.tables.layout import TimeForm
+from shiplog.layouts.layout import TimeForm
 from shiplog.tables.printed_times import TimeTextError, parse_times
 
 BERLIN = ZoneInfo("Europe/Berlin")

@@ -11,8 +11,8 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, Vessel
 from shiplog.checks.consistency.consistency_check import consistency_findings
+from shiplog.layouts.layout import load_layout
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 
 
 def simulated_log(vessel: Vessel, seed: int = 0, **settings: float) -> TrialLog:

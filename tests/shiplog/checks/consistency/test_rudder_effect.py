@@ -10,8 +10,8 @@ from channels import channel
 from places import KVLCC2, LAYOUTS
 
 from shiplog.checks.consistency.consistency_check import consistency_findings
+from shiplog.layouts.layout import load_layout
 from shiplog.tables.foreign import read_table
-from shiplog.tables.layout import load_layout
 from shiplog.types import TrialLog
 
 Steering = Callable[[float, float, float], float]  # time, heading, yaw rate -> rudder, rad

@@ -8,8 +8,8 @@ import pytest
 from layout_texts import MINIMAL, layout
 
 from shiplog.errors import LayoutError
-from shiplog.tables.layout import load_layout
-from shiplog.tables.layout_parser import parse_layout
+from shiplog.layouts.layout import load_layout
+from shiplog.layouts.layout_parser import parse_layout
 
 
 def errors_of(text: str) -> str:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from shiplog.tables.header_words import is_units_row, recognise, split_header
+from shiplog.layouts.header_words import is_units_row, recognise, split_header
 from shiplog.units import CATALOGUE
 
 
