@@ -1,11 +1,12 @@
 """Content of a log as `shiplog info` shows it: times, rates, ranges, gaps and foreign topics."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from mcap import records
 
 from shiplog.mcap.clock_repair import mixed_times_in
 from shiplog.mcap.contents import McapContents, MessageCount
@@ -112,16 +113,21 @@ def _events_of(path: Path, summary: McapSummary) -> tuple[Event, ...]:
 
 
 def _foreign_in_summary(summary: McapSummary) -> tuple[ForeignTopic, ...]:
-    counts, schemas = summary.statistics.channel_message_counts, summary.schemas
+    counts = summary.statistics.channel_message_counts
     return tuple(
-        ForeignTopic(
-            channel.topic,
-            schemas[channel.schema_id].name if channel.schema_id in schemas else "",
-            counts.get(channel_id, 0),
-        )
+        _foreign_topic(channel, summary.schemas, counts.get(channel_id, 0))
         for channel_id, channel in sorted(summary.channels.items())
-        if is_foreign(channel, schemas)
+        if is_foreign(channel, summary.schemas)
     )
+
+
+def _foreign_topic(
+    channel: records.Channel, schemas: Mapping[int, records.Schema], messages: int
+) -> ForeignTopic:
+    """Return a topic of another program as its records describe it."""
+    schema = schemas.get(channel.schema_id)
+    name, encoding = (schema.name, schema.encoding) if schema else ("", "")
+    return ForeignTopic(channel.topic, name, messages, channel.message_encoding, encoding)
 
 
 def _raw_in_summary(summary: McapSummary) -> tuple[RawTopic, ...]:
@@ -144,12 +150,11 @@ def _raw_in_contents(contents: McapContents) -> tuple[RawTopic, ...]:
     for channel_id, record in sorted(contents.channels.items()):
         if is_raw(record, contents.schemas):
             count = contents.not_decoded.get(channel_id, MessageCount())
-            span = (count.first_ns, count.last_ns) if count.count else (None, None)
-            secs = (count.last_ns - count.first_ns) * 1e-9
-            rate = (count.count - 1) / secs if secs > 0 else None
             source, packet_format = raw_source(record), record.metadata.get("format", "")
             topics.append(
-                RawTopic(record.topic, source, packet_format, count.count, count.size, rate, *span)
+                RawTopic(
+                    record.topic, source, packet_format, count.count, count.size, *_rate(count)
+                )
             )
     return tuple(topics)
 
@@ -159,18 +164,20 @@ def _foreign_in_contents(contents: McapContents) -> tuple[ForeignTopic, ...]:
     topics = []
     for channel_id, record in sorted(contents.channels.items()):
         if is_foreign(record, contents.schemas):
-            schema = contents.schemas.get(record.schema_id)
-            messages = contents.not_decoded.get(channel_id)
-            topics.append(
-                ForeignTopic(
-                    record.topic,
-                    schema.name if schema else "",
-                    messages.count if messages else 0,
-                    messages.first_ns if messages else None,
-                    messages.last_ns if messages else None,
-                )
-            )
+            count = contents.not_decoded.get(channel_id, MessageCount())
+            topic = _foreign_topic(record, contents.schemas, count.count)
+            rate_hz, first_ns, last_ns = _rate(count)
+            topics.append(replace(topic, rate_hz=rate_hz, first_ns=first_ns, last_ns=last_ns))
     return tuple(topics)
+
+
+def _rate(count: MessageCount) -> tuple[float | None, int | None, int | None]:
+    """Return the mean rate of counted messages, Hz, and their first and last time, ns."""
+    if not count.count:
+        return None, None, None
+    secs = (count.last_ns - count.first_ns) * 1e-9
+    rate = (count.count - 1) / secs if secs > 0 else None
+    return rate, count.first_ns, count.last_ns
 
 
 def _info_of_log(

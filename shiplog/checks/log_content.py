@@ -71,16 +71,22 @@ class ChannelInfo:
 
 @dataclass(frozen=True)
 class ForeignTopic:
-    """One topic of another program, whose messages shiplog does not read.
+    """One topic of another program, whose messages are read by a layout only.
 
     Attributes
     ----------
     topic
         The topic.
     schema
-        The name of its message schema; empty if it has none.
+        The name of its message schema, which is the type of its messages; empty if it has none.
     messages
         The number of messages.
+    encoding
+        The encoding of the messages, such as ``cdr``; empty if it is not stated.
+    schema_encoding
+        The encoding of the schema, such as ``ros2msg``; empty if it has none.
+    rate_hz
+        The mean rate between the first and the last message; None if unknown.
     first_ns, last_ns
         Its first and last time of reception, ns since 1970-01-01 UTC; None if unknown.
     """
@@ -88,6 +94,9 @@ class ForeignTopic:
     topic: str
     schema: str
     messages: int
+    encoding: str = ""
+    schema_encoding: str = ""
+    rate_hz: float | None = None
     first_ns: int | None = None
     last_ns: int | None = None
 

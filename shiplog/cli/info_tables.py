@@ -26,9 +26,9 @@ def info_tables(info: LogInfo) -> list[TextTable]:
     )
     foreign = TextTable(
         "Topics of other programs",
-        ("topic", "messages", "schema", "first [s]", "last [s]"),
+        ("topic", "type", "messages", "rate\n[Hz]", "encoding", "first [s]", "last [s]"),
         tuple(_foreign_row(topic, info) for topic in info.foreign),
-        ("shiplog does not read these; their times are of reception, in s since the start.",),
+        ("`shiplog layout` drafts their conversion; times are of reception, in s from the start.",),
     )
     raw = TextTable(
         "Raw packets",
@@ -102,13 +102,26 @@ def _remarks(channels: Sequence[ChannelInfo]) -> list[str]:
 
 
 def _raw_row(topic: RawTopic, info: LogInfo) -> tuple[str, ...]:
-    rate = "" if topic.rate_hz is None else f"{topic.rate_hz:.3g}"
     size = "" if topic.size is None else str(topic.size)
-    return (topic.topic, str(topic.packets), rate, size, topic.format, *_span_cells(topic, info))
+    return (
+        topic.topic,
+        str(topic.packets),
+        _rate_cell(topic),
+        size,
+        topic.format,
+        *_span_cells(topic, info),
+    )
 
 
 def _foreign_row(topic: ForeignTopic, info: LogInfo) -> tuple[str, ...]:
-    return (topic.topic, str(topic.messages), topic.schema, *_span_cells(topic, info))
+    encodings = [text for text in (topic.encoding, topic.schema_encoding) if text]
+    encoding = " / ".join(dict.fromkeys(encodings))
+    messages, span = str(topic.messages), _span_cells(topic, info)
+    return (topic.topic, topic.schema, messages, _rate_cell(topic), encoding, *span)
+
+
+def _rate_cell(topic: RawTopic | ForeignTopic) -> str:
+    return "" if topic.rate_hz is None else f"{topic.rate_hz:.3g}"
 
 
 def _span_cells(topic: RawTopic | ForeignTopic, info: LogInfo) -> tuple[str, str]:

@@ -9,6 +9,7 @@ from recorders.record import record
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import Channel, LogError, LogWriter, UsageError
 from shiplog.checks.info import read_log_info
+from shiplog.cli.main import main
 from shiplog.tables.convert import convert
 
 
@@ -116,10 +117,33 @@ def test_foreign_topics_are_listed_whether_the_file_is_finished_or_cut(
     info = read_log_info(tmp_path / "bag.mcap")
     (topic,) = info.foreign
     assert (topic.topic, topic.schema, topic.messages) == ("/chatter", "std/Text", 10)
+    assert (topic.encoding, topic.schema_encoding) == ("cdr", "ros2msg")
     assert (topic.first_ns, topic.last_ns) == (100 * 10**9, 109 * 10**9)
+    assert topic.rate_hz == pytest.approx(1.0)
     assert (info.start_ns, info.end_ns) == (topic.first_ns, topic.last_ns)
     assert info.finished is finish
     assert not info.channels
+
+
+def test_a_topic_with_two_types_or_none_has_a_row_for_each(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with (tmp_path / "bag.mcap").open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start()
+        schema = writer.register_schema("pkg/Odd", "jsonschema", b"{}")
+        for schema_id in (schema, 0):
+            channel = writer.register_channel("/odd", "json", schema_id)
+            writer.add_message(channel, 10**18, b"{}", 10**18)
+        writer.finish()
+    topics = read_log_info(tmp_path / "bag.mcap").foreign
+    assert [(each.schema, each.encoding, each.schema_encoding) for each in topics] == [
+        ("pkg/Odd", "json", "jsonschema"),
+        ("", "json", ""),
+    ]
+    assert all(each.rate_hz is None for each in topics)
+    assert main(["info", str(tmp_path / "bag.mcap")]) == 0
+    assert "json / jsonschema" in capsys.readouterr().out
 
 
 def test_a_log_of_foreign_topics_alone_is_not_converted(tmp_path: Path) -> None:
