@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from recorders.trial.live_source import LiveSource
 from recorders.trial.status import ChannelStatus
-from shiplog.cli.printable import printable
+from shiplog.printable import printable
 from shiplog.types import Event
 from shiplog.units import CATALOGUE, conversion_factor, utc_text
 

@@ -8,10 +8,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from shiplog.files import atomic_write
+from shiplog.printable import escape_json, printable
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.text_table import TextTable
-
-from .printable import printable
 
 MIN_NAME_WIDTH = 12  # characters of a shortened cell in the first column
 MIN_PROSE_WIDTH = 30  # characters of a column that is wrapped
@@ -187,12 +186,6 @@ def shortened(text: str, size: int) -> str:
     return f"{text[:head]}…{text[len(text) - (size - 1 - head) :]}"
 
 
-def _json_printable(line: str) -> str:
-    if line.isprintable():
-        return line
-    return "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in line)
-
-
 def print_warnings(warnings: Sequence[str]) -> None:
     """Print warnings on stderr, a line each."""
     for warning in warnings:
@@ -205,7 +198,7 @@ def write_json(value: object, where: str) -> None:
     Characters that do not print are escaped, as for a terminal.
     """
     text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
-    text = "\n".join(map(_json_printable, text.split("\n"))) + "\n"
+    text = "\n".join(map(escape_json, text.split("\n"))) + "\n"
     if where == "-":
         sys.stdout.write(text)
         return

@@ -5,11 +5,11 @@ import sys
 from pathlib import Path
 
 from shiplog.errors import ShiplogError
+from shiplog.printable import printable
 
 from .console import print_tables, print_warnings, progress, write_json
 from .options import add_cut_options, add_derive_option
 from .paths import require_distinct, require_inputs, require_outputs
-from .printable import printable
 from .verb import ExitCode, Verb
 
 

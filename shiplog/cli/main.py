@@ -16,9 +16,9 @@ from types import ModuleType
 
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import declared_entries, extension_names, load_extension
+from shiplog.printable import printable
 from shiplog.version import __version__
 
-from .printable import printable
 from .verb import ExitCode, Verb
 
 GROUP = "shiplog.verbs"

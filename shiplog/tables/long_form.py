@@ -5,7 +5,6 @@ is in a header of JSON lines. A data frame carries it in its `attrs`, a CSV in c
 file in the metadata of its schema.
 """
 
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -14,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shiplog.errors import LogError
-from shiplog.mcap.schema import schema_for
-from shiplog.types import Channel, Event, EventLevel, FloatArray, TimeArray, TrialLog
+from shiplog.types import Channel, FloatArray, TimeArray, TrialLog
 from shiplog.units import did_you_mean
+
+from .table_header import header_lines, read_header
 
 if TYPE_CHECKING:  # slow to import: only what makes a frame waits for it
     import pandas as pd
@@ -159,38 +159,6 @@ def row_labels(log: TrialLog) -> tuple[list[str], Codes, list[str], Codes]:
     return topics, np.concatenate(codes + topic_codes), fields, np.concatenate(codes + field_codes)
 
 
-def header_lines(log: TrialLog) -> str:
-    """Return the header: JSON lines of the metadata, channels, events and the vessel file."""
-    lines = ["metadata " + _json(dict(log.metadata))]
-    for c in log:
-        entry = {"name": c.name, "source": c.source, "unit": c.unit, "fields": list(c.fields)}
-        lines.append("channel " + _json(entry | {"metadata": dict(c.metadata)}))
-    lines += ["event " + _json(_event_entry(event)) for event in log.events]
-    if log.vessel_toml is not None:
-        lines += ["vessel " + _json(line) for line in log.vessel_toml.split("\n")]
-    return "\n".join(lines)
-
-
-def _event_entry(event: Event) -> dict[str, str | int]:
-    return {
-        "time_ns": event.time_ns,
-        "text": event.text,
-        "source": event.source,
-        "level": event.level.name.lower(),
-    }
-
-
-def _event(time_ns: int, text: str, source: str, level: str) -> Event:
-    levels = {each.name.lower(): each for each in EventLevel}
-    if level not in levels:
-        raise ValueError(f"no level of an event: {level!r}; there are {', '.join(levels)}")
-    return Event(time_ns, text, source, levels[level])
-
-
-def _json(value: object) -> str:
-    return json.dumps(value, ensure_ascii=False)
-
-
 def assemble(name: str, header: list[str], columns: LongColumns) -> TrialLog:
     """Assemble a trial from its header and its rows.
 
@@ -208,7 +176,7 @@ def assemble(name: str, header: list[str], columns: LongColumns) -> TrialLog:
     LogError
         The header cannot be read, or a row belongs to no channel of it.
     """
-    outline = _read_header(name, header)
+    outline = read_header(name, header)
     empty = outline.channels
     place = {(c.topic, field): i for i, (c, field) in enumerate(_components(empty))}
     labels = zip(columns.topics, columns.fields, strict=True)
@@ -228,45 +196,8 @@ def assemble(name: str, header: list[str], columns: LongColumns) -> TrialLog:
     return replace(outline, channels=tuple(channels))
 
 
-def _read_header(name: str, header: list[str]) -> TrialLog:
-    """Parse the log without its samples: channels, metadata, events and the vessel file."""
-    metadata: dict[str, str] = {}
-    events: list[Event] = []
-    channels: list[Channel] = []
-    vessel: list[str] = []
-    for line in header:
-        key, _, text = line.partition(" ")
-        try:
-            entry = json.loads(text)
-            if key == "metadata":
-                metadata |= entry
-            elif key == "channel":
-                channels.append(_empty_channel(**entry))
-            elif key == "event":
-                events.append(_event(**entry))
-            elif key == "vessel":
-                vessel.append(entry)
-            else:
-                raise ValueError(f"unknown key {key!r}")
-        except (ValueError, TypeError) as error:
-            raise LogError(
-                f"header line {line[:60]!r} cannot be read ({error}); convert the log again: {name}"
-            ) from error
-    vessel_toml = "\n".join(vessel) if vessel else None
-    return TrialLog(name, tuple(channels), metadata, vessel_toml, events=tuple(events))
-
-
 def _components(channels: Sequence[Channel]) -> list[tuple[Channel, str]]:
     return [(channel, field) for channel in channels for field in field_names(channel)]
-
-
-def _empty_channel(
-    name: str, source: str, unit: str, fields: list[str], metadata: dict[str, str]
-) -> Channel:
-    schema_for(tuple(fields))  # raises ValueError for fields without a message schema
-    empty = np.zeros(0, np.int64)
-    values = np.zeros((0, len(fields)) if fields else 0)
-    return Channel(name, source, unit, empty, empty, values, tuple(fields), metadata)
 
 
 def _filled(name: str, channel: Channel, rows: list[Rows], columns: LongColumns) -> Channel:

@@ -161,7 +161,7 @@ def test_a_csv_begins_with_its_mark_and_can_be_read_with_pandas(tmp_path: Path) 
     path, values = tmp_path / "a.csv", np.array([1 / 7, np.nan, -np.nan, -0.0, 3])
     log = replace(trial(), channels=(replace(trial().channels[3], values=values),))
     write_csv(log, path)
-    assert path.read_text(encoding="utf-8").startswith("# shiplog csv 1\n# metadata {")
+    assert path.read_text(encoding="utf-8").startswith("# shiplog csv 2\n# metadata {")
     frame = pd.read_csv(path, comment="#")
     assert frame["topic"].tolist() == ["/yaw_rate/mems"] * 5
     assert frame["measured_ns"].tolist() == trial().channels[3].measured_ns.tolist()
@@ -185,8 +185,8 @@ def damage_error(tmp_path: Path, old: str, new: str) -> str:
 @pytest.mark.parametrize(
     ("old", "new", "part"),
     [
-        ("# shiplog csv 1", "# shiplog csv 2", "install a newer shiplog"),
-        ("# shiplog csv 1", "t,r", "it needs a layout"),
+        ("# shiplog csv 2", "# shiplog csv 3", "install a newer shiplog"),
+        ("# shiplog csv 2", "t,r", "it needs a layout"),
         ("topic,field,", "theme,field,", "line 11 should be 'topic,field,"),
         (
             "\n/position/gps,north,",

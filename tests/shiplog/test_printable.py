@@ -9,7 +9,7 @@ import pytest
 
 from shiplog import Channel, LogWriter
 from shiplog.cli.main import main
-from shiplog.cli.printable import printable
+from shiplog.printable import printable
 from shiplog.types import Event, RawPackets
 
 HOSTILE = "a\x1b[2J\x9b1m\u202e\x07\r\nb"

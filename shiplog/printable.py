@@ -1,0 +1,35 @@
+r"""Texts from files and sensors made safe to show: control and format characters are escaped.
+
+Such a text may hold sequences that control a terminal, line ends that make one line look like
+several, and characters that change the direction of the text around them.
+"""
+
+import json
+
+
+def printable(text: str) -> str:
+    r"""Return a text with all characters escaped that do not print, such as control characters.
+
+    Examples
+    --------
+    >>> printable("gyro \x1b[2J ok")
+    'gyro \\x1b[2J ok'
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text
+    )
+
+
+def escape_json(line: str) -> str:
+    r"""Escape the characters of a line of JSON that do not print; its value stays the same.
+
+    Examples
+    --------
+    >>> escape_json('{"source": "gyro \x9b2J, 20°"}')
+    '{"source": "gyro \\u009b2J, 20°"}'
+    """
+    if line.isprintable():
+        return line
+    return "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in line)
