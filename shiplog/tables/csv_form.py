@@ -176,7 +176,7 @@ def _cell(text: str) -> str:
     """Return the cell of a text, from which the text can be restored.
 
     A text with characters that do not print, and one that a spreadsheet would take for a formula,
-    is a string of JSON. Others are quoted if they need it; for pandas a quoted `#` begins no comment.
+    is a string of JSON. Others are quoted if they need it: a quoted `#` begins no comment.
     """
     if not text.isprintable() or text.startswith(('"', *FORMULA_SIGNS)):
         text = escape_json(json.dumps(text, ensure_ascii=False))

@@ -1,4 +1,4 @@
-"""The header of a table may come from anybody: any value of a wrong type is an error of one line."""
+"""The header of a table may come from anybody: a value of a wrong type is an error of one line."""
 
 import json
 
