@@ -5,6 +5,7 @@ it is searched in turn (binary segmentation). Only the triangular factors of at 
 blocks of rows are stored, so that a trial may be of any length.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import inf, nan, sqrt
 
@@ -25,6 +26,7 @@ from .change_point import (
     is_significant,
     relative_difference,
 )
+from .coefficients import Coefficient
 from .sliding import MAX_INFLATION
 from .weak_form import SLIPSTREAM, Equation, Rows, WeakForm, with_constant, with_slipstream
 from .window_qr import rotate_row
@@ -75,6 +77,11 @@ class Change:
     alternatives: tuple[str, ...]
 
     @property
+    def determined(self) -> bool:
+        """Whether both values are over two standard deviations from zero."""
+        return abs(self.before) > 2 * self.before_std and abs(self.after) > 2 * self.after_std
+
+    @property
     def description(self) -> str:
         """The relative change with its 95 % interval if known, else the values before and after."""
         if np.isfinite(self.relative_change):
@@ -90,6 +97,25 @@ class Change:
             f"{names} changed {self.description} at {self.at_secs:.0f} s: the ship, its loading, "
             "the water depth or the weather changed, or the model does not hold on both sides"
         )
+
+
+def determined_changes(
+    changes: Iterable[Change], coefficients: Mapping[str, Coefficient]
+) -> tuple[Change, ...]:
+    """Return the changes of coefficients that the trial determines, as a whole and on both sides.
+
+    Where one is not determined, the change of a sum of terms can appear as its own.
+
+    Parameters
+    ----------
+    changes
+        The changes found.
+    coefficients
+        The coefficients over the whole trial, by name.
+    """
+    return tuple(
+        change for change in changes if change.determined and coefficients[change.name].determined
+    )
 
 
 class ShipChangeTest:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import atan2, hypot, pi
+from math import atan2, hypot, nan, pi
 
 MIN_STDS = 2.0  # standard deviations by which the speed of a current must exceed zero
 
@@ -40,6 +40,18 @@ class Current:
     def direction(self) -> float:
         """Direction into which it flows, 0 to 2π rad from north to east: its set."""
         return atan2(self.east, self.north) % (2 * pi)
+
+    @property
+    def speed_std(self) -> float:
+        """Standard deviation of the speed, m/s, if north and east err alike; else it is smaller."""
+        along = abs(self.north) * self.north_std + abs(self.east) * self.east_std
+        return along / self.speed if self.speed else nan
+
+    @property
+    def direction_std(self) -> float:
+        """Standard deviation of the direction, rad, if north and east err alike; likewise."""
+        across = abs(self.east) * self.north_std + abs(self.north) * self.east_std
+        return across / self.speed**2 if self.speed else nan
 
     @property
     def determined(self) -> bool:

@@ -87,16 +87,14 @@ class ResidualSummary:
         low, high = self.nis_band
         return low <= self.mean_nis <= high
 
-    @property
-    def warning(self) -> str:
-        """A warning where the gate rejected more than spikes explain; else empty."""
+    def gate_warning(self, remedy: str) -> str:
+        """Return a warning where the gate rejected more than spikes explain; else empty."""
         share = self.rejected / max(self.rejected + self.count, 1)
         if share <= MAX_REJECTED_SHARE:
             return ""
         return (
             f"{self.name}: the gate rejected {share:.1%} of the samples, too many for spikes: the "
-            "model or the noise set does not fit; let the log determine the noise "
-            "(filter.process_ratio=auto), separate waves (filter.wave), or widen filter.gate"
+            f"model or the noise set does not fit; {remedy}"
         )
 
 

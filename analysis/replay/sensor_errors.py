@@ -7,6 +7,7 @@ from math import nan
 import numpy as np
 
 from analysis.filters.further_states import HOUR, SENSOR_WALKS
+from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.units import display_conversion
 
 from .residuals import ResidualSummary
@@ -14,6 +15,12 @@ from .residuals import ResidualSummary
 DETERMINED_SHARE = 1 / 3  # of the standard deviation at the start
 MAX_NIS = 2.0  # mean normalised innovation squared: above it the standard deviations are wrong
 MAX_CHANGE_STDS = 5.0  # of an error in half a trial, in the standard deviations stated for it
+OTHER_MODEL = "give another model with --vessel"
+LARGER_NOISE = {
+    **dict.fromkeys(PAPER_OUTPUTS, "set filter.process_ratio to auto"),
+    "heading": "state a larger filter.heading_std",
+    **dict.fromkeys(("north", "east"), "state a larger filter.position_std"),
+}
 # the channels in whose units further estimates are shown
 DISPLAYED_AS = {
     "gyro": "yaw_rate", "log": "speed", "current_north": "speed", "current_east": "speed",
@@ -98,8 +105,8 @@ def sensor_errors(
     sensors: tuple[str, ...],
     omitted: Mapping[str, str],
     last: Mapping[str, tuple[float, float]],
-    residuals: Sequence[ResidualSummary],
     middle: Middle,
+    inconsistency: str,
 ) -> tuple[SensorError, ...]:
     """Return the sensor errors found.
 
@@ -111,17 +118,18 @@ def sensor_errors(
         Those that are not, although asked for, each with the reason.
     last
         Value and standard deviation of each at the end of the trial.
-    residuals
-        The tests of the innovations: where these are much larger than expected, so are the errors.
     middle
         The same at half time: an error that has changed by more than its standard deviations allow
         follows errors of model or heading that are not white.
+    inconsistency
+        Why the standard deviations are too small, as in `inconsistency_of`; empty where they are
+        right.
     """
     found = []
     for name, walk in SENSOR_WALKS.items():
         if name in sensors:
             value, std = last[name]
-            reason = inconsistency(residuals)
+            reason = inconsistency
             if middle.change(name, value, std) > MAX_CHANGE_STDS:
                 unit, factor = further_display(name, walk.unit)
                 reason = (
@@ -141,12 +149,33 @@ def sensor_errors(
     return tuple(found)
 
 
-def inconsistency(residuals: Sequence[ResidualSummary]) -> str:
-    """Return why the standard deviations are too small; empty where they are right."""
+def inconsistency_of(residuals: Sequence[ResidualSummary], tuned: tuple[bool, bool]) -> str:
+    """Return why the standard deviations are too small; empty where they are right.
+
+    Parameters
+    ----------
+    residuals
+        The tests of the innovations, those of yaw rate and speed first.
+    tuned
+        Whether the process noise of yaw and surge was estimated from the log.
+    """
     wrong = [residual.name for residual in residuals if residual.mean_nis > MAX_NIS]
     if not wrong:
         return ""
+    remedies = dict.fromkeys(noise_remedy(name, tuned) for name in wrong)
     return (
         f"the innovations of {' and '.join(wrong)} are larger than expected: the model or the noise"
-        " does not fit; set filter.process_ratio to auto, or the std of heading or position"
+        f" does not fit; {', and '.join(remedies)}"
     )
+
+
+def noise_remedy(output: str, tuned: tuple[bool, bool]) -> str:
+    """Return what makes the innovations of an output as large as expected.
+
+    Examples
+    --------
+    >>> noise_remedy("speed", (True, True)), noise_remedy("heading", (True, True))
+    ('give another model with --vessel', 'state a larger filter.heading_std')
+    """
+    is_tuned = dict(zip(PAPER_OUTPUTS, tuned, strict=True))
+    return OTHER_MODEL if is_tuned.get(output) else LARGER_NOISE[output]

@@ -140,7 +140,7 @@ def _choose_sensors(
         found = _ambiguities(candidate, evidence, ship)
         missing = [flag for flag in flags if not getattr(evidence, flag)]
         if missing:
-            omitted[name] = f"it takes {' and '.join(REMEDIES[flag] for flag in missing)}"
+            omitted[name] = f"it needs {' and '.join(REMEDIES[flag] for flag in missing)}"
         elif found:
             omitted[name] = _described(found[0], candidate, evidence, ship)
         else:
@@ -288,7 +288,7 @@ def _described(
             break
     else:
         cures = []
-    remedies = [f"it takes {' and '.join(cures)}"] if cures else []
+    remedies = [f"it needs {' and '.join(cures)}"] if cures else []
     if any(name.startswith("constant") for name in names):
         remedies.append('set disturbance.models to ["wave"]')
     remedies.append("remove one of them" if len(names) > 1 else "remove it")

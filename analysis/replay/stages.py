@@ -1,6 +1,6 @@
 """Stages of a replay, chunk by chunk: filter, disturbance observer, regression, tests, track."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from analysis.filters.base import OUTPUT_STATES, Estimates, FurtherStates
 from analysis.filters.factory import smoothable
 from analysis.filters.noise_model import FURTHER_OUTPUTS
 from analysis.filters.smoother import Adjoint, smoothed
-from analysis.regression.changes import ShipChangeTest
+from analysis.regression.changes import ShipChangeTest, determined_changes
 from analysis.regression.coefficients import CoefficientStage
 from shiplog import Signals
 from shiplog.screening import ScreenedLog
@@ -27,8 +27,8 @@ from .estimator_design import (
 from .passes import weak_form_on_clock
 from .plan import Plan
 from .replay_results import Findings, ReplayChunk
-from .residuals import ResidualTest
-from .sensor_errors import Middle, inconsistency, sensor_errors
+from .residuals import ResidualSummary, ResidualTest
+from .sensor_errors import Middle, inconsistency_of, noise_remedy, sensor_errors
 from .track import Tracker
 
 MIN_EXCESS_SHARE = 0.5  # of the trial, with a disturbance beyond the rudder: the model is wrong
@@ -119,8 +119,12 @@ class Stages:
     def findings(self, log: ScreenedLog) -> Findings:
         """Return the findings, once all chunks of the log were replayed."""
         residuals = tuple(test.result() for test in self._residual_tests)
-        changes = self._change_test.result()
-        warnings = [residual.warning for residual in residuals if residual.warning]
+        yaw, surge = self._yaw.result(), self._surge.result()
+        changes = determined_changes(
+            self._change_test.result(), yaw.coefficients | surge.coefficients
+        )
+        tuned, wrong = self._plan.noise.tuned, inconsistency_of(residuals, self._plan.noise.tuned)
+        warnings = _gate_warnings(residuals, tuned)
         disturbances = self._forces or self._observer
         warnings += _excess_warnings(self._plan, disturbances.excess_share)
         return Findings(
@@ -128,8 +132,8 @@ class Stages:
             metadata=dict(log.metadata),
             residuals=residuals,
             disturbances=disturbances.result(),
-            yaw=self._yaw.result(),
-            surge=self._surge.result(),
+            yaw=yaw,
+            surge=surge,
             changes=changes,
             track_origin=self.tracker.origin,
             warnings=(*self._plan.warnings, *warnings, *map(str, changes)),
@@ -138,10 +142,10 @@ class Stages:
                 self._plan.noise.further.sensors,
                 self._plan.omitted_sensors,
                 self._last,
-                residuals,
                 Middle(self._middle, self._plan.clock.count * self._plan.clock.dt_secs / 2),
+                wrong,
             ),
-            current=current_of(self._last, inconsistency(residuals)),
+            current=current_of(self._last, wrong),
         )
 
     def _disturbance(
@@ -185,6 +189,16 @@ def _values_at(further: FurtherStates, instant: int) -> dict[str, tuple[float, f
     rows = zip(further.values[instant], further.stds[instant], strict=True)
     pairs = [(float(value), float(std)) for value, std in rows]
     return dict(zip(further.names, pairs, strict=True))
+
+
+def _gate_warnings(residuals: Sequence[ResidualSummary], tuned: tuple[bool, bool]) -> list[str]:
+    """Warn of each output of which the gate rejected more than spikes explain."""
+    others = "separate waves (filter.wave), or widen filter.gate"
+    warnings = (
+        residual.gate_warning(f"{noise_remedy(residual.name, tuned)}, {others}")
+        for residual in residuals
+    )
+    return [warning for warning in warnings if warning]
 
 
 def _excess_warnings(plan: Plan, share: float) -> list[str]:

@@ -1,7 +1,7 @@
 """Sensor errors and current as tables, as far as the filter estimates them."""
 
 from collections.abc import Iterator
-from math import degrees, isnan
+from math import ceil, degrees, isnan
 
 from analysis.replay.current import Current
 from analysis.replay.replay_results import Findings
@@ -70,7 +70,13 @@ def _current_remarks(current: Current) -> Iterator[str]:
         yield f"Not determined: {current.reason}."
     elif current.determined:
         set_deg = round(degrees(current.direction)) % 360
-        yield f"Set {set_deg:03d}°, drift {current.speed * factor:.2f} {unit}, at the end."
+        set_half = NORMAL_95 * degrees(current.direction_std)
+        half = NORMAL_95 * current.speed_std * factor
+        digits = decimals(half)
+        yield (
+            f"Set {set_deg:03d}° ± {ceil(set_half)}°, drift "
+            f"{current.speed * factor:.{digits}f} ± {half:.{digits}f} {unit} (95 %), at the end."
+        )
     else:
         yield "No current: at the end it is less than two standard deviations."
     yield (

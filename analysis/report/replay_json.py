@@ -193,7 +193,7 @@ def _sensor_error(error: SensorError) -> JsonObject:
 def _current(current: Current | None) -> JsonObject | None:
     if current is None:
         return None
-    derived = ("speed", "direction", "determined")
+    derived = ("speed", "speed_std", "direction", "direction_std", "determined")
     values = asdict(current) | {name: getattr(current, name) for name in derived}
     return values | {"reason": current.reason or None}
 

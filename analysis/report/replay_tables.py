@@ -112,9 +112,14 @@ def _further_remarks(findings: Findings, residuals: Sequence[ResidualSummary]) -
         for unit, factor in [display_conversion(r.name, r.unit)]
     ]
     if assumed:
+        keys = dict.fromkeys(
+            "filter.heading_std" if r.name == "heading" else "filter.position_std"
+            for r, is_small in zip(residuals, small, strict=True)
+            if is_small
+        )
         yield (
             f"Innovations smaller than the noise assumed, which allows for slow errors of the "
-            f"sensor: {', '.join(assumed)}; change it by filter.heading_std, filter.position_std."
+            f"sensor: {', '.join(assumed)}; change it by {' and '.join(keys)}."
         )
 
 

@@ -10,12 +10,15 @@ from typing import Any, ClassVar, TypeVar
 
 from shiplog.extensions import extension_names
 from shiplog.toml_text import unknown_key
+from shiplog.units import did_you_mean
 
 FILTER_GROUP = "shiplog.filters"  # the entry points whose names `[filter] kind` accepts
+ABBREVIATIONS = {"ekf": "extended", "kf": "pseudo-input"}  # for hints about unknown names
+NONE = "none"  # a choice that excludes all others
 DISTURBANCES = ("constant", "ramp", "wave")
 SPECTRA = ("butterworth", "binomial")
 SENSOR_ERRORS = ("gyro", "log", "log_scale", "rudder", "compass")
-SENSOR_CHOICES = ("auto", "none", *SENSOR_ERRORS)
+SENSOR_CHOICES = ("auto", NONE, *SENSOR_ERRORS)
 
 MIN_WINDOW_SECS = 60.0  # length of one test function of the equations in integral form
 
@@ -115,7 +118,7 @@ class FilterSettings:
     @property
     def sensors(self) -> tuple[str, ...]:
         """The sensor errors requested, which may be ``auto``; empty for none."""
-        return tuple(name for name in self.sensor_bias or () if name != "none")
+        return tuple(name for name in self.sensor_bias or () if name != NONE)
 
     @property
     def chosen(self) -> str:
@@ -232,11 +235,33 @@ def _value_error(label: str, value: object, expected: Mapping[str, Any]) -> str 
     allowed = expected["of"]() if callable(expected["of"]) else expected["of"]
     choices = ", ".join(allowed)
     if kind is str:
-        ok = value in allowed
-        return None if ok else f"{label} must be one of {choices}, got {value!r}"
-    ok = isinstance(value, list | tuple) and bool(value)
-    ok = ok and all(each in allowed for each in value)  # type: ignore[attr-defined]
-    return None if ok else f"{label} must be a list of some of {choices}, got {value!r}"
+        hint = _nearest(value, allowed)
+        return (
+            None if value in allowed else f"{label} must be one of {choices}, got {value!r}{hint}"
+        )
+    return _list_error(label, value, allowed)
+
+
+def _list_error(label: str, value: object, allowed: Sequence[str]) -> str | None:
+    """Describe what is wrong with a list of choices; None if nothing is."""
+    choices = ", ".join(allowed)
+    if not isinstance(value, list | tuple) or not value:
+        return f"{label} must be a list of some of {choices}, got {value!r}"
+    unknown = [each for each in value if each not in allowed]
+    if unknown:
+        hint = _nearest(unknown[0], allowed)
+        return f"{label} must be a list of some of {choices}, got {list(value)!r}{hint}"
+    if NONE in value and set(value) != {NONE}:
+        others = ", ".join(each for each in value if each != NONE)
+        return f"{label} has {NONE} beside {others}; remove one of them"
+    return None
+
+
+def _nearest(name: object, allowed: Sequence[str]) -> str:
+    """Return a hint with the choice that is most like a name; empty where none is."""
+    meant = str(name).lower()
+    abbreviated = ABBREVIATIONS.get(meant, meant)
+    return did_you_mean(abbreviated, allowed).replace(";", ",")
 
 
 def number_error(

@@ -8,7 +8,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from analysis.regression.changes import MAX_BLOCKS, Change, ChangeTest, ShipChangeTest
+from analysis.regression.changes import (
+    MAX_BLOCKS,
+    Change,
+    ChangeTest,
+    ShipChangeTest,
+    determined_changes,
+)
+from analysis.regression.coefficients import Coefficient
 from analysis.regression.first_model import SPEED_PROPORTIONAL_RUDDER
 from analysis.regression.weak_form import (
     CHANNELS,
@@ -240,3 +247,24 @@ def test_a_ship_test_equals_the_tests_of_its_two_equations(vessel: Vessel) -> No
     assert found == reported_changes(log, ZIGZAG)
     equations = WeakForm(SPEED_PROPORTIONAL_RUDDER, len(signals), signals.dt_secs, (1, 1, 1, 1))
     assert ShipChangeTest(equations, model_is_fitted=True).result() == ()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "of_trial", "is_reported"),
+    [
+        ((1.0, 0.1), (1.2, 0.1), (1.1, 0.1), True),
+        ((1.0, 0.1), (1.2, 0.1), (-0.1, 1.0), False),
+        ((0.1, 0.1), (1.2, 0.1), (1.1, 0.1), False),
+        ((1.0, 0.1), (0.1, 0.1), (1.1, 0.1), False),
+    ],
+)
+def test_the_change_of_a_coefficient_that_is_not_determined_is_not_reported(
+    before: tuple[float, float],
+    after: tuple[float, float],
+    of_trial: tuple[float, float],
+    is_reported: bool,
+) -> None:
+    values = before[0], after[0], before[1], after[1]
+    change = Change("g", "1/m", 0.0, 50.0, 100.0, *values, 0.2, 0.1, ())
+    coefficients = {"g": Coefficient(*of_trial, "1/m")}
+    assert bool(determined_changes([change], coefficients)) == is_reported

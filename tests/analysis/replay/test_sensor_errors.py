@@ -14,6 +14,8 @@ from trial_logs import InChunks, as_log
 from analysis.replay.reading_options import ReadingOptions
 from analysis.replay.replay import analyse
 from analysis.replay.replay_results import Analysis
+from analysis.replay.residuals import ResidualSummary
+from analysis.replay.sensor_errors import inconsistency_of
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, UsageError, load_vessel, read
@@ -69,7 +71,7 @@ def test_a_biased_gyro_is_found_and_the_yaw_rate_is_accurate() -> None:
     assert all(residual.consistent for residual in result.findings.residuals[:2])
     gyro, log = result.findings.sensor_errors
     assert (gyro.determined, log.determined) == (True, False)
-    assert str(log) == "speed log bias: not estimated: it takes a turn of half a circle"
+    assert str(log) == "speed log bias: not estimated: it needs a turn of half a circle"
     assert abs(np.degrees(gyro.value) - 0.02) < 2.6 * np.degrees(gyro.std) < 1e-3
 
 
@@ -85,6 +87,34 @@ def test_where_the_innovations_contradict_the_noise_set_nothing_is_determined() 
     gyro, _ = analyse(biased(), wrong_model(), settings=AUTO).findings.sensor_errors
     assert not gyro.determined
     assert "larger than expected: the model or the noise does not fit" in gyro.reason
+
+
+def residual(name: str, mean_nis: float) -> ResidualSummary:
+    return ResidualSummary(name, "", 100, 1.0, mean_nis, (0.9, 1.1), 0.5, 0.0, 1.0, 0)
+
+
+def test_the_remedy_names_the_noise_of_the_output_concerned() -> None:
+    large = [residual(name, 4.0) for name in ("speed", "heading", "north")]
+    fine = [residual(name, 1.0) for name in ("yaw_rate", "east")]
+    stated = inconsistency_of([*fine, *large], (False, False))
+    assert stated.startswith("the innovations of speed and heading and north are larger")
+    assert stated.endswith(
+        "set filter.process_ratio to auto, and state a larger filter.heading_std, and state a"
+        " larger filter.position_std"
+    )
+    heading = inconsistency_of([*fine, large[1]], (False, False))
+    assert "filter.heading_std" in heading
+    assert "position" not in heading
+    assert inconsistency_of(fine, (False, False)) == ""
+
+
+def test_noise_that_the_log_determined_is_not_to_be_determined_by_the_log() -> None:
+    assert "auto" not in inconsistency_of([residual("yaw_rate", 4.0)], (True, False))
+    assert "auto" in inconsistency_of([residual("yaw_rate", 4.0)], (False, True))
+    settings = {"filter.gate": 1.0, "filter.process_ratio": "auto", "filter.kind": "extended"}
+    warnings = [w for w in analyse(biased(), settings=settings).findings.warnings if "gate" in w]
+    assert warnings
+    assert not any("auto" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("kind", ["pseudo-input", "steady-state", "quality", "per-tick"])
@@ -125,10 +155,10 @@ def test_what_the_log_does_not_determine_is_omitted_with_the_reason() -> None:
     assert gyro.determined
     assert not log.determined
     assert str(log) == (
-        "speed log bias: not estimated: it takes positions and a turn of half a circle"
+        "speed log bias: not estimated: it needs positions and a turn of half a circle"
     )
     gyro, log = analyse(without(biased(), "heading"), settings=settings).findings.sensor_errors
-    assert str(gyro) == "gyro bias: not estimated: it takes a heading"
+    assert str(gyro) == "gyro bias: not estimated: it needs a heading"
 
 
 def test_a_biased_speed_log_is_found_with_positions_in_a_turn() -> None:
@@ -205,7 +235,7 @@ REFUSED: dict[str, tuple[Mapping[str, object], tuple[str, ...], str]] = {
     "gyro bias and yaw moment": (
         {"filter.sensor_bias": ["gyro"]},
         ("heading",),
-        "gyro bias and constant yaw moment cannot be distinguished at the mode 0 1/s; it takes a h",
+        "gyro bias and constant yaw moment cannot be distinguished at the mode 0 1/s; it needs a h",
     ),
     "rudder zero and yaw moment": (
         {"filter.sensor_bias": ["rudder"]},
@@ -215,7 +245,7 @@ REFUSED: dict[str, tuple[Mapping[str, object], tuple[str, ...], str]] = {
     "compass bias": (
         {"filter.sensor_bias": ["compass"]},
         ("position",),
-        "compass bias cannot be seen at the mode 0 1/s; it takes positions",
+        "compass bias cannot be seen at the mode 0 1/s; it needs positions",
     ),
     "log bias and surge force": (
         {"filter.sensor_bias": ["log"]},

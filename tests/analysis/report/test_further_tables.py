@@ -72,7 +72,7 @@ def test_a_current_has_set_and_drift(zigzag_analysis: Analysis) -> None:
     findings = with_errors(zigzag_analysis, GYRO, current=CURRENT)
     assert rows_of(findings)["to east"] == ("-1.000", "0.019", "± 0.038", "kn")
     assert rows_of(findings)["drift length"] == ("60.0", "4.0", "± 7.8", "m")
-    assert "Set 270°, drift 1.00 kn" in remarks_of(findings)
+    assert "Set 270° ± 3°, drift 1.000 ± 0.038 kn (95 %), at the end." in remarks_of(findings)
     found = replay_json(findings)["current"]
     assert found["direction"] == pytest.approx(1.5 * np.pi)
     assert found["speed"] == pytest.approx(1852 / 3600)

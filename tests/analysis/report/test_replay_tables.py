@@ -90,3 +90,17 @@ def test_events_are_listed_and_cannot_break_the_page(zigzag_analysis: Analysis) 
     )
     assert "execute \\| 20 starboard |" in replay_markdown(findings)
     assert "## Events" not in replay_markdown(zigzag_analysis.findings)
+
+
+def test_small_innovations_name_the_setting_of_their_output_alone(
+    zigzag_analysis: Analysis,
+) -> None:
+    findings = zigzag_analysis.findings
+    yaw, speed = findings.residuals
+    heading = replace(yaw, name="heading", unit="rad", mean_nis=0.1, nis_band=(0.9, 1.1))
+    further = replace(findings.plan.noise.further, outputs=("compass",), output_stds=(1e-3,))
+    noise = replace(findings.plan.noise, further=further)
+    plan = replace(findings.plan, noise=noise)
+    page = replay_markdown(replace(findings, plan=plan, residuals=(yaw, speed, heading)))
+    assert "change it by filter.heading_std." in page
+    assert "position_std" not in page

@@ -112,6 +112,28 @@ def test_a_wrong_value_is_named(section: str, key: str, value: object, message: 
     assert message in errors_of(section, {key: value})
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "nearest"),
+    [
+        ("filter.sensor_bias", "gyr", "gyro"),
+        ("filter.kind", "ekf", "extended"),
+        ("filter.kind", "extendet", "extended"),
+        ("disturbance.models", ["wav"], "wave"),
+    ],
+)
+def test_an_unknown_name_brings_the_nearest_one(
+    vessel: Vessel, name: str, value: object, nearest: str
+) -> None:
+    with pytest.raises(UsageError, match=f"did you mean '{nearest}'"):
+        with_settings(vessel, {name: value})
+
+
+def test_no_sensor_error_and_some_contradict_each_other(vessel: Vessel) -> None:
+    with pytest.raises(UsageError, match="has none beside gyro; remove one of them"):
+        with_settings(vessel, {"filter.sensor_bias": "none,gyro"})
+    assert with_settings(vessel, {"filter.sensor_bias": "none"}).filter.sensors == ()
+
+
 def test_a_section_that_is_not_a_table_is_reported_with_the_other_errors() -> None:
     with pytest.raises(VesselError, match=r"2 errors.*\[filter\] must be a section"):
         parse_vessel('filter = 3\nlength = "long"\n' + PRESETS["table1"].split("[filter]")[0], "x")
