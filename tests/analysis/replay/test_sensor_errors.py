@@ -250,7 +250,7 @@ REFUSED: dict[str, tuple[Mapping[str, object], tuple[str, ...], str]] = {
     "log bias and surge force": (
         {"filter.sensor_bias": ["log"]},
         ("position",),
-        "speed log bias and constant surge force cannot be distinguished at the mode 0 1/s; it t",
+        "speed log bias and constant surge force cannot be distinguished at the mode 0 1/s; it n",
     ),
 }
 
