@@ -1,23 +1,22 @@
-"""The loop that writes a source of samples to a log, safe against crashes and Ctrl-C."""
+"""The loop that writes a source of samples to a log, safe against crashes and signals."""
 
 import os
 import re
-import signal
-import threading
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
-from itertools import chain
 from pathlib import Path
 
 from shiplog.errors import ShiplogError
-from shiplog.files import is_device, write_error
+from shiplog.files import claimed_name, is_device, replace_durably, write_error
+from shiplog.interrupts import deferred, handled_signals, interruptible, take_waiting
 from shiplog.mcap.writer import LogWriter
 from shiplog.types import Channel, Event
 
+from .disk_sync import SYNC_SECS, DiskSync
 from .source import Recordable, Source
 
 _PART = ".part"  # appended to the name of a file that grows
@@ -34,7 +33,7 @@ class Recording:
     channels
         The number of channels written.
     interrupted
-        Whether Ctrl-C ended the recording.
+        Whether a signal, such as that of Ctrl-C, ended the recording.
     files
         The logs written, in the order of time.
     dropped
@@ -76,15 +75,18 @@ def record(
     *,
     rotation: Rotation | None = None,
     overwrites: bool = True,
+    sync_secs: float = SYNC_SECS,
     on_chunk: Callable[[int], None] = lambda _: None,
 ) -> Recording:
     """Write everything that a source yields to a log: samples, raw packets and events.
 
     While recording, the log grows beside its final name with ``.part`` appended, readable up to the
-    last chunk even if the process is killed. Ctrl-C ends the recording and keeps the log. If the
-    source fails or the disk is full, what was received until then stays in the ``.part`` file, and
-    the error names it; an older file at `path` is not changed. However the recording ends, the
-    metadata of the source that have changed since its beginning are written then.
+    last chunk even if the process is killed, and up to the last synchronisation with the disk if
+    the power fails. SIGINT, SIGTERM and SIGHUP end the recording between chunks and keep the log,
+    also where Python alone would not handle them. If the source fails or the disk is full, what was
+    received until then stays in the ``.part`` file, and the error names it; an older file at `path`
+    is not changed. However the recording ends, the metadata of the source that have changed since
+    its beginning are written then.
 
     Parameters
     ----------
@@ -97,22 +99,27 @@ def record(
         When to go on in a new file. The files are then named ``trial.001.mcap`` and so on.
     overwrites
         Whether the complete recording replaces an older log of its name.
+    sync_secs
+        How often what was written is forced to the disk, s.
     on_chunk
         Called after each chunk with the number of samples written so far.
 
     Raises
     ------
     ShiplogError
-        The file cannot be written, an unfinished recording or a log that is not to be replaced lies
-        there, or the source failed.
+        The file cannot be written, another process is writing it, an unfinished recording or a log
+        that is not to be replaced lies there, or the source failed.
     """
-    _require_free(Path(path), rotation, overwrites=overwrites)
-    chunks = source.chunks()
-    try:
-        return _record_files(source, chunks, Path(path), rotation, overwrites, on_chunk)
-    finally:
-        if isinstance(chunks, Generator):
-            chunks.close()  # stops the readers of live streams
+    path = Path(path)
+    with handled_signals(), deferred(), claimed_name(path):
+        _require_free(path, rotation, overwrites=overwrites)
+        chunks = source.chunks()
+        files = _Files(path, rotation, sync_secs, overwrites=overwrites)
+        try:
+            return _record_files(source, chunks, files, on_chunk)
+        finally:
+            if isinstance(chunks, Generator):
+                chunks.close()  # stops the readers of live streams
 
 
 def growing_file(path: Path, rotation: Rotation | None) -> Path:
@@ -150,32 +157,70 @@ def _files_of(path: Path, rotation: Rotation | None) -> list[Path]:
 
 def _unfinished(part: Path) -> ShiplogError:
     return ShiplogError(
-        "an unfinished recording lies there, or another recorder is writing it; rescue it with "
-        f"`shiplog convert`, or delete it: {part}"
+        "an unfinished recording lies there; rescue it with `shiplog convert`, or delete it: "
+        f"{part}"
     )
+
+
+@dataclass(frozen=True)
+class _Files:
+    """Where a recording is written, and how.
+
+    Attributes
+    ----------
+    path
+        The log.
+    rotation
+        When to go on in a new file; None for never.
+    sync_secs
+        How often the files are forced to the disk, s.
+    overwrites
+        Whether they replace older ones.
+    """
+
+    path: Path
+    rotation: Rotation | None
+    sync_secs: float
+    overwrites: bool
+
+    def final(self, number: int) -> Path:
+        """Return the final name of a file, by its number from 1 on."""
+        if self.rotation is None:
+            return self.path
+        return self.path.with_name(f"{self.path.stem}.{number:03}{self.path.suffix}")
 
 
 def _record_files(
     source: Source,
     chunks: Iterator[tuple[Recordable, ...]],
-    path: Path,
-    rotation: Rotation | None,
-    overwrites: bool,
+    files: _Files,
     on_chunk: Callable[[int], None],
 ) -> Recording:
     """Write one file after the other until the source ends."""
-    topics, files, samples = set[str](), list[Path](), 0
+    topics, finals, samples = set[str](), list[Path](), 0
+    first: tuple[Recordable, ...] | None = None
     while True:
-        final = path if rotation is None else _numbered(path, len(files) + 1)
-        part = _RecordedPart(source, final, rotation, overwrites=overwrites)
-        end = part.write(chunks, partial(_report, on_chunk, samples))
+        final = files.final(len(finals) + 1)
+        part = _RecordedPart(source, final, files)
+        end = part.write(first, chunks, partial(_report, on_chunk, samples))
         topics |= part.topics
         samples += part.samples
-        files.append(final)
-        following = next(chunks, None) if end is _End.ROTATED else None
-        if following is None:
-            return Recording(samples, len(topics), end is _End.INTERRUPTED, tuple(files))
-        chunks = chain([following], chunks)
+        finals.append(final)
+        first = None
+        if end is _End.ROTATED:
+            try:
+                first = _next_chunk(chunks)
+            except KeyboardInterrupt:
+                end = _End.INTERRUPTED
+        if first is None:
+            interrupted = take_waiting() or end is _End.INTERRUPTED
+            return Recording(samples, len(topics), interrupted, tuple(finals))
+
+
+def _next_chunk(chunks: Iterator[tuple[Recordable, ...]]) -> tuple[Recordable, ...] | None:
+    """Return the next chunk of a source, None at its end; a signal is raised here."""
+    with interruptible():
+        return next(chunks, None)
 
 
 def _report(on_chunk: Callable[[int], None], before: int, samples: int) -> None:
@@ -191,50 +236,63 @@ class _End(Enum):
     ROTATED = "rotated"
 
 
-def _numbered(path: Path, number: int) -> Path:
-    return path.with_name(f"{path.stem}.{number:03}{path.suffix}")
-
-
 class _RecordedPart:
     """One file of a recording."""
 
-    def __init__(
-        self, source: Source, final: Path, rotation: Rotation | None, *, overwrites: bool
-    ) -> None:
-        self._source, self._final = source, final
-        self._rotation = rotation or Rotation()
-        self._overwrites = overwrites
+    def __init__(self, source: Source, final: Path, files: _Files) -> None:
+        self._source, self._final, self._files = source, final, files
+        self._rotation = files.rotation or Rotation()
         self._part = final if is_device(final) else final.with_name(final.name + _PART)
         self._has_data = False  # samples or raw packets: a log of events alone is worth nothing
         self.topics = set[str]()
         self.samples = 0
 
     def write(
-        self, chunks: Iterator[tuple[Recordable, ...]], on_chunk: Callable[[int], None]
+        self,
+        first: tuple[Recordable, ...] | None,
+        chunks: Iterator[tuple[Recordable, ...]],
+        on_chunk: Callable[[int], None],
     ) -> _End:
-        """Write chunks until something ends the file, and give it its final name."""
-        self._claim()
+        """Write chunks until something ends the file, and give it its final name.
+
+        Parameters
+        ----------
+        first
+            The chunk that is written before the others; None where they are all.
+        chunks
+            The chunks of the source.
+        on_chunk
+            Called after each with the number of samples in this file.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            A signal came before there was anything to keep; no file is left.
+        """
+        self._create()
         writer = LogWriter(
             self._part, metadata=self._source.metadata, vessel_toml=self._source.vessel_toml
         )
         try:
-            end = self._write_all(writer, chunks, on_chunk)
+            end = self._write_all(writer, first, chunks, on_chunk)
         except KeyboardInterrupt:  # the file is complete
+            if not self._has_data:
+                self._delete()
+                raise
             end = _End.INTERRUPTED
         except ShiplogError as error:
             if self._has_data:
                 message = f"{error}; the {writer.samples} samples until then are in {self._part}"
                 raise ShiplogError(message) from error
-            if self._part != self._final:
-                self._part.unlink(missing_ok=True)
+            self._delete()
             raise
         if self._part != self._final:
             self._rename()
         self.samples = writer.samples
         return end
 
-    def _claim(self) -> None:
-        """Create the file that grows, which no other recorder may be writing."""
+    def _create(self) -> None:
+        """Create the file that grows."""
         if self._part == self._final:
             return
         try:
@@ -244,49 +302,64 @@ class _RecordedPart:
         except OSError as error:
             raise write_error(self._final, error) from error
 
+    def _delete(self) -> None:
+        """Delete the file that grows, which holds nothing."""
+        if self._part != self._final:
+            self._part.unlink(missing_ok=True)
+
     def _write_all(
         self,
         writer: LogWriter,
+        first: tuple[Recordable, ...] | None,
         chunks: Iterator[tuple[Recordable, ...]],
         on_chunk: Callable[[int], None],
     ) -> _End:
         """Write chunks, and whatever ends them, the metadata of the end."""
         try:
-            return self._write_chunks(writer, chunks, on_chunk)
+            with DiskSync(self._part, self._files.sync_secs) as disk:
+                return self._write_chunks(writer, disk, first, chunks, on_chunk)
         finally:
-            with _write_errors(), _uninterrupted(), writer:
+            with _write_errors(), writer:
                 # those that have changed, such as counts of rejected packets
                 writer.update_metadata(self._source.metadata)
 
     def _write_chunks(
         self,
         writer: LogWriter,
+        disk: DiskSync,
+        first: tuple[Recordable, ...] | None,
         chunks: Iterator[tuple[Recordable, ...]],
         on_chunk: Callable[[int], None],
     ) -> _End:
         opened = time.monotonic()
-        for chunk in chunks:
+        chunk = _next_chunk(chunks) if first is None else first
+        while chunk is not None:
             self._has_data |= any(len(item) for item in chunk if not isinstance(item, Event))
-            with _write_errors(), _uninterrupted():
+            with _write_errors():
                 writer.write(*chunk)
                 writer.flush()
+                disk.check()
                 size = self._part.stat().st_size  # fails, too, where the file was deleted
             self.topics.update(item.topic for item in chunk if isinstance(item, Channel))
-            on_chunk(writer.samples)
+            with interruptible():
+                on_chunk(writer.samples)
             if self._rotation.is_due(time.monotonic() - opened, size):
                 return _End.ROTATED
+            chunk = _next_chunk(chunks)
         return _End.SOURCE
 
     def _rename(self) -> None:
         """Give the complete file its final name."""
-        if self._final.exists() and not self._overwrites:
+        if self._final.exists() and not self._files.overwrites:
             raise ShiplogError(
                 f"a file of the log's name has appeared; the recording is complete in {self._part}"
             )
         try:
-            self._part.replace(self._final)
+            replace_durably(self._part, self._final)
         except OSError as error:
-            raise write_error(self._final, error) from error
+            raise ShiplogError(
+                f"cannot write: {error.strerror or error}; the recording is in {self._part}"
+            ) from error
 
 
 @contextmanager
@@ -298,19 +371,3 @@ def _write_errors() -> Iterator[None]:
         raise
     except OSError as error:
         raise ShiplogError(f"cannot write: {error.strerror or error}") from error
-
-
-@contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """Delay Ctrl-C to the end of the block: a write that it interrupts would damage the file."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    pressed: list[int] = []
-    previous = signal.signal(signal.SIGINT, lambda number, _frame: pressed.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)
-        if pressed:
-            signal.raise_signal(signal.SIGINT)

@@ -10,6 +10,8 @@ The package `analysis` builds on this one: state estimation, disturbances, ident
 The package `recorders` writes logs from sensors and simulations. ``shiplog --help`` lists the
 verbs.
 
+The names are imported when they are first used, so that ``import shiplog`` costs nothing.
+
 >>> import shiplog
 >>> log = shiplog.read("sample_data/zigzag_20_20.mcap")
 >>> log["yaw_rate"]
@@ -19,17 +21,44 @@ Channel(/yaw_rate/simulated [rad/s], 6001 samples)
 (1201,)
 """
 
-from shiplog.mcap.reader import read
-from shiplog.mcap.stream import LogFile, open_log
-from shiplog.mcap.writer import LogWriter, write
-from shiplog.vessel.vessel import Vessel
-from shiplog.vessel.vessel_parser import load_vessel
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-from .errors import LayoutError, LogError, ShiplogError, UsageError, VesselError
-from .progress import ProgressCallback
-from .resampling import Clock, resample
-from .types import Channel, Log, Signals, TrialLog
 from .version import __version__
+
+if TYPE_CHECKING:
+    from shiplog.mcap.reader import read
+    from shiplog.mcap.stream import LogFile, open_log
+    from shiplog.mcap.writer import LogWriter, write
+    from shiplog.vessel.vessel import Vessel
+    from shiplog.vessel.vessel_parser import load_vessel
+
+    from .errors import LayoutError, LogError, ShiplogError, UsageError, VesselError
+    from .progress import ProgressCallback
+    from .resampling import Clock, resample
+    from .types import Channel, Log, Signals, TrialLog
+
+_MODULES = {
+    "Channel": "types",
+    "Clock": "resampling",
+    "LayoutError": "errors",
+    "Log": "types",
+    "LogError": "errors",
+    "LogFile": "mcap.stream",
+    "LogWriter": "mcap.writer",
+    "ProgressCallback": "progress",
+    "ShiplogError": "errors",
+    "Signals": "types",
+    "TrialLog": "types",
+    "UsageError": "errors",
+    "Vessel": "vessel.vessel",
+    "VesselError": "errors",
+    "load_vessel": "vessel.vessel_parser",
+    "open_log": "mcap.stream",
+    "read": "mcap.reader",
+    "resample": "resampling",
+    "write": "mcap.writer",
+}
 
 __all__ = [
     "Channel",
@@ -53,3 +82,14 @@ __all__ = [
     "resample",
     "write",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name on its first use."""
+    if name not in _MODULES:
+        raise AttributeError(f"module 'shiplog' has no attribute {name!r}")
+    return getattr(import_module(f".{_MODULES[name]}", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from recorders.streams.format import StreamFormat
 from recorders.streams.reception_clock import ReceptionClock
-from recorders.trial.live_source import LiveInput, LiveSource, stopped_by_signals
+from recorders.trial.live_source import LiveInput, LiveSource
 from recorders.trial.open_source import (
     StreamRequest,
     open_streams,
@@ -19,6 +19,7 @@ from recorders.trial.undecoded import why_undecoded
 from shiplog.cli.console import print_tables
 from shiplog.cli.verb import ExitCode
 from shiplog.errors import UsageError
+from shiplog.interrupts import stopped_by_signals
 from shiplog.text_table import TextTable
 
 from .live_display import rate_in_words, value_in_words

@@ -16,7 +16,7 @@ from shiplog.cli.paths import require_outputs, require_suffix
 from shiplog.cli.verb import ExitCode, Verb
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import extension_names, load_extension
-from shiplog.files import is_device
+from shiplog.files import claimed_name, is_device
 
 GROUP = "shiplog.recorders"
 TRIAL = "trial"  # the source that `record FILE.toml` is short for
@@ -155,7 +155,8 @@ def _record(arguments: argparse.Namespace) -> ExitCode:
         file=sys.stderr if is_device(first) else sys.stdout,
     )
     if recording.interrupted:
-        print("interrupted: the log ends there", file=sys.stderr)
+        print("interrupted: the log is whole, and ends there", file=sys.stderr)
+        return ExitCode.INTERRUPTED
     if not recording.samples:
         print("shiplog: no sample was recorded; the events of the log state why", file=sys.stderr)
         return ExitCode.FAILURE
@@ -186,17 +187,24 @@ def _recorded(arguments: argparse.Namespace) -> Recording:
 
 
 def _record_command(command: RecorderCommand[Any], arguments: argparse.Namespace) -> Recording:
-    """Open the source of a recorder and write it to the log."""
-    source = command.open(arguments)
-    from recorders.record import record
+    """Open the source of a recorder and write it to the log.
 
-    with progress() as on_progress:
-        on_progress("write")
-        recording = record(
-            source, arguments.output, on_chunk=lambda n: on_progress(f"write: {n} samples")
-        )
-        if not recording.interrupted:
-            command.finish(arguments, source)
+    The name is claimed before: of two processes started together, the slower one would otherwise
+    replace the other's log.
+    """
+    if arguments.output is None:  # the source could not be loaded
+        command.open(arguments)
+    with claimed_name(arguments.output):
+        source = command.open(arguments)
+        from recorders.record import record
+
+        with progress() as on_progress:
+            on_progress("write")
+            recording = record(
+                source, arguments.output, on_chunk=lambda n: on_progress(f"write: {n} samples")
+            )
+            if not recording.interrupted:
+                command.finish(arguments, source)
     return recording
 
 

@@ -13,7 +13,7 @@ from recorders.record import Recording, Rotation, growing_file, record
 from recorders.streams.format import StreamFormat
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.streams.stream_source import StreamSource
-from recorders.trial.live_source import LiveSource, stopped_by_signals
+from recorders.trial.live_source import LiveSource
 from recorders.trial.marks import MarkListener
 from recorders.trial.open_source import (
     StreamRequest,
@@ -29,6 +29,7 @@ from shiplog.cli.console import print_tables, print_warnings, progress
 from shiplog.cli.paths import require_outputs, require_suffix
 from shiplog.errors import UsageError
 from shiplog.files import is_device
+from shiplog.interrupts import stopped_by_signals
 from shiplog.types import Event
 
 from .live_display import MarkKey, Shown, live_display

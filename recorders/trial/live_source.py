@@ -1,12 +1,8 @@
 """Live streams joined to one source of samples."""
 
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from types import FrameType
 
 from recorders.source import Recordable
 from recorders.streams.packets import Batches
@@ -142,35 +138,3 @@ class LiveSource:
             "the times of this log run on steadily"
         )
         return [Event(now_ns, text, "recorder", EventLevel.WARNING)]
-
-
-@contextmanager
-def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Call `stop` at the first SIGINT, SIGTERM or SIGHUP, so that a recording ends between chunks.
-
-    The second signal has its usual effect. A SIGHUP that is ignored, as by ``nohup``, stays so.
-    Outside of the main thread, where Python handles no signals, this does nothing.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    names = ("SIGINT", "SIGTERM", "SIGHUP")  # the last one is not on all systems
-    previous = {s: signal.getsignal(s) for s in (getattr(signal, n, None) for n in names) if s}
-    hangup = getattr(signal, "SIGHUP", None)
-    if hangup and previous[hangup] == signal.SIG_IGN:
-        del previous[hangup]
-
-    def on_signal(_number: int, _frame: FrameType | None) -> None:
-        stop()
-        restore()
-
-    def restore() -> None:
-        for number, handler in previous.items():
-            signal.signal(number, handler)
-
-    for number in previous:
-        signal.signal(number, on_signal)
-    try:
-        yield
-    finally:
-        restore()

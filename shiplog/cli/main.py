@@ -16,6 +16,7 @@ from types import ModuleType
 
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import declared_entries, extension_names, load_extension
+from shiplog.interrupts import deferred, handled_signals, interruptible, take_signals
 from shiplog.printable import printable
 from shiplog.version import __version__
 
@@ -48,32 +49,44 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         An `ExitCode`. Errors of the input are reported in one line on stderr.
     """
-    is_process = arguments is None
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    if arguments is None:
+        take_signals()
+        return _run(sys.argv[1:], is_process=True)
+    with handled_signals(), deferred():
+        return _run(list(arguments), is_process=False)
+
+
+def _run(arguments: list[str], *, is_process: bool) -> int:
+    """Run one verb, and report what ends it other than its own end."""
     try:
-        parser = _parser(arguments)
-        parsed = parser.parse_args(_expanded(arguments))
-        if "verb" not in parsed:
-            parser.print_help(sys.stderr)
-            return ExitCode.USAGE
-        verb: Verb = parsed.verb
-        if is_process:
-            _prepare_process(verb)
-        code = verb.run(parsed)
-        sys.stdout.flush()
-        if is_process:
-            gc.freeze()  # the end of the process, too, would search all modules for garbage
+        with interruptible():
+            return _run_verb(arguments, is_process=is_process)
     except UsageError as error:
-        code = _fail(error, ExitCode.USAGE)
+        return _fail(error, ExitCode.USAGE)
     except ShiplogError as error:
-        code = _fail(error, ExitCode.FAILURE)
+        return _fail(error, ExitCode.FAILURE)
     except BrokenPipeError:  # the reader of our output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = ExitCode.OK
+        return ExitCode.OK
     except OSError as error:
-        code = _fail(f"cannot write the output: {error.strerror or error}", ExitCode.FAILURE)
+        return _fail(f"cannot write the output: {error.strerror or error}", ExitCode.FAILURE)
     except KeyboardInterrupt:
-        code = _fail("interrupted; no output is incomplete", ExitCode.FAILURE)
+        return _fail("interrupted; no output is incomplete", ExitCode.INTERRUPTED)
+
+
+def _run_verb(arguments: list[str], *, is_process: bool) -> int:
+    parser = _parser(arguments)
+    parsed = parser.parse_args(_expanded(arguments))
+    if "verb" not in parsed:
+        parser.print_help(sys.stderr)
+        return ExitCode.USAGE
+    verb: Verb = parsed.verb
+    if is_process:
+        _prepare_process(verb)
+    code = verb.run(parsed)
+    sys.stdout.flush()
+    if is_process:
+        gc.freeze()  # the end of the process, too, would search all modules for garbage
     return code
 
 

@@ -13,6 +13,7 @@ class ExitCode(IntEnum):
     FAILURE = 1
     USAGE = 2  # the command line or a setting is wrong
     DATA_LOST = 3  # finished, but a part of the input could not be read
+    INTERRUPTED = 4  # by a signal: a recording is whole to there, of other work nothing is left
 
 
 @dataclass(frozen=True)

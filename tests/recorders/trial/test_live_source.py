@@ -1,6 +1,5 @@
 """Tests of recorders.trial.live_source, over loopback and with clocks that are set by hand."""
 
-import signal
 import socket
 import threading
 import time
@@ -13,7 +12,7 @@ from recorders.streams.packets import Packet
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.streams.stream_options import parse_options
 from recorders.trial import live_source
-from recorders.trial.live_source import LiveSource, stopped_by_signals
+from recorders.trial.live_source import LiveSource
 from recorders.trial.open_source import StreamRequest, open_streams
 from recorders.trial.recorded_source import RecordedSource
 from shiplog.types import Channel, Event, RawPackets
@@ -144,26 +143,6 @@ def test_the_end_of_all_sources_ends_the_recording_and_loses_no_packet(
             counts[item.source] += len(item)
     assert counts == {"s0.N": 10, "s1.N": 20}
     assert [i.text for i in items if isinstance(i, Event)].count("the source has ended") == 2
-
-
-def test_a_hangup_that_is_ignored_stays_ignored() -> None:
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        with stopped_by_signals(lambda: None):
-            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
-            assert signal.getsignal(signal.SIGTERM) != signal.SIG_DFL
-    finally:
-        signal.signal(signal.SIGHUP, before)
-
-
-def test_the_second_signal_has_its_usual_effect() -> None:
-    stops: list[bool] = []
-    with stopped_by_signals(lambda: stops.append(True)):
-        signal.raise_signal(signal.SIGINT)
-        assert stops == [True]
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-    assert stops == [True]
 
 
 def test_a_silent_source_yields_empty_chunks_so_that_displays_and_rotations_go_on() -> None:
