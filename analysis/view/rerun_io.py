@@ -3,19 +3,21 @@
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from shiplog.errors import ShiplogError
-from shiplog.files import atomic_write
+from shiplog.files import atomic_write, is_device
 from shiplog.types import Event, EventLevel, FloatArray
 
 from .panels import Panel
 from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Series
 from .track_chart import TrackChart
 
+RRD_MAGIC, FOOTER_MAGIC, FOOTER_BYTES = b"RRF2", b"RRF2FOOT", 32
 MAX_ROWS = 1 << 16  # sent at once
 EVENT_LEVELS = {EventLevel.INFO: "INFO", EventLevel.WARNING: "WARN", EventLevel.ERROR: "ERROR"}
 WHOLE_RUN = rrb.TimeAxis(
@@ -41,11 +43,25 @@ def save_recording(recording: rr.RecordingStream, path: str | os.PathLike[str]) 
             recording.save(part)
             yield
         except RuntimeError as error:  # raised by Rerun where the disk is full
-            raise ShiplogError(
-                f"cannot write the review to the end; is the disk full? {path}"
-            ) from error
+            raise _unfinished(path) from error
         finally:
             recording.disconnect()
+        if not _is_complete(part):  # Rerun raises nothing where its last write has failed
+            raise _unfinished(path)
+
+
+def _unfinished(path: str | os.PathLike[str]) -> ShiplogError:
+    return ShiplogError(f"cannot write the review to the end; is the disk full? {path}")
+
+
+def _is_complete(path: Path) -> bool:
+    """Whether an .rrd file of Rerun's second format ends with a footer; a pipe cannot be read."""
+    if is_device(path):
+        return True
+    with path.open("rb") as stream:
+        has_footer = stream.read(len(RRD_MAGIC)) == RRD_MAGIC
+        stream.seek(-min(path.stat().st_size, FOOTER_BYTES), os.SEEK_END)
+        return not has_footer or FOOTER_MAGIC in stream.read()
 
 
 def send_style(recording: rr.RecordingStream, entity: str, series: Series) -> None:
