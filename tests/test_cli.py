@@ -182,7 +182,7 @@ def test_a_damaged_log_is_replayed_and_lost_data_are_reported(
             end_mcap_chunk(writer)
     writer.close()
     data = bytearray(Path("bad.mcap").read_bytes())
-    data[len(data) // 2] ^= 0x10
+    data[len(data) // 2] ^= 0x14
     Path("bad.mcap").write_bytes(data)
     assert main(["replay", "bad.mcap"]) == DATA_LOST
     assert "damaged" in capsys.readouterr().err
@@ -378,7 +378,7 @@ def test_damage_is_reported_even_if_the_replay_then_fails(
     recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data = bytearray(recorded.read_bytes())
-    data[len(data) // 2] ^= 0x10
+    data[len(data) // 2] ^= 0x14
     Path("bad.mcap").write_bytes(data)
     code = main(["replay", "bad.mcap"])
     lines = capsys.readouterr().err.split("\n")

@@ -11,11 +11,12 @@ from mcap import records
 from shiplog.mcap.clock_repair import mixed_times_in
 from shiplog.mcap.contents import McapContents, MessageCount
 from shiplog.mcap.decode import is_events, is_foreign, is_raw, schema_of
+from shiplog.mcap.mcap_file import open_mcap
 from shiplog.mcap.raw_reader import raw_source
-from shiplog.mcap.reader import open_mcap, read, sample_count
+from shiplog.mcap.reader import read, sample_count
 from shiplog.mcap.scan import scan
 from shiplog.mcap.stream import open_log
-from shiplog.mcap.summary import McapSummary, read_summary
+from shiplog.mcap.summary import McapSummary
 from shiplog.mcap.trial_log import build_trial_log
 from shiplog.types import Channel, Event, Log, TrialLog
 from shiplog.units import CATALOGUE, GEOGRAPHIC, display_conversion
@@ -62,15 +63,15 @@ def read_log_info(
     """
     path = Path(path)
     contents = McapContents()
-    with open_mcap(path) as stream:
-        summary = read_summary(stream)
+    with open_mcap(path) as file:
+        summary = None if file.check.is_intact is False else file.check.summary
         if summary and sample_count(summary) > MAX_MESSAGES_TO_READ:
             if start is None and end is None:
                 return _info_of_summary(path, summary)
             log = open_log(path, start, end)
             others = _foreign_in_summary(summary), _raw_in_summary(summary)
             return _info_of_log(log, *others, finished=True)
-        for _ in scan(stream, contents):
+        for _ in scan(file, contents):
             pass
     log = build_trial_log(path, contents).between(start, end)
     mixed = mixed_times_in(contents.mixed_times, log.span_ns)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shiplog.types import Event, FloatArray, TimeArray
 
 from .clock_repair import MixedTimes
+from .damage import Damage
 from .locate import Offsets, record_sizes
 from .pauses import Pauses
 from .records import MESSAGE_HEAD
@@ -141,7 +142,11 @@ class McapContents:
     truncated
         Whether an unfinished file ends within a record.
     damage
-        One warning for each damaged part.
+        The damaged parts so far.
+    reading
+        The offsets, start and end, of the record that is being read.
+    mcap_chunks_read
+        The offsets of the MCAP chunks read so far, by their heads.
     data_blocks
         The number of MCAP chunks, and runs of messages outside of them, read so far.
     clock_warnings
@@ -173,7 +178,9 @@ class McapContents:
     latest_ns: int = 0
     finished: bool = False
     truncated: bool = False
-    damage: list[str] = field(default_factory=list)
+    damage: list[Damage] = field(default_factory=list)
+    reading: tuple[int, int] = (0, 0)
+    mcap_chunks_read: dict[bytes, int] = field(default_factory=dict)
     data_blocks: int = 0
     clock_warnings: list[str] = field(default_factory=list)
     mixed_times: list[MixedTimes] = field(default_factory=list)
@@ -183,3 +190,7 @@ class McapContents:
         """Return the blocks collected so far, by channel id, and release them."""
         blocks, self.blocks, self.pending_samples = self.blocks, {}, 0
         return blocks
+
+    def report(self, text: str) -> None:
+        """Report damage in the record that is being read, by which something is lost."""
+        self.damage.append(Damage(*self.reading, text))

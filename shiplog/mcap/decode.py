@@ -17,6 +17,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from .contents import EventMessage, McapContents, MessageCount, RawBlock, SampleBlock
+from .limits import MAX_DESCRIPTION_BYTES
 from .locate import (
     Offsets,
     complete_records,
@@ -25,6 +26,8 @@ from .locate import (
     locate_by_size,
     record_sizes,
 )
+from .metadata_record import read_metadata
+from .record_structure import content_size, read_attachment
 from .records import MESSAGE_HEAD, RECORD_HEAD
 from .schema import (
     ENCODING,
@@ -90,15 +93,15 @@ def collect_undescribed(contents: McapContents) -> None:
         count for channel_id, count in counts.items() if not _is_described(channel_id, contents)
     )
     if lost:
-        contents.damage.append(f"lost {lost} samples: the description of their channel is damaged")
+        contents.report(f"lost {lost} samples: the description of their channel is damaged")
 
 
 def read_record(opcode: int, content: bytes, contents: McapContents) -> None:
     """Add a record other than a message to the contents; report it if it is damaged."""
     try:
-        _read_record(opcode, ReadDataStream(BytesIO(content)), contents)
+        _read_record(opcode, content, contents)
     except MALFORMED as error:
-        contents.damage.append(f"skipped a damaged record: {error}")
+        contents.report(f"a record was not used: {str(error) or 'it cannot be read'}")
 
 
 def schema_of(channel: records.Channel, schemas: Mapping[int, records.Schema]) -> Schema | None:
@@ -128,21 +131,25 @@ def _schema_name(channel: records.Channel, schemas: Mapping[int, records.Schema]
     return schema.name if schema and channel.message_encoding == ENCODING else ""
 
 
-def _read_record(opcode: int, stream: ReadDataStream, contents: McapContents) -> None:
-    if opcode == Opcode.SCHEMA:
-        schema = records.Schema.read(stream)
-        contents.schemas.setdefault(schema.id, schema)
-    elif opcode == Opcode.CHANNEL:
-        channel = records.Channel.read(stream)
-        contents.channels.setdefault(channel.id, channel)
+def _read_record(opcode: int, content: bytes, contents: McapContents) -> None:
+    if opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
+        if len(content) > MAX_DESCRIPTION_BYTES or content_size(opcode, content) is None:
+            raise ValueError("the fields of a description are longer than it, or than any of a log")
+        stream = ReadDataStream(BytesIO(content))
+        if opcode == Opcode.SCHEMA:
+            schema = records.Schema.read(stream)
+            contents.schemas.setdefault(schema.id, schema)
+        else:
+            channel = records.Channel.read(stream)
+            contents.channels.setdefault(channel.id, channel)
     elif opcode == Opcode.METADATA:
-        metadata = records.Metadata.read(stream)
+        metadata = read_metadata(content)
         if metadata.name == METADATA_NAME:
             contents.metadata.update(metadata.metadata)
         else:
             contents.foreign_records[f"metadata {metadata.name!r}"] = None
     elif opcode == Opcode.ATTACHMENT:
-        attachment = records.Attachment.read(stream)
+        attachment = read_attachment(content)
         if attachment.name == VESSEL_ATTACHMENT:
             contents.vessel_toml = attachment.data.decode()
         else:

@@ -10,7 +10,7 @@ from shiplog.errors import LogError
 from shiplog.types import RawPackets
 
 from .contents import McapContents, RawBlock
-from .reader import open_mcap
+from .mcap_file import open_mcap
 from .scan import scan
 from .schema import RAW, RAW_NAME
 from .serialised import packet_of
@@ -46,8 +46,8 @@ def raw_groups(path: str | os.PathLike[str]) -> Iterator[list[RawPackets]]:
     """Read raw packets as `read_raw` does, those of all sources in one MCAP chunk together."""
     path = Path(path)
     contents = McapContents(selected=frozenset(), keep_raw=True)
-    with open_mcap(path) as stream:
-        for _ in scan(stream, contents):
+    with open_mcap(path) as file:
+        for _ in scan(file, contents):
             blocks, contents.raw_blocks = contents.raw_blocks, []
             contents.event_messages.clear()
             if blocks:

@@ -1,24 +1,24 @@
 """Reading of an MCAP file, or a part of it, into memory."""
 
 import os
-from collections.abc import Collection, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
-from shiplog.errors import LogError, UsageError
+from shiplog.errors import UsageError
 from shiplog.types import TimeArray, TrialLog
 
 from .clock_repair import MixedTimes, refuse_mixed_times
 from .contents import McapContents
+from .damage import Damage
 from .decode import is_events, schema_of
 from .index_times import received_in_order
-from .records import MAGIC
+from .mcap_file import McapFile, open_mcap
 from .scan import scan
-from .summary import McapChunkLocation, McapSummary, are_in_order, read_summary
+from .schema import EVENTS_TOPIC
+from .summary import McapChunkLocation, McapSummary, are_in_order
 from .times_check import TimesCheck
 from .trial_log import build_trial_log, channels_by_id, merge_by_topic
 
@@ -90,10 +90,10 @@ def read(
     -------
     log
         The trial. Where a part was requested, MCAP chunks that contain nothing of it according to
-        the summary of the file are not read: damage in them is not noticed, and the checksum of the
-        data section is not verified. Their message indexes, and the MCAP chunks at the ends of the
-        file, show whether times need a repair; such a file, and one without a summary, is read
-        whole, so that the part has the times that it has in the whole log.
+        the summary of the file are not decompressed. Their message indexes, and the MCAP chunks at
+        the ends of the file, show whether times need a repair; such a file, one whose data section
+        has a wrong checksum, and one without a summary, is read whole, so that the part is the one
+        that the whole log has.
 
     Raises
     ------
@@ -138,87 +138,58 @@ def read_unchecked(
         )
     span = ReceptionSpan(start_ns, end_ns)
     is_part = keys is not None or span != ReceptionSpan()
-    with open_mcap(path) as stream:
-        contents = _contents_of_part(path, stream, keys, span) if is_part else None
+    with open_mcap(path) as file:
+        contents = _contents_of_part(file, keys, span) if is_part else None
         if contents is None:
             contents = McapContents()
-            for _ in scan(stream, contents):
+            for _ in scan(file, contents):
                 pass
+            contents.damage = [each for each in contents.damage if _concerns(each, keys, span)]
     log = build_trial_log(path, contents)
     return _selected_part(log, keys, span) if is_part else log, contents.mixed_times
 
 
 def _contents_of_part(
-    path: Path, stream: IO[bytes], keys: Collection[str] | None, span: ReceptionSpan
+    file: McapFile, keys: Collection[str] | None, span: ReceptionSpan
 ) -> McapContents | None:
     """Return the contents of the MCAP chunks that have something of a part.
 
-    None where the summary does not describe them, or where some times may need a repair: what is
-    repaired depends on the whole file.
+    None where the file is damaged, where the summary does not describe them, or where some times
+    may need a repair: what is repaired depends on the whole file.
     """
-    summary = read_summary(stream)
-    if summary is None:
+    summary = file.check.summary
+    if summary is None or file.check.is_intact is False:
         return None
     contents = contents_described_by(summary)
-    contents.selected = _selected_ids(path, contents, keys)
+    contents.selected = _selected_ids(file.path, contents, keys)
     mcap_chunks = summary.mcap_chunk_locations() or ()
     skip = _mcap_chunks_to_skip(mcap_chunks, contents.selected, span)
-    if not skip or not received_in_order(stream, summary):
+    if not skip or not received_in_order(file.stream, summary):
         return None
     check = TimesCheck()
     offsets = frozenset(mcap_chunk.offset for mcap_chunk in mcap_chunks)
     first, last = min(offsets), max(offsets)
-    _check_skipped(stream, summary, offsets - ({first} & skip), check)
-    for _ in scan(stream, contents, skip):
+    _check_skipped(file, summary, offsets - ({first} & skip), check)
+    for _ in scan(file, contents, skip):
         pass
     check.add(contents.blocks, contents)
-    _check_skipped(stream, summary, offsets - ({last} & skip - {first}), check)
+    _check_skipped(file, summary, offsets - ({last} & skip - {first}), check)
     return None if check.need_repair() else contents
 
 
 def _check_skipped(
-    stream: IO[bytes], summary: McapSummary, skip: frozenset[int], check: TimesCheck
+    file: McapFile, summary: McapSummary, skip: frozenset[int], check: TimesCheck
 ) -> None:
     """Check the times in the MCAP chunks at the ends of a file that are not in the part."""
     contents = contents_described_by(summary)
-    for _ in scan(stream, contents, skip):
+    for _ in scan(file, contents, skip):
         pass
     check.add(contents.blocks, contents)
-
-
-@contextmanager
-def open_mcap(path: Path) -> Iterator[IO[bytes]]:
-    """Open a file that begins as an MCAP file does.
-
-    Raises
-    ------
-    LogError
-        The file is missing, empty or not MCAP, or reading it fails within the block.
-    """
-    try:
-        with path.open("rb") as stream:
-            magic = stream.read(len(MAGIC))
-            if not magic:
-                raise LogError(f"the file is empty; record or convert it again: {path}")
-            if magic != MAGIC:
-                raise LogError(f"not an MCAP file; `shiplog convert` reads tables: {path}")
-            stream.seek(0)
-            yield stream
-    except OSError as error:
-        raise LogError(_read_failure(path, error)) from error
 
 
 def contents_described_by(summary: McapSummary) -> McapContents:
     """Return empty contents that have all schemas and channels of the file from the start."""
     return McapContents(dict(summary.schemas), dict(summary.channels), keep_undescribed=False)
-
-
-def _read_failure(path: Path, error: OSError) -> str:
-    if isinstance(error, FileNotFoundError):
-        return f"no such file: {path}"
-    if isinstance(error, IsADirectoryError):
-        return f"a folder, not a log; name one file in it: {path}"
-    return f"cannot read: {(error.strerror or str(error)).lower()}: {path}"
 
 
 def _selected_ids(
@@ -266,6 +237,16 @@ def _mcap_chunks_to_skip(
         if ids.isdisjoint(mcap_chunk.channel_ids)
         or span.excludes(mcap_chunk.first_ns, mcap_chunk.last_ns)
     )
+
+
+def _concerns(damage: Damage, keys: Collection[str] | None, span: ReceptionSpan) -> bool:
+    """Whether damage may have taken samples or events of a part."""
+    if damage.span_ns is not None and span.excludes(*damage.span_ns):
+        return False
+    if keys is None or not damage.topics or EVENTS_TOPIC in damage.topics:
+        return True
+    lost = [f"{topic.strip('/')}/" for topic in damage.topics]
+    return any(topic.startswith(f"{key.strip('/')}/") for topic in lost for key in keys)
 
 
 def _selected_part(log: TrialLog, keys: Collection[str] | None, span: ReceptionSpan) -> TrialLog:

@@ -10,6 +10,7 @@ import zlib
 from typing import IO
 
 import numpy as np
+from numpy.typing import NDArray
 
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER_BYTES = 29
@@ -23,6 +24,20 @@ MESSAGE_HEAD = np.dtype(
 INDEX_HEAD = struct.Struct("<HI")  # of the content of a message index: channel id, bytes of entries
 INDEX_ENTRY = np.dtype([("received", "<u8"), ("offset", "<u8")])  # offset in the MCAP chunk's data
 _BLOCK_BYTES = 1 << 20
+
+
+def index_entries(content: bytes) -> tuple[int, NDArray[np.void]]:
+    """Return the channel id and the entries (n,) in the content of a message index.
+
+    Examples
+    --------
+    >>> channel_id, entries = index_entries(INDEX_HEAD.pack(3, 16) + bytes(16))
+    >>> channel_id, len(entries)
+    (3, 1)
+    """
+    channel_id, size = INDEX_HEAD.unpack_from(content)
+    count = min(size, len(content) - INDEX_HEAD.size) // INDEX_ENTRY.itemsize
+    return channel_id, np.frombuffer(content, INDEX_ENTRY, count, INDEX_HEAD.size)
 
 
 def crc32_of_range(stream: IO[bytes], start: int, end: int, crc: int = 0) -> int:

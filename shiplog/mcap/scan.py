@@ -4,171 +4,154 @@ The file is read from front to back in bounded memory, up to the contents that t
 drain. All checksums are verified; damaged parts are skipped and reported.
 """
 
-import os
 import struct
-import zlib
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
-from typing import IO
 
 import numpy as np
 from mcap.opcode import Opcode
 
+from shiplog.errors import LogError
+
 from .contents import McapContents
+from .damage import Damage, gap_damage, lost_messages_text
 from .decode import MALFORMED, collect_messages, collect_undescribed, read_record
-from .decompress import mcap_chunk_data, truncated_mcap_chunk_data
-from .locate import complete_records
-from .records import MAGIC, MCAP_CHUNK_HEAD, RECORD_HEAD, crc32_of_range
+from .decompress import (
+    is_mcap_chunk_intact,
+    is_mcap_chunk_start,
+    mcap_chunk_data,
+    truncated_mcap_chunk_data,
+)
+from .limits import MAX_MESSAGES_PER_BYTE, MAX_RECORD_BYTES
+from .locate import complete_records, gather, locate_by_index
+from .mcap_file import McapFile
+from .record_walk import Record, RecordWalk
+from .records import MCAP_CHUNK_HEAD, MESSAGE_HEAD, RECORD_HEAD, index_entries
+from .summary import McapSummary
 
 _MAX_LOOSE_BYTES = 1 << 20  # of messages outside of MCAP chunks that are collected at once
-# Longer records other than MCAP chunks are skipped: no attachment of shiplog is as long. Of an
-# MCAP chunk cut off by a crash no more is decompressed.
-_MAX_RECORD_BYTES = 1 << 28
 
 
-def scan(stream: IO[bytes], contents: McapContents, skip: Collection[int] = ()) -> Iterator[None]:
+def scan(file: McapFile, contents: McapContents, skip: Collection[int] = ()) -> Iterator[None]:
     """Go through a file once, and yield after each MCAP chunk that was added to `contents`.
 
     Parameters
     ----------
-    stream
-        The file, opened in binary mode.
+    file
+        The file.
     contents
         Receives what the file contains. The caller may drain it at each yield.
     skip
-        The offsets of MCAP chunks not to read. With any, the checksum of the data section as a
-        whole is not verified.
+        The offsets of MCAP chunks not to read.
+
+    Raises
+    ------
+    LogError
+        The file holds more messages than one of its size can.
     """
-    reader = _RecordReader(stream, stream.seek(0, os.SEEK_END), skip)
-    for opcode, content, indexes in _grouped_records(reader):
-        if opcode == Opcode.CHUNK:
-            _read_mcap_chunk(content, indexes, contents)
+    contents.damage += file.check.damage
+    contents.finished = file.check.is_finished
+    walk = RecordWalk(file.stream, skip, file.check.data_end)
+    for record, indexes in _with_indexes(walk):
+        contents.reading = record.start, record.end
+        if record.opcode == Opcode.CHUNK:
+            _read_mcap_chunk(record, indexes, contents)
+            if file.check.is_intact is False:
+                _check_indexes(record, indexes, contents)
+            _refuse_bomb(file, walk, contents)
             yield
-        elif opcode == Opcode.MESSAGE:
-            contents.in_order &= not collect_messages(content, [], contents)
+        elif record.opcode == Opcode.MESSAGE:
+            contents.in_order &= not collect_messages(record.content, [], contents)
             yield
-        elif opcode == Opcode.DATA_END:
-            if not skip:
-                _verify_checksum(reader.crc_before, content, "data section", contents)
-        elif opcode == Opcode.FOOTER and _is_at_end(reader):
-            crc = _summary_crc(stream, reader.end, content)
-            _verify_checksum(crc, content[-4:], "summary", contents)
-            contents.finished = True
-            break
         else:
-            read_record(opcode, content, contents)
-    if not contents.finished:
-        _read_truncated_end(reader, contents)
+            read_record(record.opcode, record.content, contents)
+    if not walk.is_complete:
+        _read_truncated_end(file, walk, contents)
+    _use_summary(file.check.summary, contents)
+    _report_damage(file, walk, contents)
     collect_undescribed(contents)
     yield
 
 
-@dataclass
-class _RecordReader:
-    """An iterator over the complete records of a file, with a running checksum.
-
-    Attributes
-    ----------
-    stream, size
-        The file and its size in bytes.
-    skip
-        The offsets of MCAP chunks not to read.
-    end
-        The offset after the last complete record.
-    crc, crc_before
-        The checksums of the file up to `end`, and up to the start of that record.
-    """
-
-    stream: IO[bytes]
-    size: int
-    skip: Collection[int]
-    end: int = len(MAGIC)
-    crc: int = zlib.crc32(MAGIC)
-    crc_before: int = 0
-
-    def __iter__(self) -> Iterator[tuple[int, bytes, bytes]]:
-        """Yield the opcode, the head and the content of each record."""
-        self.stream.seek(self.end)
-        skipping = False
-        while len(head := self.stream.read(RECORD_HEAD.size)) == RECORD_HEAD.size:
-            opcode, length = RECORD_HEAD.unpack(head)
-            end = self.end + RECORD_HEAD.size + length
-            if opcode == 0 or end > self.size:
-                return
-            # the message indexes of a skipped MCAP chunk are skipped with it
-            skipping = self.end in self.skip or (skipping and opcode == Opcode.MESSAGE_INDEX)
-            if skipping:
-                self.end = self.stream.seek(end)
-                continue
-            if opcode != Opcode.CHUNK and length > _MAX_RECORD_BYTES:
-                self.crc = crc32_of_range(self.stream, self.end, end, self.crc)
-                self.end = end
-                continue
-            content = self.stream.read(length)
-            if len(content) < length:
-                return
-            self.end, self.crc_before = end, self.crc
-            if not self.skip:
-                self.crc = zlib.crc32(content, zlib.crc32(head, self.crc))
-            yield opcode, head, content
-
-
-def _grouped_records(reader: _RecordReader) -> Iterator[tuple[int, bytes, list[bytes]]]:
+def _with_indexes(walk: RecordWalk) -> Iterator[tuple[Record, list[bytes]]]:
     """Yield MCAP chunks with their message indexes, runs of loose messages, and other records."""
-    mcap_chunk: bytes | None = None
+    mcap_chunk: Record | None = None
     indexes: list[bytes] = []
-    loose = bytearray()
-    for opcode, head, content in reader:
-        if opcode == Opcode.MESSAGE_INDEX:
-            indexes.append(content)
+    loose, loose_start = bytearray(), 0
+    for record in walk:
+        if record.opcode == Opcode.MESSAGE_INDEX:
+            if sum(map(len, indexes)) <= MAX_RECORD_BYTES:
+                indexes.append(record.content)
             continue
         if mcap_chunk is not None:
-            yield Opcode.CHUNK, mcap_chunk, indexes
-        mcap_chunk, indexes = (content if opcode == Opcode.CHUNK else None), []
-        if loose and (opcode != Opcode.MESSAGE or len(loose) >= _MAX_LOOSE_BYTES):
-            yield Opcode.MESSAGE, bytes(loose), []
+            yield mcap_chunk, indexes
+        mcap_chunk, indexes = (record if record.opcode == Opcode.CHUNK else None), []
+        if loose and (record.opcode != Opcode.MESSAGE or len(loose) >= _MAX_LOOSE_BYTES):
+            yield Record(Opcode.MESSAGE, loose_start, record.start, bytes(loose)), []
             loose.clear()
-        if opcode == Opcode.MESSAGE:
-            loose += head + content
+        if record.opcode == Opcode.MESSAGE:
+            loose_start = loose_start if loose else record.start
+            loose += RECORD_HEAD.pack(record.opcode, len(record.content)) + record.content
         elif mcap_chunk is None:
-            yield opcode, content, []
+            yield record, []
     if mcap_chunk is not None:
-        yield Opcode.CHUNK, mcap_chunk, indexes
+        yield mcap_chunk, indexes
     if loose:
-        yield Opcode.MESSAGE, bytes(loose), []
+        yield Record(Opcode.MESSAGE, loose_start, walk.end, bytes(loose)), []
 
 
-def _summary_crc(stream: IO[bytes], end: int, footer: bytes) -> int:
-    """Return the checksum of the summary to which the footer refers; the footer ends at `end`."""
-    start = int.from_bytes(footer[:8], "little")
-    return crc32_of_range(stream, start or end - len(footer) - RECORD_HEAD.size, end - 4)
-
-
-def _is_at_end(reader: _RecordReader) -> bool:
-    is_magic = reader.stream.read(len(MAGIC)) == MAGIC
-    reader.stream.seek(reader.end)
-    return is_magic
-
-
-def _verify_checksum(crc: int, recorded: bytes, section: str, contents: McapContents) -> None:
-    """Report a wrong checksum of a section, unless damage in it was reported already."""
-    expected = int.from_bytes(recorded, "little")
-    if expected and not contents.damage and expected != crc:
-        contents.damage.append(
-            f"damaged: the checksum of the {section} is wrong; samples may be missing"
-        )
-
-
-def _read_mcap_chunk(content: bytes, indexes: list[bytes], contents: McapContents) -> None:
+def _read_mcap_chunk(record: Record, indexes: list[bytes], contents: McapContents) -> None:
+    key = record.content[: MCAP_CHUNK_HEAD.size]
     try:
-        data = mcap_chunk_data(content)
+        data = mcap_chunk_data(record.content)
     except MALFORMED as error:
-        span = np.frombuffer(content[:16].ljust(16, b"\0"), "<M8[ns]").astype("M8[ms]")
-        contents.damage.append(
-            f"lost the samples received from {span[0]} to {span[1]}: damaged MCAP chunk, {error}"
-        )
-    else:
-        _collect_mcap_chunk(data, content, indexes, contents)
+        contents.damage.append(_lost_mcap_chunk(record, indexes, contents, str(error)))
+        return
+    size, crc = struct.unpack_from("<QI", key, 16)
+    if size and crc and key in contents.mcap_chunks_read:
+        text = f"the MCAP chunk at byte {contents.mcap_chunks_read[key]} is there again; once read"
+        contents.damage.append(Damage(record.start, record.end, text, is_lost=False))
+        return
+    contents.mcap_chunks_read[key] = record.start
+    _collect_mcap_chunk(data, record.content, indexes, contents)
+
+
+def _check_indexes(record: Record, indexes: list[bytes], contents: McapContents) -> None:
+    """Report message indexes that do not describe an intact MCAP chunk; they were not used."""
+    if not indexes or not is_mcap_chunk_intact(record.content):
+        return
+    data = mcap_chunk_data(record.content)
+    first = (at for opcode, at, _ in complete_records(data, 0) if opcode == Opcode.MESSAGE)
+    located = locate_by_index(data, next(first, len(data)), indexes)
+    entries = [index_entries(index)[1] for index in indexes]
+    times = [
+        np.array_equal(gather(data, offsets, MESSAGE_HEAD)["received"], rows["received"])
+        for offsets, rows in zip(located.values(), filter(len, entries), strict=False)
+    ]
+    if not located or not all(times):
+        end = record.end + sum(len(index) + RECORD_HEAD.size for index in indexes)
+        text = "a message index is wrong; it is not needed"
+        contents.damage.append(Damage(record.end, end, text, is_lost=False))
+
+
+def _lost_mcap_chunk(
+    record: Record, indexes: list[bytes], contents: McapContents, cause: str
+) -> Damage:
+    """Return what is lost by an MCAP chunk, according to its message indexes or else its head."""
+    ids, times = [], []
+    for index in indexes:
+        channel_id, entries = index_entries(index)
+        if len(entries):
+            ids.append(channel_id)
+            times.append(entries["received"].astype(np.int64))
+    messages = sum(map(len, times))
+    head = np.frombuffer(record.content[:16].ljust(16, b"\0"), np.int64)
+    received = np.concatenate(times) if times else head
+    span = int(received.min()), int(received.max())
+    topics = tuple(contents.channels[id_].topic for id_ in ids if id_ in contents.channels)
+    text = lost_messages_text(messages, topics, span)
+    return Damage(
+        record.start, record.end, f"{text}: MCAP chunk, {cause}", topics=topics, span_ns=span
+    )
 
 
 def _collect_mcap_chunk(
@@ -180,29 +163,52 @@ def _collect_mcap_chunk(
         contents.latest_ns = last
 
 
-def _read_truncated_end(reader: _RecordReader, contents: McapContents) -> None:
-    """Read what follows the last complete record of an unfinished file."""
-    contents.truncated = reader.end < reader.size
-    reader.stream.seek(reader.end)
-    _read_truncated_mcap_chunk(reader.stream.read(_MAX_RECORD_BYTES), contents)
-    reader.stream.seek(max(reader.end, reader.size - len(MAGIC)))
-    if reader.stream.read(len(MAGIC)) == MAGIC:
-        contents.damage.append(f"damaged at byte {reader.end}: the rest of the file was not read")
+def _refuse_bomb(file: McapFile, walk: RecordWalk, contents: McapContents) -> None:
+    messages = contents.total_samples + len(contents.event_messages)
+    messages += sum(contents.undescribed_counts.values())
+    if messages > MAX_MESSAGES_PER_BYTE * walk.size:
+        raise LogError(f"its MCAP chunks unpack to more than a log of its size has: {file.path}")
 
 
-def _read_truncated_mcap_chunk(record: bytes, contents: McapContents) -> None:
-    """Collect the complete messages of an MCAP chunk that is cut off by the end of the file.
-
-    One that a recorder had left open is not cut off where it ends with a message.
-    """
-    head = RECORD_HEAD.size + MCAP_CHUNK_HEAD.size
-    if len(record) <= head or record[0] != Opcode.CHUNK:
+def _read_truncated_end(file: McapFile, walk: RecordWalk, contents: McapContents) -> None:
+    """Read what follows the last complete record of a file whose data section does not end."""
+    if contents.finished:
+        end = file.check.data_end or walk.size
+        walk.gaps.append((walk.end, end))
         return
+    contents.truncated = walk.end < walk.size
+    file.stream.seek(walk.end)
+    record = file.stream.read(MAX_RECORD_BYTES)
     content = record[RECORD_HEAD.size :]
+    if record[:1] != bytes([Opcode.CHUNK]) or not is_mcap_chunk_start(content):
+        return
     data = truncated_mcap_chunk_data(content)
+    contents.reading = walk.end, walk.size
     _collect_mcap_chunk(data, content, [], contents)
     *_, size, _, _ = MCAP_CHUNK_HEAD.unpack_from(content)
-    if size == 0:  # its head was not completed
+    if size == 0:  # left open by a recorder; it is not cut off where it ends with a message
         contents.truncated = max((end for *_, end in complete_records(data, 0)), default=0) < len(
             data
         )
+
+
+def _report_damage(file: McapFile, walk: RecordWalk, contents: McapContents) -> None:
+    """Report what the walk found, and a wrong checksum of the data that no damage explains."""
+    summary, data_end = file.check.summary, file.check.data_end
+    contents.damage += walk.remarks
+    contents.damage += [gap_damage(start, end, summary) for start, end in walk.gaps]
+    contents.damage.sort(key=lambda damage: damage.start)
+    is_explained = any(damage.start < (data_end or 0) for damage in contents.damage)
+    if file.check.is_intact is False and not is_explained:
+        text = (
+            "the checksum of the data section is wrong, those of its parts are right or absent; "
+            "metadata may be wrong, samples may be missing"
+        )
+        contents.damage.append(Damage(0, data_end or 0, text))
+
+
+def _use_summary(summary: McapSummary | None, contents: McapContents) -> None:
+    """Take the descriptions from the summary that are missing in the data."""
+    if summary is not None:
+        contents.schemas = dict(summary.schemas) | contents.schemas
+        contents.channels = dict(summary.channels) | contents.channels

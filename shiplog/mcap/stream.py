@@ -4,7 +4,6 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO
 
 from mcap import records
 
@@ -14,9 +13,11 @@ from shiplog.types.time_cut import TimeCut, empty_cut_error, resolve_cut
 
 from .clock_repair import MixedTimes, refuse_mixed_times
 from .contents import McapContents
-from .reader import contents_described_by, open_mcap, read_unchecked, sample_count
+from .file_check import FileCheck
+from .mcap_file import McapFile, open_mcap
+from .reader import contents_described_by, read_unchecked, sample_count
 from .scan import scan
-from .summary import are_in_order, read_summary
+from .summary import are_in_order
 from .times_check import TimesCheck
 from .trial_log import build_trial_log
 
@@ -39,6 +40,8 @@ class LogFile:
         The log without its samples: its channels in their order, and what is known of the file.
     schemas, channel_records
         The schema and channel records, by id.
+    check
+        What the checksums of the file show.
     cuts
         The cuts of `between`, one after the other.
     """
@@ -47,6 +50,7 @@ class LogFile:
     outline: TrialLog
     schemas: Mapping[int, records.Schema]
     channel_records: Mapping[int, records.Channel]
+    check: FileCheck
     cuts: tuple[TimeCut, ...] = ()
 
     def __repr__(self) -> str:
@@ -139,8 +143,8 @@ class LogFile:
             dict(self.schemas), dict(self.channel_records), keep_undescribed=False
         )
         is_first = True
-        with open_mcap(self.path) as stream:
-            for _ in scan(stream, contents):
+        with open_mcap(self.path, self.check) as file:
+            for _ in scan(file, contents):
                 if contents.pending_samples >= FILE_CHUNK_SAMPLES:
                     chunk = build_trial_log(self.path, contents)
                     yield self._selected(chunk, is_first=is_first)
@@ -206,33 +210,35 @@ def open_log(
 
 def _open_unchecked(path: Path) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
     """Open a log whose parts may have mixed times, of which a `LogFile` learns by its chunks."""
-    with open_mcap(path) as stream:
-        summary = read_summary(stream)
-        if summary is None:
-            return _open_by_scan(path, stream)
+    with open_mcap(path) as file:
+        summary = file.check.summary
+        mcap_chunks = None if summary is None else summary.mcap_chunk_locations()
+        if summary is None or file.check.is_intact is False:
+            return _open_by_scan(file)
         if sample_count(summary) <= MAX_SAMPLES_IN_MEMORY:
             return read_unchecked(path)
-        mcap_chunks = summary.mcap_chunk_locations()
         if mcap_chunks is None:
-            return _open_by_scan(path, stream)
+            return _open_by_scan(file)
     if not are_in_order(mcap_chunks):
         return read_unchecked(path)
     contents = contents_described_by(summary)
     contents.finished = True
     contents.metadata, contents.vessel_toml = dict(summary.metadata), summary.vessel_toml
-    return _log_file(path, contents)
+    return _log_file(path, file.check, contents)
 
 
-def _log_file(path: Path, contents: McapContents) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
+def _log_file(
+    path: Path, check: FileCheck, contents: McapContents
+) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
     """Return a log in its file, or in memory where some times may need a repair."""
     contents.event_messages = []  # of an earlier pass
-    if _need_repair(path, contents):
+    if _need_repair(path, check, contents):
         return read_unchecked(path)
     outline = build_trial_log(path, contents)
-    return LogFile(path, outline, contents.schemas, contents.channels), []
+    return LogFile(path, outline, contents.schemas, contents.channels, check), []
 
 
-def _need_repair(path: Path, described: McapContents) -> bool:
+def _need_repair(path: Path, check: FileCheck, described: McapContents) -> bool:
     """Whether some times of a file may have to be changed or dropped, by one pass over it.
 
     Where none has, the contents that describe the file receive its events.
@@ -240,27 +246,27 @@ def _need_repair(path: Path, described: McapContents) -> bool:
     contents = McapContents(
         dict(described.schemas), dict(described.channels), keep_undescribed=False
     )
-    check = TimesCheck()
-    with open_mcap(path) as stream:
-        for _ in scan(stream, contents):
-            check.add(contents.drain(), contents)
-            if check.need_repair():
+    times = TimesCheck()
+    with open_mcap(path, check) as file:
+        for _ in scan(file, contents):
+            times.add(contents.drain(), contents)
+            if times.need_repair():
                 return True
     described.event_messages = contents.event_messages
     return False
 
 
-def _open_by_scan(path: Path, stream: IO[bytes]) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
+def _open_by_scan(file: McapFile) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
     """Open a log by a scan of its file that keeps the samples only while they are few."""
     contents = McapContents()
-    for _ in scan(stream, contents):
+    for _ in scan(file, contents):
         samples = contents.total_samples + sum(contents.undescribed_counts.values())
         if samples > MAX_SAMPLES_IN_MEMORY:
             contents.drain()
             contents.undescribed.clear()
             contents.keep_undescribed = False
     if contents.keep_undescribed:
-        return build_trial_log(path, contents), contents.mixed_times
+        return build_trial_log(file.path, contents), contents.mixed_times
     if contents.in_order:
-        return _log_file(path, contents)
-    return read_unchecked(path)
+        return _log_file(file.path, file.check, contents)
+    return read_unchecked(file.path)

@@ -12,6 +12,9 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
+from .limits import MAX_RECORD_BYTES, MAX_SUMMARY_BYTES
+from .metadata_record import read_metadata
+from .record_structure import content_size, read_attachment
 from .records import FOOTER_BYTES, INDEX_ENTRY, INDEX_HEAD, MAGIC, RECORD_HEAD, crc32_of_range
 from .schema import METADATA_NAME, VESSEL_ATTACHMENT
 
@@ -52,6 +55,10 @@ class McapSummary:
         The attached vessel file, or None.
     mcap_chunk_indexes
         The content of the chunk index records, not parsed: a long file has thousands.
+    attachment_offsets, metadata_offsets
+        The offsets of the indexed attachments and metadata records.
+    is_verified
+        Whether a checksum covers the summary.
     """
 
     schemas: dict[int, records.Schema]
@@ -60,6 +67,9 @@ class McapSummary:
     metadata: dict[str, str]
     vessel_toml: str | None
     mcap_chunk_indexes: tuple[bytes, ...]
+    attachment_offsets: tuple[int, ...]
+    metadata_offsets: tuple[int, ...]
+    is_verified: bool
 
     def mcap_chunk_locations(self) -> tuple[McapChunkLocation, ...] | None:
         """Return the locations of the MCAP chunks in the order of the file.
@@ -114,6 +124,8 @@ def _read_summary(stream: IO[bytes]) -> McapSummary | None:
     if footer[0] != Opcode.FOOTER or not footer.endswith(MAGIC) or not 0 < start < size:
         return None
     end = size - len(MAGIC) - 4
+    if end - start > MAX_SUMMARY_BYTES:
+        return None
     if crc and crc32_of_range(stream, start, end) != crc:
         return None
     by_opcode: dict[int, list[bytes]] = {}
@@ -134,6 +146,9 @@ def _read_summary(stream: IO[bytes]) -> McapSummary | None:
         _metadata(stream, by_opcode),
         _vessel_toml(stream, by_opcode),
         tuple(by_opcode.get(Opcode.CHUNK_INDEX, [])),
+        _offsets(by_opcode.get(Opcode.ATTACHMENT_INDEX, [])),
+        _offsets(by_opcode.get(Opcode.METADATA_INDEX, [])),
+        bool(crc),
     )
 
 
@@ -144,13 +159,19 @@ def _section_records(stream: IO[bytes], start: int, end: int) -> Iterator[tuple[
     while at < len(data):
         opcode, length = RECORD_HEAD.unpack_from(data, at)
         at += RECORD_HEAD.size + length
-        if at > len(data):
-            raise ValueError("a record that is longer than its section")
-        yield opcode, data[at - length : at]
+        content = data[at - length : at]
+        if at > len(data) or (opcode <= max(Opcode) and content_size(opcode, content) is None):
+            raise ValueError("a record that is longer than its section, or than its fields")
+        yield opcode, content
 
 
 def _streams(by_opcode: dict[int, list[bytes]], opcode: Opcode) -> Iterator[ReadDataStream]:
     return (ReadDataStream(BytesIO(content)) for content in by_opcode.get(opcode, []))
+
+
+def _offsets(indexes: list[bytes]) -> tuple[int, ...]:
+    """Return the offsets of the records to which indexes of attachments or metadata point."""
+    return tuple(int.from_bytes(content[:8], "little") for content in indexes)
 
 
 def _metadata(stream: IO[bytes], by_opcode: dict[int, list[bytes]]) -> dict[str, str]:
@@ -159,7 +180,7 @@ def _metadata(stream: IO[bytes], by_opcode: dict[int, list[bytes]]) -> dict[str,
         index = records.MetadataIndex.read(entry)
         if index.name == METADATA_NAME:
             content = _indexed_record(stream, index.offset, index.length, Opcode.METADATA)
-            metadata |= records.Metadata.read(content).metadata
+            metadata |= read_metadata(content).metadata
     return metadata
 
 
@@ -169,14 +190,16 @@ def _vessel_toml(stream: IO[bytes], by_opcode: dict[int, list[bytes]]) -> str | 
         index = records.AttachmentIndex.read(entry)
         if index.name == VESSEL_ATTACHMENT:
             content = _indexed_record(stream, index.offset, index.length, Opcode.ATTACHMENT)
-            text = records.Attachment.read(content).data.decode()
+            text = read_attachment(content).data.decode()
     return text
 
 
-def _indexed_record(stream: IO[bytes], offset: int, length: int, opcode: Opcode) -> ReadDataStream:
+def _indexed_record(stream: IO[bytes], offset: int, length: int, opcode: Opcode) -> bytes:
     """Return the content of the record that an index points to."""
+    if length > MAX_RECORD_BYTES:
+        raise ValueError("an index of a record that is longer than any of a log")
     stream.seek(offset)
     data = stream.read(length)
-    if RECORD_HEAD.unpack_from(data)[0] != opcode:
-        raise ValueError("an index that points to a record of another kind")
-    return ReadDataStream(BytesIO(data[RECORD_HEAD.size :]))
+    if RECORD_HEAD.unpack_from(data) != (opcode, length - RECORD_HEAD.size):
+        raise ValueError("an index that points to another record")
+    return data[RECORD_HEAD.size :]

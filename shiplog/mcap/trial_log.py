@@ -18,6 +18,7 @@ from shiplog.units import CATALOGUE, conversion_factor
 
 from .clock_repair import MessageColumns, drop_impossible_times, repair_clock_steps
 from .contents import McapContents, SampleBlock
+from .damage import is_any_lost
 from .decode import is_foreign, schema_of
 from .schema import FORMAT_VERSION, Schema
 from .unset_times import replace_unset_times
@@ -42,7 +43,7 @@ def build_trial_log(path: Path, contents: McapContents) -> TrialLog:
         The format version is another one, a unit is unknown, or a message is not of its schema.
     """
     version = contents.metadata.get("format_version", FORMAT_VERSION)
-    if version != FORMAT_VERSION:
+    if version != FORMAT_VERSION and not contents.damage:
         raise LogError(
             f"written in format {version}, this shiplog reads format {FORMAT_VERSION}; "
             f"install a newer shiplog: {path}"
@@ -55,7 +56,7 @@ def build_trial_log(path: Path, contents: McapContents) -> TrialLog:
         contents.metadata,
         contents.vessel_toml,
         tuple(_warnings(contents)),
-        contents.truncated or bool(contents.damage),
+        contents.truncated or is_any_lost(contents.damage),
         tuple(contents.events),
     )
 
@@ -124,7 +125,7 @@ def _decode_events(
         try:
             contents.events.append(decode_event(event.data, event.time_ns + shift))
         except ValueError as error:
-            contents.damage.append(f"skipped an event: {error}")
+            contents.report(f"skipped an event: {error}")
 
 
 def _shift_at(
@@ -145,8 +146,9 @@ def _shift_at(
 
 
 def _warnings(contents: McapContents) -> list[str]:
-    pauses = [] if contents.damage else contents.pauses.warnings()  # else of the lost samples
-    warnings = [*contents.damage, *contents.clock_warnings, *pauses]
+    is_lost = is_any_lost(contents.damage)
+    pauses = [] if is_lost else contents.pauses.warnings()  # else of the lost samples
+    warnings = [*map(str, contents.damage), *contents.clock_warnings, *pauses]
     if not contents.finished:
         warnings.append(
             "the file was not finished (the recorder was stopped or killed); "

@@ -17,6 +17,7 @@ from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 from shiplog.version import __version__
 
 from .encode import MAX_MCAP_CHUNK_BYTES, McapChunk, MessageBatch, encode_mcap_chunks
+from .metadata_record import with_checksum
 from .record_writer import McapRecordWriter
 from .schema import (
     ENCODING,
@@ -148,7 +149,7 @@ class LogWriter:
         changed = {key: text for key, text in metadata.items() if self._metadata.get(key) != text}
         if changed:
             self._metadata |= changed
-            self._file.write_metadata(METADATA_NAME, changed)
+            self._file.write_metadata(METADATA_NAME, with_checksum(changed))
 
     def flush(self) -> None:
         """Hand all to the operating system, so that a killed process does not lose it."""

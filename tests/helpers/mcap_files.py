@@ -171,6 +171,13 @@ def offset_between(fraction: float, low: int, high: int) -> int:
     return low + int(fraction * (high - low))
 
 
+def spoil(data: bytes, at: int) -> bytes:
+    """Return the data with all bits of a byte inverted, which no checksum can correct."""
+    changed = bytearray(data)
+    changed[at] ^= 0xFF
+    return bytes(changed)
+
+
 def flip_bit(data: bytes, bit: int) -> bytes:
     """Return the data with one bit inverted."""
     changed = bytearray(data)

@@ -54,7 +54,7 @@ def test_a_summary_is_the_one_that_the_mcap_library_reads(path: Path, *, by_ship
     assert by_mcap is not None
     assert (summary.schemas, summary.channels) == (by_mcap.schemas, by_mcap.channels)
     assert summary.statistics == by_mcap.statistics
-    assert summary.metadata == dict(metadata)
+    assert summary.metadata == {k: text for k, text in metadata if k != "crc32"}
     assert summary.vessel_toml == (vessels[0] if vessels else None)
     locations = summary.mcap_chunk_locations()
     assert locations is not None

@@ -1,0 +1,72 @@
+"""An MCAP file opened for reading, of which all checksums are known."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from mcap.opcode import Opcode
+
+from shiplog.errors import LogError
+
+from .file_check import FileCheck, check_file
+from .inverted_bit import with_inverted_bit
+from .limits import MAX_DESCRIPTION_BYTES
+from .record_structure import content_size
+from .records import MAGIC, RECORD_HEAD
+
+
+@dataclass(frozen=True, eq=False)
+class McapFile:
+    """An open file: where it is, and what its checksums show."""
+
+    path: Path
+    stream: IO[bytes]
+    check: FileCheck
+
+
+@contextmanager
+def open_mcap(path: Path, check: FileCheck | None = None) -> Iterator[McapFile]:
+    """Open a file that begins as an MCAP file does, and verify its checksums.
+
+    Parameters
+    ----------
+    path
+        The file.
+    check
+        What its checksums showed before, so that they are not computed again.
+
+    Raises
+    ------
+    LogError
+        The file is missing, empty or not MCAP, or reading it fails within the block.
+    """
+    try:
+        with path.open("rb") as stream:
+            _require_mcap(path, stream)
+            check = check or check_file(stream)
+            yield McapFile(path, with_inverted_bit(stream, check.wrong_bit), check)
+    except OSError as error:
+        raise LogError(_read_failure(path, error)) from error
+
+
+def _require_mcap(path: Path, stream: IO[bytes]) -> None:
+    """Refuse what is no MCAP file; damaged first bytes are followed by a header."""
+    magic = stream.read(len(MAGIC))
+    if not magic:
+        raise LogError(f"the file is empty; record or convert it again: {path}")
+    if magic != MAGIC:
+        head = stream.read(RECORD_HEAD.size)
+        opcode, length = RECORD_HEAD.unpack(head.ljust(RECORD_HEAD.size, b"\0"))
+        content = stream.read(length) if length <= MAX_DESCRIPTION_BYTES else b""
+        if opcode != Opcode.HEADER or content_size(opcode, content) != length:
+            raise LogError(f"not an MCAP file; `shiplog convert` reads tables: {path}")
+
+
+def _read_failure(path: Path, error: OSError) -> str:
+    if isinstance(error, FileNotFoundError):
+        return f"no such file: {path}"
+    if isinstance(error, IsADirectoryError):
+        return f"a folder, not a log; name one file in it: {path}"
+    return f"cannot read: {(error.strerror or str(error)).lower()}: {path}"
