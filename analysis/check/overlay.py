@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 from analysis.view.rerun_io import WHOLE_RUN
 from shiplog import ShiplogError
 from shiplog.files import atomic_write
+from shiplog.printable import printable
 from shiplog.types import FloatArray, TimeArray
 
 from .compare import Comparison
@@ -57,7 +58,7 @@ def _send(
 def _blueprint(comparison: Comparison) -> rrb.Blueprint:
     views = [
         rrb.TimeSeriesView(
-            name=f"{difference.topic} [{difference.unit}]",
+            name=printable(f"{difference.topic} [{difference.unit}]"),
             origin=difference.topic,
             axis_x=WHOLE_RUN,
         )

@@ -2,10 +2,9 @@
 
 import argparse
 import os
-import sys
 from pathlib import Path
 
-from shiplog.cli.console import progress, write_json
+from shiplog.cli.console import print_line, print_lines, progress, write_json
 from shiplog.cli.paths import (
     require_distinct,
     require_outputs,
@@ -44,7 +43,7 @@ def _check(arguments: argparse.Namespace) -> ExitCode:
             on_progress(f"log {number + 1} of {len(logs)}: {log.name}", number / len(logs))
             comparisons.append(compare(log))
     for comparison in comparisons:
-        print(comparison, file=sys.stderr if arguments.json == "-" else sys.stdout)
+        print_lines(str(comparison), to_stderr=arguments.json == "-")
     if arguments.json:
         write_json([comparison_json(comparison) for comparison in comparisons], arguments.json)
     if arguments.update:
@@ -55,7 +54,7 @@ def _check(arguments: argparse.Namespace) -> ExitCode:
             )
         for log, comparison in zip(logs, comparisons, strict=True):
             update_reference(log, comparison)
-            print(f"updated: {reference_path(log)}", file=sys.stderr)
+            print_line(f"updated: {reference_path(log)}", to_stderr=True)
         return ExitCode.OK
     for comparison in comparisons:
         if comparison.changed:
@@ -63,7 +62,7 @@ def _check(arguments: argparse.Namespace) -> ExitCode:
 
             overlay = Path(f"{Path(comparison.name).stem}.check.rrd")
             write_overlay(comparison, overlay)
-            print(f"replay and reference, overlaid: {overlay}", file=sys.stderr)
+            print_line(f"replay and reference, overlaid: {overlay}", to_stderr=True)
     return ExitCode.OK if all(comparison.ok for comparison in comparisons) else ExitCode.FAILURE
 
 

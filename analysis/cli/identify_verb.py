@@ -1,12 +1,11 @@
 """The verb identify: fit a ship model to logs, and validate it on others."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shiplog.cli.console import print_tables, print_warnings, progress, write_json
+from shiplog.cli.console import print_line, print_tables, print_warnings, progress, write_json
 from shiplog.cli.options import (
     assigned_numbers,
     open_cut,
@@ -131,12 +130,12 @@ def _report_vessel_file(path: str, ship: "IdentifiedShip") -> None:
 
     names = ", ".join(ship.uncertainty.unidentifiable)
     caution = f"; not identifiable, and valid for these logs only: {names}" if names else ""
-    print(f"vessel file: {path}{caution}", file=sys.stderr)
+    print_line(f"vessel file: {path}{caution}", to_stderr=True)
     for equation in undetermined_parts(ship):
-        print(
+        print_line(
             f"the vessel file gives no model, only comments: no parameter of the {equation} "
             "equation is identifiable from these logs; add the log of a zig-zag",
-            file=sys.stderr,
+            to_stderr=True,
         )
 
 
@@ -153,7 +152,7 @@ def _measured_logs(paths: Sequence[str], arguments: argparse.Namespace) -> "list
         )
     if skipped:
         names = ", ".join(Path(path).name for path in skipped)
-        print(f"skipped, as references or simulated truths: {names}", file=sys.stderr)
+        print_line(f"skipped, as references or simulated truths: {names}", to_stderr=True)
     return [log for path, log in logs.items() if path not in skipped]
 
 

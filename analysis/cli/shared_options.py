@@ -1,10 +1,10 @@
 """Options that replay and identify share: how their logs are read, and the review they show."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from shiplog.cli.console import print_line
 from shiplog.cli.options import (
     add_cut_options,
     add_derive_option,
@@ -73,7 +73,7 @@ def _sensor_delays(text: str | None) -> "StatedDelays":
 
 def show_review(path: str | Path, *, view: bool) -> None:
     """Print where the review is, and open it in the Rerun viewer if asked to."""
-    print(f"review: {path} (open it with: rerun {path})", file=sys.stderr)
+    print_line(f"review: {path} (open it with: rerun {path})", to_stderr=True)
     if view:
         from analysis.view.viewer import view_review
 

@@ -1,7 +1,9 @@
 """Pages of tables in Markdown."""
 
+import re
 from collections.abc import Iterable
 
+from shiplog.printable import printable
 from shiplog.text_table import TextTable
 
 
@@ -34,23 +36,32 @@ def markdown_page(title: str, tables: Iterable[TextTable], warnings: Iterable[st
     | 1 | 2 |
     <BLANKLINE>
     """
-    blocks, listed = [f"# {title}"], _markdown_list(warnings)
+    blocks, listed = [f"# {_inline(title)}"], _markdown_list(warnings)
     if listed:
         blocks += ["## Warnings", listed]
     for table in tables:
         columns = (column.replace("\n", " ") for column in table.columns)
-        blocks += [f"## {table.title}", _markdown_table(columns, table.rows)]
+        blocks += [f"## {_inline(table.title)}", _markdown_table(columns, table.rows)]
         if table.remarks:
             blocks.append(_markdown_list(table.remarks))
     return "\n\n".join(blocks) + "\n"
 
 
 def _markdown_list(items: Iterable[str]) -> str:
-    return "\n".join(f"- {item}" for item in items)
+    return "\n".join(f"- {_inline(item)}" for item in items)
 
 
 def _markdown_table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    columns = [column or " " for column in columns]
-    cells = ([cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows)
+    columns = [_cell(column) or " " for column in columns]
+    cells = (map(_cell, row) for row in rows)
     lines = [columns, ["---"] * len(columns), *cells]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _cell(text: str) -> str:
+    return _inline(text.replace("\n", " ")).replace("|", "\\|")
+
+
+def _inline(text: str) -> str:
+    """Return a text in one line without links, images and HTML, as it may come from a file."""
+    return re.sub(r"\\|\](?=[(\[:])|<", r"\\\g<0>", printable(text))

@@ -12,6 +12,7 @@ from analysis.identification.comparison.history import total_duration_secs
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.report.identification_tables import identification_tables
 from analysis.report.markdown import markdown_page
+from shiplog.printable import printable
 
 from .identification_panels import RunSheet, parameter_panels, run_sheets
 from .panels import Panel
@@ -79,7 +80,8 @@ def _recording(ship: IdentifiedShip) -> rr.RecordingStream:
     recording = rr.RecordingStream(
         name, recording_id=digest.hexdigest()[:32], send_properties=False
     )
-    recording.send_recording_name(f"{ship.model.name} from {', '.join(dict.fromkeys(logs))}")
+    title = f"{ship.model.name} from {', '.join(dict.fromkeys(logs))}"
+    recording.send_recording_name(printable(title))
     return recording
 
 
@@ -120,5 +122,5 @@ def _run_tab(i: int, sheet: RunSheet) -> rrb.Container:
         right.append(chart_view(_track_origin(i), sheet.track))
     shares = [1] * (len(right) - 1) + [2 if sheet.track is not None else 1]
     return rrb.Horizontal(
-        rrb.Vertical(*left), rrb.Vertical(*right, row_shares=shares), name=sheet.title
+        rrb.Vertical(*left), rrb.Vertical(*right, row_shares=shares), name=printable(sheet.title)
     )

@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 
 from analysis.replay.plan import Plan
 from analysis.replay.replay_results import Analysis, Findings, ReplayChunk
+from shiplog.printable import printable
 from shiplog.types import Event, EventLevel, Log
 
 from .further_channels import FurtherChannels
@@ -185,7 +186,7 @@ def _recording(plan: Plan) -> rr.RecordingStream:
 
 def _send_properties(recording: rr.RecordingStream, findings: Findings) -> None:
     """Send the recording's name, start and properties."""
-    recording.send_recording_name(findings.plan.name)
+    recording.send_recording_name(printable(findings.plan.name))
     rr.send_recording_start_time_nanos(findings.plan.clock.start_ns, recording=recording)
     trial = rr.AnyValues(
         vessel=findings.plan.vessel.name,

@@ -1,4 +1,7 @@
-"""Rerun recordings: series, text and track charts sent to them, views and blueprints."""
+"""Rerun recordings: series, text and track charts sent to them, views and blueprints.
+
+Names and texts, which may come from a file, are made printable here.
+"""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -11,6 +14,7 @@ import rerun.blueprint as rrb
 
 from shiplog.errors import ShiplogError
 from shiplog.files import atomic_write, is_device
+from shiplog.printable import printable
 from shiplog.types import Event, EventLevel, FloatArray
 
 from .panels import Panel
@@ -67,7 +71,7 @@ def _is_complete(path: Path) -> bool:
 def send_style(recording: rr.RecordingStream, entity: str, series: Series) -> None:
     """Send the names, colours and widths of a series' lines."""
     style = rr.SeriesLines(
-        names=[line.name for line in series.lines],
+        names=[printable(line.name) for line in series.lines],
         colors=[line.colour for line in series.lines],
         widths=[line.width for line in series.lines],
         aggregation_policy="MinMax" if series.spiky else "Average",
@@ -103,7 +107,7 @@ def send_events(
         rr.TimeColumn("time", duration=(stamps - start_ns).astype("m8[ns]")),
         rr.TimeColumn("stamp", timestamp=stamps.astype("M8[ns]")),
     ]
-    texts = [f"{event.source}: {event.text}" for event in events]
+    texts = [printable(f"{event.source}: {event.text}") for event in events]
     levels = [EVENT_LEVELS[event.level] for event in events]
     recording.send_columns(entity, times, rr.TextLog.columns(text=texts, level=levels))
 
@@ -145,7 +149,7 @@ def plot_view(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesVie
     """Return a view of a panel, by default over the whole trial."""
     return rrb.TimeSeriesView(
         origin=panel.name,
-        name=panel.title,
+        name=printable(panel.title),
         axis_x=axis,
         axis_y=rrb.ScalarAxis(range=panel.limits),
         plot_legend=rrb.PlotLegend("RightTop", visible=panel.legend),
@@ -162,7 +166,7 @@ def chart_view(origin: str, chart: TrackChart) -> rrb.Spatial2DView:
     """Return a view of a track chart."""
     low, high = chart.bounds
     bounds = rrb.VisualBounds2D(x_range=(low[0], high[0]), y_range=(low[1], high[1]))
-    return rrb.Spatial2DView(origin=origin, name=chart.title, visual_bounds=bounds)
+    return rrb.Spatial2DView(origin=origin, name=printable(chart.title), visual_bounds=bounds)
 
 
 def make_blueprint(content: rrb.View | rrb.Container) -> rrb.Blueprint:

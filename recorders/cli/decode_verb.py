@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from shiplog.cli.console import print_tables, print_warnings, progress
+from shiplog.cli.console import print_line, print_tables, print_warnings, progress
 from shiplog.cli.options import assigned_texts
 from shiplog.cli.paths import require_distinct, require_inputs, require_outputs, require_suffix
 from shiplog.cli.verb import ExitCode, Verb
@@ -39,7 +39,7 @@ def _decode(arguments: argparse.Namespace) -> ExitCode:
     samples, channels = _write(source, arguments.output)
     print_tables(stream_tables(source.recorded.streams))
     print_warnings(source.log.warnings)  # known when it was read to its end
-    print(
+    print_line(
         f"{arguments.output}: {samples} samples of {channels} channels, "
         f"{source.old_channels} before"
     )

@@ -1,7 +1,6 @@
 """Dry run of a recording: listen for a while, and report what is heard and what is missing."""
 
 import argparse
-import sys
 import threading
 from collections.abc import Sequence
 
@@ -16,7 +15,7 @@ from recorders.trial.open_source import (
 from recorders.trial.stream_tables import stream_tables
 from recorders.trial.trial_file import load_trial_file
 from recorders.trial.undecoded import why_undecoded
-from shiplog.cli.console import print_tables
+from shiplog.cli.console import print_line, print_tables
 from shiplog.cli.verb import ExitCode
 from shiplog.errors import UsageError
 from shiplog.interrupts import stopped_by_signals
@@ -42,7 +41,7 @@ def _listen(requests: Sequence[StreamRequest], secs: float) -> ExitCode:
     source = open_streams(requests, ReceptionClock())
     if not isinstance(source, LiveSource):
         raise UsageError("--dry-run listens to live sources; of a file, record it and see its info")
-    print(f"listening for {secs:.0f} s", file=sys.stderr, flush=True)
+    print_line(f"listening for {secs:.0f} s", to_stderr=True)
     timer = threading.Timer(secs, source.stop)
     timer.daemon = True  # a second Ctrl-C ends the process at once
     timer.start()
@@ -56,11 +55,11 @@ def _listen(requests: Sequence[StreamRequest], secs: float) -> ExitCode:
     silent = [each.stream for each in source.inputs if not _heard(each)]
     missing = source.status.missing
     for stream in silent:
-        print(f"nothing decoded from {stream.name}: {why_undecoded(stream.decoder.counts)}")
+        print_line(f"nothing decoded from {stream.name}: {why_undecoded(stream.decoder.counts)}")
     if missing:
-        print(f"missing for a replay: {', '.join(missing)}")
+        print_line(f"missing for a replay: {', '.join(missing)}")
     else:
-        print("all channels that a replay needs are heard")
+        print_line("all channels that a replay needs are heard")
     return ExitCode.FAILURE if silent or missing else ExitCode.OK
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from recorders.trial.live_source import LiveSource
 from recorders.trial.status import ChannelStatus
+from shiplog.cli.console import print_line
 from shiplog.printable import printable
 from shiplog.types import Event
 from shiplog.units import CATALOGUE, conversion_factor, utc_text
@@ -163,7 +164,7 @@ def _line_printer(shown: Shown) -> Callable[[int], None]:
             return
         last = time.monotonic()
         with suppress(OSError):
-            print(printable(_status_line(shown, samples)), file=sys.stderr, flush=True)
+            print_line(_status_line(shown, samples), to_stderr=True)
 
     return on_chunk
 
@@ -211,7 +212,7 @@ def _status_table(shown: Shown, height: int) -> "Group":
     if len(channels) > room:
         lines.insert(0, Text(f"and {len(channels) - room} more channels"))
     if missing := source.status.missing:
-        lines.append(Text(f"no value of {', '.join(missing)}", style="bold red"))
+        lines.append(Text(printable(f"no value of {', '.join(missing)}"), style="bold red"))
     if mark := source.status.last_mark:
         lines.append(Text(printable(f"last mark: {mark.text}, {_age(mark.time_ns, now_ns)} ago")))
     lines.append(Text(f"{MARK_KEY}: mark an event   Ctrl-C: end the recording", style="dim"))

@@ -2,6 +2,7 @@
 
 import argparse
 
+from shiplog.cli.console import print_line
 from shiplog.cli.verb import ExitCode, Verb
 
 
@@ -15,7 +16,7 @@ def _mark(arguments: argparse.Namespace) -> ExitCode:
     from recorders.trial.marks import send_mark
 
     send_mark(arguments.log, arguments.text)
-    print(f"marked in {arguments.log}: {arguments.text}")
+    print_line(f"marked in {arguments.log}: {arguments.text}")
     return ExitCode.OK
 
 

@@ -2,7 +2,6 @@
 
 import argparse
 import re
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from recorders.record import Recording
 from recorders.source import RecorderCommand
 from recorders.streams.format import GROUP as FORMAT_GROUP
 from recorders.streams.format import StreamFormat
-from shiplog.cli.console import progress
+from shiplog.cli.console import print_line, progress
 from shiplog.cli.paths import require_outputs, require_suffix
 from shiplog.cli.verb import ExitCode, Verb
 from shiplog.errors import ShiplogError, UsageError
@@ -58,13 +57,12 @@ def _detected(address: str) -> str:
     from recorders.trial.format_detection import LISTEN_SECS, detect_stream_format
 
     if not Path(address).is_file():
-        print(
+        print_line(
             f"no format is stated: listening for up to {LISTEN_SECS:.0f} s to detect it",
-            file=sys.stderr,
-            flush=True,
+            to_stderr=True,
         )
     name = detect_stream_format(address)
-    print(f"the format is {name}: shiplog record {name} {address}", file=sys.stderr, flush=True)
+    print_line(f"the format is {name}: shiplog record {name} {address}", to_stderr=True)
     return name
 
 
@@ -150,18 +148,20 @@ def _record(arguments: argparse.Namespace) -> ExitCode:
     recording = _recorded(arguments)
     first, *others = recording.files
     names = f"{first} to {others[-1].name}" if others else str(first)
-    print(
+    print_line(
         f"{names}: {recording.samples} samples of {recording.channels} channels",
-        file=sys.stderr if is_device(first) else sys.stdout,
+        to_stderr=is_device(first),
     )
     if recording.interrupted:
-        print("interrupted: the log is whole, and ends there", file=sys.stderr)
+        print_line("interrupted: the log is whole, and ends there", to_stderr=True)
         return ExitCode.INTERRUPTED
     if not recording.samples:
-        print("shiplog: no sample was recorded; the events of the log state why", file=sys.stderr)
+        print_line(
+            "shiplog: no sample was recorded; the events of the log state why", to_stderr=True
+        )
         return ExitCode.FAILURE
     if recording.dropped:
-        print(f"{recording.dropped} packets came too fast and were dropped", file=sys.stderr)
+        print_line(f"{recording.dropped} packets came too fast and were dropped", to_stderr=True)
         return ExitCode.DATA_LOST
     return ExitCode.OK
 

@@ -1,7 +1,6 @@
 """What `record` does with streams: one stream of a format, or all sources of a trial file."""
 
 import argparse
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -25,7 +24,7 @@ from recorders.trial.recorded_source import RecordedSource
 from recorders.trial.stream_tables import stream_tables
 from recorders.trial.trial_file import load_trial_file
 from recorders.trial.undecoded import why_undecoded
-from shiplog.cli.console import print_tables, print_warnings, progress
+from shiplog.cli.console import print_line, print_tables, print_warnings, progress
 from shiplog.cli.paths import require_outputs, require_suffix
 from shiplog.errors import UsageError
 from shiplog.files import is_device
@@ -164,7 +163,7 @@ def _shown(
             stopped_by_signals(source.stop),
             live_display(shown) as on_chunk,
         ):
-            print(f"recording to {log}; Ctrl-C ends it", file=sys.stderr, flush=True)
+            print_line(f"recording to {log}; Ctrl-C ends it", to_stderr=True)
             yield on_chunk
     else:
         with progress() as on_progress:

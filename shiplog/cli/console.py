@@ -1,4 +1,8 @@
-"""What a verb prints: progress, tables, warnings, JSON."""
+"""What a verb prints: progress, tables, lines, warnings, JSON.
+
+Verbs print by these functions alone: they escape what could control a terminal, and replace what
+its encoding lacks.
+"""
 
 import json
 import sys
@@ -11,6 +15,8 @@ from shiplog.files import atomic_write
 from shiplog.printable import escape_json, printable
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.text_table import TextTable
+
+from .terminal import encodable
 
 MIN_NAME_WIDTH = 12  # characters of a shortened cell in the first column
 MIN_PROSE_WIDTH = 30  # characters of a column that is wrapped
@@ -51,14 +57,14 @@ def _progress_bar(note: str) -> Iterator[ProgressCallback]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    bar_columns = (SpinnerColumn(), BarColumn(bar_width=24), TimeElapsedColumn())
+    bar_columns = (SpinnerColumn("line"), BarColumn(bar_width=24), TimeElapsedColumn())
     columns = (*bar_columns, TextColumn("{task.description}"))
     start = time.monotonic()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
 
         def on_progress(step: str, share: float | None = None, /) -> None:
-            text = f"{step}{note}{_remaining(time.monotonic() - start, share)}"
+            text = f"{printable(step)}{note}{_remaining(time.monotonic() - start, share)}"
             total = None if share is None else 1.0
             bar.update(task, description=text, total=total, completed=share or 0.0)
 
@@ -72,7 +78,7 @@ def _progress_lines(note: str) -> ProgressCallback:
     def on_progress(step: str, share: float | None = None, /) -> None:
         if share is not None and step not in reported:
             text = f"{step}{_remaining(time.monotonic() - start, share)}"
-            print(text if reported else text + note, file=sys.stderr, flush=True)
+            print_line(text if reported else text + note, to_stderr=True)
             reported.add(step)
 
     return on_progress
@@ -98,26 +104,31 @@ def print_tables(tables: Sequence[TextTable], *, to_stderr: bool = False) -> Non
     from rich.table import Table
 
     console = Console(stderr=to_stderr, highlight=False, markup=False)  # [deg] is a unit
+
+    def safe(text: str) -> str:
+        return encodable(printable(text), console.encoding)
+
     for table in tables:
-        rows = [tuple(map(printable, row)) for row in table.rows]
+        headings = ["\n".join(map(safe, heading.split("\n"))) for heading in table.columns]
+        rows = [tuple(map(safe, row)) for row in table.rows]
         fixed = len(table.columns) - table.has_prose  # columns that are not wrapped
         room = console.width - (MIN_PROSE_WIDTH + GAP if table.has_prose else 0)
-        parts = _fitted(table.columns[:fixed], [row[:fixed] for row in rows], room)
+        parts = _fitted(headings[:fixed], [row[:fixed] for row in rows], room)
         for number, part in enumerate(parts):
-            title = table.title if number == 0 else f"{table.title} (continued)"
+            title = safe(table.title) + (" (continued)" if number else "")
             shown = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE)
             for i, heading in enumerate(part[0]):
                 shown.add_column(
                     heading, justify="left" if i == 0 else "right", no_wrap=i > 0, overflow="fold"
                 )
-            prose = fixed if number == 0 else len(table.columns)  # where it begins in this part
-            for heading in table.columns[prose:]:
+            prose = fixed if number == 0 else len(headings)  # where it begins in this part
+            for heading in headings[prose:]:
                 shown.add_column(heading, overflow="fold")
             for cells, row in zip(part[1:], rows, strict=True):
                 shown.add_row(*cells, *row[prose:])
             console.print(shown)
         for remark in table.remarks:
-            console.print(printable(remark))
+            console.print(safe(remark))
         console.print()
 
 
@@ -186,21 +197,45 @@ def shortened(text: str, size: int) -> str:
     return f"{text[:head]}…{text[len(text) - (size - 1 - head) :]}"
 
 
+def print_line(text: str, *, to_stderr: bool = False) -> None:
+    """Print a text in one line at once: a result on stdout, any other information on stderr."""
+    print(printable(text), file=sys.stderr if to_stderr else sys.stdout, flush=to_stderr)
+
+
+def print_lines(text: str, *, to_stderr: bool = False) -> None:
+    """Print a text whose line ends are ours."""
+    for line in text.split("\n"):
+        print_line(line, to_stderr=to_stderr)
+
+
 def print_warnings(warnings: Sequence[str]) -> None:
     """Print warnings on stderr, a line each."""
     for warning in warnings:
-        print(f"warning: {printable(warning)}", file=sys.stderr)
+        print_line(f"warning: {warning}", to_stderr=True)
+
+
+def print_toml(text: str) -> None:
+    """Print a file in TOML on stdout, with what its encoding may lack as escapes of TOML."""
+    if not _is_unicode(sys.stdout.encoding):
+        text = "".join(c if c.isascii() else f"\\U{ord(c):08x}" for c in text)
+    sys.stdout.write(text)
 
 
 def write_json(value: object, where: str) -> None:
     """Write a value as JSON to a file, or to stdout where its name is ``-``.
 
-    Characters that do not print are escaped, as for a terminal.
+    Characters that do not print are escaped, as for a terminal, and on stdout those that its
+    encoding may lack.
     """
-    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    ensure_ascii = where == "-" and not _is_unicode(sys.stdout.encoding)
+    text = json.dumps(value, indent=2, ensure_ascii=ensure_ascii, allow_nan=False)
     text = "\n".join(map(escape_json, text.split("\n"))) + "\n"
     if where == "-":
         sys.stdout.write(text)
         return
     with atomic_write(where) as part:
         part.write_text(text, encoding="utf-8")
+
+
+def _is_unicode(encoding: str) -> bool:
+    return encoding.lower().startswith("utf")

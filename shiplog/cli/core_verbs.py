@@ -1,13 +1,11 @@
 """The verbs of the core: info, convert, layout."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from shiplog.errors import ShiplogError
-from shiplog.printable import printable
 
-from .console import print_tables, print_warnings, progress, write_json
+from .console import print_line, print_tables, print_toml, print_warnings, progress, write_json
 from .options import add_cut_options, add_derive_option
 from .paths import require_distinct, require_inputs, require_outputs
 from .verb import ExitCode, Verb
@@ -36,11 +34,11 @@ def _info(arguments: argparse.Namespace) -> ExitCode:
         write_json(info.to_dict(), arguments.json)
     else:
         start = f"from {info.start_utc}" if info.start_utc else "no samples"
-        print(f"{printable(info.name)}: {start}, {info.duration_secs:.1f} s, {info.state}")
+        print_line(f"{info.name}: {start}, {info.duration_secs:.1f} s, {info.state}")
         print_tables(info_tables(info))
         for key, value in info.metadata.items():
-            print(f"  {printable(key)}: {printable(value)}")
-        print(f"  vessel.toml: {'attached' if info.has_vessel else 'none'}")
+            print_line(f"  {key}: {value}")
+        print_line(f"  vessel.toml: {'attached' if info.has_vessel else 'none'}")
         print_warnings(info.warnings)
     return ExitCode.DATA_LOST if info.data_lost else ExitCode.OK
 
@@ -61,7 +59,7 @@ def _info_of_several(arguments: argparse.Namespace) -> ExitCode:
                 entries.append(infos[-1].to_dict())
             except ShiplogError as error:
                 entries.append({"name": Path(path).name, "error": str(error)})
-                print(f"shiplog: {error}", file=sys.stderr)
+                print_line(f"shiplog: {error}", to_stderr=True)
                 failed = True
     if arguments.json:
         write_json(entries, arguments.json)
@@ -108,7 +106,7 @@ def _convert(arguments: argparse.Namespace) -> ExitCode:
         )
     print_warnings(warnings)
     samples = sum(len(channel) for channel in log.channels)
-    print(f"{arguments.target}: {samples} samples of {len(log.channels)} channels")
+    print_line(f"{arguments.target}: {samples} samples of {len(log.channels)} channels")
     return ExitCode.DATA_LOST if log.data_lost else ExitCode.OK
 
 
@@ -148,12 +146,12 @@ def _layout(arguments: argparse.Namespace) -> ExitCode:
     require_distinct([arguments.output], [arguments.table])
     draft = draft_layout(arguments.table)
     if arguments.output is None:
-        print(draft.text, end="")
+        print_toml(draft.text)
     else:
         with atomic_write(arguments.output) as part:
             part.write_text(draft.text, encoding="utf-8")
     for remark in draft.remarks:
-        print(f"{arguments.table.name}: {remark}", file=sys.stderr)
+        print_line(f"{arguments.table.name}: {remark}", to_stderr=True)
     return ExitCode.OK
 
 

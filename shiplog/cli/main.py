@@ -13,6 +13,7 @@ from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
+from typing import NoReturn
 
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import declared_entries, extension_names, load_extension
@@ -20,6 +21,8 @@ from shiplog.interrupts import deferred, handled_signals, interruptible, take_si
 from shiplog.printable import printable
 from shiplog.version import __version__
 
+from .console import print_line
+from .terminal import output_error, prepare_streams
 from .verb import ExitCode, Verb
 
 GROUP = "shiplog.verbs"
@@ -51,6 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if arguments is None:
         take_signals()
+        prepare_streams()
         return _run(sys.argv[1:], is_process=True)
     with handled_signals(), deferred():
         return _run(list(arguments), is_process=False)
@@ -65,9 +69,6 @@ def _run(arguments: list[str], *, is_process: bool) -> int:
         return _fail(error, ExitCode.USAGE)
     except ShiplogError as error:
         return _fail(error, ExitCode.FAILURE)
-    except BrokenPipeError:  # the reader of our output has closed it
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return ExitCode.OK
     except OSError as error:
         return _fail(f"cannot write the output: {error.strerror or error}", ExitCode.FAILURE)
     except KeyboardInterrupt:
@@ -84,7 +85,8 @@ def _run_verb(arguments: list[str], *, is_process: bool) -> int:
     if is_process:
         _prepare_process(verb)
     code = verb.run(parsed)
-    sys.stdout.flush()
+    if error := output_error():
+        raise error
     if is_process:
         gc.freeze()  # the end of the process, too, would search all modules for garbage
     return code
@@ -127,8 +129,16 @@ class _UnneededModules(MetaPathFinder):
 
 
 def _fail(error: object, code: ExitCode) -> ExitCode:
-    print(f"shiplog: {printable(' '.join(str(error).split()))}", file=sys.stderr)
+    print_line(f"shiplog: {' '.join(str(error).split())}", to_stderr=True)
     return code
+
+
+class _ArgumentParser(argparse.ArgumentParser):
+    """Parser whose errors quote arguments, such as names of files, in characters that print."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage and the error, and end the process."""
+        super().error(printable(message))
 
 
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
@@ -136,7 +146,7 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     names = _verb_names()
     first = _first(arguments)
     asked = first if first in names else None
-    parser = argparse.ArgumentParser(
+    parser = _ArgumentParser(
         prog="shiplog",
         description="Record, convert, replay, identify and check sea trials.",
         epilog="shiplog VERB --help shows the options of a verb, with examples.",
