@@ -22,7 +22,7 @@ from shiplog.printable import printable
 from shiplog.version import __version__
 
 from .console import print_line
-from .terminal import output_error, prepare_streams
+from .terminal import prepare_streams, stdout_error
 from .verb import ExitCode, Verb
 
 GROUP = "shiplog.verbs"
@@ -85,7 +85,7 @@ def _run_verb(arguments: list[str], *, is_process: bool) -> int:
     if is_process:
         _prepare_process(verb)
     code = verb.run(parsed)
-    if error := output_error():
+    if error := stdout_error():
         raise error
     if is_process:
         gc.freeze()  # the end of the process, too, would search all modules for garbage

@@ -105,7 +105,7 @@ def _stream(stream: TextIO | None, descriptor: int, *, line_buffering: bool) -> 
     )
 
 
-def output_error() -> OSError | None:
+def stdout_error() -> OSError | None:
     """Return the error for which a part of stdout is lost; a reader that has left is none.
 
     To be called at the end of the work.
