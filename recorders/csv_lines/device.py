@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from shiplog.errors import LayoutError
+from shiplog.layouts.channel_sections import parse_columns
 from shiplog.layouts.layout import DELIMITERS, HEMISPHERES, VELOCITIES, Column
-from shiplog.layouts.layout_parser import KIND, parse_columns
+from shiplog.layouts.layout_parser import KIND
 from shiplog.toml_text import list_errors, parse_toml, read_toml_text, unknown_key
 from shiplog.units import CATALOGUE, GEOGRAPHIC
 
