@@ -1,7 +1,7 @@
 """What the scan of an MCAP file collects: samples, raw packets and events by channel."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from mcap import records
@@ -86,12 +86,29 @@ class EventMessage:
     data: bytes
 
 
-class RawBlock(NamedTuple):
-    """Raw packets of one channel in one MCAP chunk: its id, (n,) times of reception, n messages."""
+@dataclass(frozen=True, eq=False)
+class KeptMessages:
+    """The messages of one channel in one MCAP chunk, as they are in the file.
 
-    channel_id: int
-    received_ns: TimeArray
+    Attributes
+    ----------
+    received, measured
+        (n,) times of logging and of publication, ns.
+    messages
+        n serialised messages.
+    number, offsets
+        Their place in the file, as in `SampleBlock`.
+    """
+
+    received: TimeArray
+    measured: TimeArray
     messages: list[bytes]
+    number: int
+    offsets: Offsets
+
+
+# whether the messages of a channel are kept as they are, given the schemas of the file
+Keeps = Callable[[records.Channel, Mapping[int, records.Schema]], bool]
 
 
 @dataclass
@@ -119,10 +136,10 @@ class McapContents:
         Whether to keep them, because a later record may describe their channel.
     not_decoded
         The numbers of raw packets, and of messages of other programs, by channel id.
-    keep_raw
-        Whether to keep the raw packets in `raw_blocks` too.
-    raw_blocks
-        The raw packets not yet taken, in the order of the file.
+    keeps
+        Selects the channels whose messages are kept as they are in `kept`; none where it is None.
+    kept
+        The messages kept and not yet taken, by channel id, in the order of the file.
     event_messages
         The events not yet decoded.
     events
@@ -167,8 +184,8 @@ class McapContents:
     undescribed_counts: dict[int, int] = field(default_factory=dict)
     keep_undescribed: bool = True
     not_decoded: dict[int, MessageCount] = field(default_factory=dict)
-    keep_raw: bool = False
-    raw_blocks: list[RawBlock] = field(default_factory=list)
+    keeps: Keeps | None = None
+    kept: dict[int, list[KeptMessages]] = field(default_factory=dict)
     event_messages: list[EventMessage] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     foreign_records: dict[str, None] = field(default_factory=dict)
@@ -194,3 +211,8 @@ class McapContents:
     def report(self, text: str) -> None:
         """Report damage in the record that is being read, by which something is lost."""
         self.damage.append(Damage(*self.reading, text))
+
+    def take_kept(self) -> dict[int, list[KeptMessages]]:
+        """Return the messages kept so far, by channel id, and release them."""
+        kept, self.kept = self.kept, {}
+        return kept

@@ -16,7 +16,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from .contents import EventMessage, McapContents, MessageCount, RawBlock, SampleBlock
+from .contents import EventMessage, KeptMessages, McapContents, MessageCount, SampleBlock
 from .limits import MAX_DESCRIPTION_BYTES
 from .locate import (
     Offsets,
@@ -197,18 +197,18 @@ def _collect_channel(
         return
     channel = contents.channels[channel_id]
     schema = schema_of(channel, contents.schemas)
+    is_kept = contents.keeps is not None and contents.keeps(channel, contents.schemas)
+    if is_kept:
+        kept = _kept_messages(data, offsets, number)
+        contents.kept.setdefault(channel_id, []).append(kept)
     if is_events(channel, contents.schemas):
         contents.event_messages += _event_messages(data, offsets, number)
         return
     if schema is None:
         count = contents.not_decoded.setdefault(channel_id, MessageCount())
         count.add(gather(data, offsets, MESSAGE_HEAD))
-        if contents.keep_raw and is_raw(channel, contents.schemas):
-            heads, messages = _undecoded(data, offsets)
-            received = heads["received"].astype(np.int64)
-            contents.raw_blocks.append(RawBlock(channel_id, received, messages))
         return
-    if contents.selected is not None and channel_id not in contents.selected:
+    if is_kept or (contents.selected is not None and channel_id not in contents.selected):
         return
     block = _fixed_width_block(data, offsets, schema, number)
     block = block or _undecoded_block(data, offsets, number)
@@ -242,9 +242,14 @@ def _event_messages(data: bytes, offsets: Offsets, number: int) -> Iterator[Even
 
 
 def _undecoded_block(data: bytes, offsets: Offsets, number: int) -> SampleBlock:
+    kept = _kept_messages(data, offsets, number)
+    return SampleBlock(kept.received, kept.measured, kept.messages, number, offsets)
+
+
+def _kept_messages(data: bytes, offsets: Offsets, number: int) -> KeptMessages:
     heads, messages = _undecoded(data, offsets)
     received, measured = heads["received"].astype(np.int64), heads["measured"].astype(np.int64)
-    return SampleBlock(received, measured, messages, number, offsets)
+    return KeptMessages(received, measured, messages, number, offsets)
 
 
 def _undecoded(data: bytes, offsets: Offsets) -> tuple[NDArray[np.void], list[bytes]]:

@@ -9,7 +9,8 @@ from mcap import records
 from shiplog.errors import LogError
 from shiplog.types import RawPackets
 
-from .contents import McapContents, RawBlock
+from .contents import KeptMessages, McapContents
+from .decode import is_raw
 from .mcap_file import open_mcap
 from .scan import scan
 from .schema import RAW, RAW_NAME
@@ -45,14 +46,16 @@ def read_raw(path: str | os.PathLike[str]) -> Iterator[RawPackets]:
 def raw_groups(path: str | os.PathLike[str]) -> Iterator[list[RawPackets]]:
     """Read raw packets as `read_raw` does, those of all sources in one MCAP chunk together."""
     path = Path(path)
-    contents = McapContents(selected=frozenset(), keep_raw=True)
+    contents = McapContents(selected=frozenset(), keeps=is_raw)
     with open_mcap(path) as file:
         for _ in scan(file, contents):
-            blocks, contents.raw_blocks = contents.raw_blocks, []
             contents.event_messages.clear()
-            if blocks:
+            kept = contents.take_kept()
+            if kept:
                 yield [
-                    _packets(path, contents.channels[block.channel_id], block) for block in blocks
+                    _packets(path, contents.channels[channel_id], block)
+                    for channel_id, blocks in kept.items()
+                    for block in blocks
                 ]
 
 
@@ -61,7 +64,7 @@ def raw_source(record: records.Channel) -> str:
     return record.metadata.get("source", record.topic.removeprefix(f"/{RAW_NAME}/"))
 
 
-def _packets(path: Path, record: records.Channel, block: RawBlock) -> RawPackets:
+def _packets(path: Path, record: records.Channel, block: KeptMessages) -> RawPackets:
     try:
         data = tuple(map(packet_of, block.messages))
     except ValueError as error:
@@ -69,6 +72,4 @@ def _packets(path: Path, record: records.Channel, block: RawBlock) -> RawPackets
             f"{record.topic} has messages that are not {RAW.name}; "
             f"correct the program that wrote them: {path}"
         ) from error
-    return RawPackets(
-        raw_source(record), record.metadata.get("format", ""), block.received_ns, data
-    )
+    return RawPackets(raw_source(record), record.metadata.get("format", ""), block.received, data)
