@@ -76,16 +76,21 @@ def _info_of_several(arguments: argparse.Namespace) -> ExitCode:
 
 def _configure_convert(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "source", metavar="FROM", type=Path, help="a log (.mcap, .csv, .parquet) or a table"
+        "source", metavar="FROM", type=Path, help="a log, a table, or MCAP of another program"
     )
     parser.add_argument("target", metavar="TO", type=Path, help=".mcap, .csv or .parquet")
     parser.add_argument(
-        "--layout", type=Path, help="the columns of a foreign table: a TOML file (docs/tables.md)"
+        "--layout",
+        type=Path,
+        help="the columns of a foreign table, or the topics and fields of a foreign MCAP file: "
+        "TOML (docs/tables.md, docs/foreign_mcap.md)",
     )
     add_cut_options(parser)
     add_derive_option(parser)
     parser.add_argument(
-        "--strict", action="store_true", help="refuse a table with a contradiction in unit or sign"
+        "--strict",
+        action="store_true",
+        help="refuse a foreign file with a contradiction in unit or sign",
     )
 
 
@@ -121,11 +126,12 @@ INFO = Verb(
     ),
 )
 CONVERT = Verb(
-    "convert a table to a log, or a log to a table",
+    "convert a table or a foreign MCAP file to a log, or a log to a table",
     _configure_convert,
     _convert,
     (
         "shiplog convert run.dat run.mcap --layout my_tank.toml",
+        "shiplog convert bag.mcap trial.mcap --layout ros.toml   (messages of ROS 2, ...)",
         "shiplog convert trial.mcap trial.csv",
         "shiplog convert day.mcap zigzag.mcap --from 12:04:30 --to 12:21   (a part of it)",
         "shiplog convert trial.mcap.part trial.mcap   (a recording that was cut short)",

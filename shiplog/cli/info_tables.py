@@ -115,7 +115,7 @@ def _raw_row(topic: RawTopic, info: LogInfo) -> tuple[str, ...]:
 
 def _foreign_row(topic: ForeignTopic, info: LogInfo) -> tuple[str, ...]:
     encodings = [text for text in (topic.encoding, topic.schema_encoding) if text]
-    encoding = " / ".join(dict.fromkeys(encodings))
+    encoding = "/".join(dict.fromkeys(encodings))
     messages, span = str(topic.messages), _span_cells(topic, info)
     return (topic.topic, topic.schema, messages, _rate_cell(topic), encoding, *span)
 

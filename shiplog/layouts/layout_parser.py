@@ -88,6 +88,12 @@ class _LayoutParser(SectionParser):
 
     def layout(self) -> Layout:
         """Return the layout, or raise all its errors at once."""
+        sections = [section for section in self.table.values() if isinstance(section, dict)]
+        if any("field" in section for section in sections):
+            raise LayoutError(
+                "a layout of an MCAP file, but the file is a table; `shiplog layout FILE` drafts "
+                f"one for it: {self.where}"
+            )
         for key, value in self.table.items():
             if key in _KINDS:
                 self._top[key] = self._top_value(key, value)

@@ -75,6 +75,12 @@ class _McapLayoutParser(SectionParser):
 
     def layout(self) -> McapLayout:
         """Return the layout, or raise all its errors at once."""
+        sections = [section for section in self.table.values() if isinstance(section, dict)]
+        if any("column" in section for section in sections):
+            raise LayoutError(
+                "a layout of a table, but the file is MCAP; `shiplog layout FILE.mcap` drafts one "
+                f"for it, and a log of shiplog needs none: {self.where}"
+            )
         for key, value in self.table.items():
             if key in ("name", "source"):
                 self._parse_name(key, value)

@@ -11,8 +11,10 @@ from shiplog.checks.consistency.consistency_check import COMPARED_CHANNELS, cons
 from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.checks.data_quality import times_in_words
 from shiplog.errors import LogError, UsageError
+from shiplog.foreign_mcap.foreign_log import read_foreign_mcap
 from shiplog.layouts.layout import load_layout
-from shiplog.mcap.clock_repair import refuse_mixed_times
+from shiplog.layouts.mcap_layout import load_mcap_layout
+from shiplog.mcap.clock_repair import MixedTimes, refuse_mixed_times
 from shiplog.mcap.raw_reader import raw_groups
 from shiplog.mcap.reader import read_unchecked
 from shiplog.mcap.writer import write
@@ -47,11 +49,11 @@ def convert(
         File to write, in the format of its suffix: one of `SUFFIXES`. From MCAP to MCAP each
         channel is sorted by measured time.
     layout
-        Layout file of a foreign table.
+        Layout file of a foreign table, or of an MCAP file of another program.
     start, end
         The part to convert, as `TrialLog.between` takes them; by default all.
     strict
-        Refuse a foreign table whose channels contradict each other in unit or sign.
+        Refuse a foreign file whose channels contradict each other in unit or sign.
     derive
         The channels to add that the log lacks, some of ``yaw_rate`` and ``speed``.
 
@@ -76,8 +78,8 @@ def convert(
         )
     if source.resolve() == target.resolve():
         raise UsageError(f"source and target are the same file; name another target: {target}")
-    is_mcap = layout is None and _suffix(source) == ".mcap"
-    log, mixed = read_unchecked(source) if is_mcap else (_read_table(source, layout), [])
+    is_mcap = _suffix(source) == ".mcap"
+    log, mixed = _read_mcap(source, layout) if is_mcap else (_read_table(source, layout), [])
     is_copy = is_mcap and target.suffix.lower() == ".mcap"
     if not (is_copy and any(raw_groups(source))):  # a recording of raw packets alone is kept
         _require_samples(log, source)
@@ -104,6 +106,13 @@ def convert(
     writers = {".csv": write_csv, ".parquet": write_parquet}
     writers[target.suffix.lower()](log, target)
     return log, warnings
+
+
+def _read_mcap(source: Path, layout: Path | None) -> tuple[TrialLog, list[MixedTimes]]:
+    """Read a log, or by a layout the topics of another program's file."""
+    if layout is None:
+        return read_unchecked(source)
+    return read_foreign_mcap(source, load_mcap_layout(layout))
 
 
 def _raw_within(
@@ -156,7 +165,7 @@ def _read_table(source: Path, layout: Path | None) -> TrialLog:
     """Read a table of shiplog, or a foreign one by its layout."""
     suffix = _suffix(source)
     if layout is not None:
-        if suffix in (".mcap", ".parquet") or (suffix == ".csv" and _is_shiplog_csv(source)):
+        if suffix == ".parquet" or (suffix == ".csv" and _is_shiplog_csv(source)):
             raise UsageError(
                 f"a layout is for foreign tables, but this is a log; omit --layout: {source}"
             )

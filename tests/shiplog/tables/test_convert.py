@@ -47,10 +47,23 @@ def test_a_foreign_table_without_layout_is_an_error_that_names_the_option(
 
 def test_a_layout_for_a_log_is_an_error(foreign: tuple[Path, Path]) -> None:
     folder = foreign[0].parent
-    for name in ("a.mcap", "a.csv", "a.parquet"):
+    for name in ("a.csv", "a.parquet"):
         convert(foreign[0], folder / name, foreign[1])
         with pytest.raises(UsageError, match="omit --layout"):
             convert(folder / name, folder / "b.mcap", foreign[1])
+
+
+def test_the_layout_of_a_table_is_not_that_of_an_mcap_file_and_the_reverse(
+    foreign: tuple[Path, Path],
+) -> None:
+    folder = foreign[0].parent
+    convert(foreign[0], folder / "a.mcap", foreign[1])
+    with pytest.raises(LayoutError, match="a layout of a table, but the file is MCAP"):
+        convert(folder / "a.mcap", folder / "b.mcap", foreign[1])
+    bag = folder / "bag.toml"
+    bag.write_text("[speed]\ntopic = '/log'\nfield = 'v'\nunit = 'kn'\n")
+    with pytest.raises(LayoutError, match="a layout of an MCAP file, but the file is a table"):
+        convert(foreign[0], folder / "b.mcap", bag)
 
 
 def test_a_target_of_unknown_suffix_is_an_error_that_lists_the_others(tmp_path: Path) -> None:
