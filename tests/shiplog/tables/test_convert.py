@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from small_logs import LAYOUT, require_same, trial
 
-from shiplog.errors import LogError, UsageError
+from shiplog.errors import LayoutError, LogError, UsageError
 from shiplog.mcap.reader import read
 from shiplog.mcap.writer import write
 from shiplog.tables.convert import convert, sorted_by_time
