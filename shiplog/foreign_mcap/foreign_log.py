@@ -10,7 +10,7 @@ from shiplog.errors import LayoutError, LogError
 from shiplog.layouts.mcap_layout import FieldChannel, McapLayout
 from shiplog.mcap.clock_repair import MixedTimes
 from shiplog.mcap.contents import McapContents, SampleBlock
-from shiplog.mcap.reader import open_mcap
+from shiplog.mcap.mcap_file import open_mcap
 from shiplog.mcap.scan import scan
 from shiplog.mcap.schema import ENCODING, schema_for
 from shiplog.mcap.trial_log import build_trial_log
@@ -51,8 +51,8 @@ def read_foreign_mcap(path: Path, layout: McapLayout) -> tuple[TrialLog, list[Mi
     converted = _Converted(path, layout, channels)
     names = {channel.choice.topic for channel in channels}
     contents = McapContents(keeps=lambda record, _: record.topic in names)
-    with open_mcap(path) as stream:
-        for _ in scan(stream, contents):
+    with open_mcap(path) as file:
+        for _ in scan(file, contents):
             converted.add(contents)
     errors = [text for topic in converted.topics.values() for text in topic.errors()]
     if errors:
@@ -62,9 +62,9 @@ def read_foreign_mcap(path: Path, layout: McapLayout) -> tuple[TrialLog, list[Mi
     if useless:
         raise LogError(f"{'; '.join(text for topic in useless for text in topic.damage())}: {path}")
     converted.move_to(contents)
-    contents.damage += [text for topic in converted.topics.values() for text in topic.damage()]
     contents.metadata |= {"converted_from": path.name, "layout": layout.name}
     log = build_trial_log(path, contents)
+    damage = [text for topic in converted.topics.values() for text in topic.damage()]
     warnings = [text for topic in converted.topics.values() for text in topic.warnings()]
     if layout.assumed:
         warnings.append(
@@ -72,7 +72,13 @@ def read_foreign_mcap(path: Path, layout: McapLayout) -> tuple[TrialLog, list[Mi
             f"remove `assumed` there: {layout.where}"
         )
     filled = tuple(channel for channel in log if len(channel))
-    return replace(log, channels=filled, warnings=(*log.warnings, *warnings)), contents.mixed_times
+    log = replace(
+        log,
+        channels=filled,
+        warnings=(*log.warnings, *damage, *warnings),
+        data_lost=log.data_lost or bool(damage),
+    )
+    return log, contents.mixed_times
 
 
 @dataclass(eq=False)

@@ -10,9 +10,8 @@ from mcap import records
 from shiplog.errors import LayoutError
 from shiplog.layouts.mcap_layout import FieldChannel, McapLayout
 from shiplog.mcap.contents import McapContents
-from shiplog.mcap.reader import open_mcap
+from shiplog.mcap.mcap_file import open_mcap
 from shiplog.mcap.scan import scan
-from shiplog.mcap.summary import read_summary
 from shiplog.units import did_you_mean
 
 from .topic_samples import short_type
@@ -55,15 +54,15 @@ def read_file_topics(path: Path) -> list[FileTopic]:
     LogError
         The file is missing or is not MCAP.
     """
-    with open_mcap(path) as stream:
-        summary = read_summary(stream)
+    with open_mcap(path) as file:
+        summary = None if file.check.is_intact is False else file.check.summary
         if summary is not None:
             counts = summary.statistics.channel_message_counts
             schemas, channels = summary.schemas, summary.channels
         else:
             contents = McapContents(selected=frozenset(), keeps=lambda *_: True)
             numbers: dict[int, int] = {}
-            for _ in scan(stream, contents):
+            for _ in scan(file, contents):
                 contents.event_messages.clear()
                 for channel_id, blocks in contents.take_kept().items():
                     count = sum(len(block.messages) for block in blocks)
