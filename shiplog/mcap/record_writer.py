@@ -45,6 +45,7 @@ class McapRecordWriter:
         self._schemas: list[records.Schema] = []
         self._channels: list[records.Channel] = []
         self._undescribed: list[records.McapRecord] = []  # schemas and channels not yet written
+        self._descriptions = b""  # the records of all schemas and channels so far
         self._mcap_chunk_indexes: list[records.ChunkIndex] = []
         self._metadata_indexes: list[records.MetadataIndex] = []
         self._attachment_indexes: list[records.AttachmentIndex] = []
@@ -93,19 +94,19 @@ class McapRecordWriter:
         self._append(data)
 
     def add_schema(self, schema: records.Schema) -> None:
-        """Describe a schema at the beginning of the next MCAP chunk."""
+        """Describe a schema at the beginning of each further MCAP chunk."""
         self._schemas.append(schema)
         self._undescribed.append(schema)
 
     def add_channel(self, channel: records.Channel) -> None:
-        """Describe a channel at the beginning of the next MCAP chunk."""
+        """Describe a channel at the beginning of each further MCAP chunk."""
         self._channels.append(channel)
         self._undescribed.append(channel)
 
     def write_mcap_chunk(self, mcap_chunk: McapChunk) -> None:
         """Append a complete MCAP chunk and its message indexes."""
         self.close_mcap_chunk()
-        descriptions = self._take_descriptions()
+        descriptions = self._all_descriptions()
         data = descriptions + mcap_chunk.data.tobytes() if descriptions else mcap_chunk.data.data
         compressed = self._compressor.compress(data)
         head = mcap_chunk_head(
@@ -131,7 +132,7 @@ class McapRecordWriter:
         if self._undescribed:  # descriptions precede the messages of an MCAP chunk
             self.close_mcap_chunk()
         if self._open is None:
-            self._open = OpenMcapChunk(self._size, self._take_descriptions(), messages.first_ns)
+            self._open = OpenMcapChunk(self._size, self._all_descriptions(), messages.first_ns)
             self._write(self._open.first_bytes())
         self._write(self._open.append(messages))
         if self._open.is_full:
@@ -160,7 +161,7 @@ class McapRecordWriter:
             The number of messages written, by channel id.
         """
         self.close_mcap_chunk()
-        self._append(self._take_descriptions())  # of channels without samples
+        self._append(_records_bytes(self._undescribed))  # of channels without samples
         self._append(_record_bytes(records.DataEnd(data_section_crc=self._crc)))
         self._write_summary(message_counts)
 
@@ -217,9 +218,11 @@ class McapRecordWriter:
             )
         )
 
-    def _take_descriptions(self) -> bytes:
-        undescribed, self._undescribed = self._undescribed, []
-        return _records_bytes(undescribed)
+    def _all_descriptions(self) -> bytes:
+        """Return the schemas and channels so far, so that each MCAP chunk can be read alone."""
+        self._descriptions += _records_bytes(self._undescribed)
+        self._undescribed = []
+        return self._descriptions
 
     def _write_summary(self, message_counts: Mapping[int, int]) -> None:
         start, data, summary_offsets = self._size, b"", []

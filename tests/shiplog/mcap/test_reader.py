@@ -580,7 +580,27 @@ def test_a_damaged_first_mcap_chunk_does_not_lose_the_others(path: Path) -> None
     assert len(log.warnings) == 1
 
 
-def test_lost_samples_without_a_channel_description_are_counted(path: Path) -> None:
+@pytest.mark.parametrize("number", range(5))
+def test_each_mcap_chunk_can_be_read_alone(path: Path, number: int) -> None:
+    original, data = write_flushed(path)
+    for n, (start, end) in enumerate(mcap_chunk_ranges(data)):
+        if n != number:
+            data = flip_bit(data, 4 * (start + end))
+    path.write_bytes(data)
+    rows = slice(100 * number, 100 * (number + 1))
+    assert samples(read(path)) == {t: r[rows] for t, r in samples(original).items()}
+
+
+def test_lost_samples_without_a_channel_description_are_counted(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Other recorders describe a channel only once."""
+
+    def described_once(self: McapRecordWriter) -> bytes:
+        undescribed, self._undescribed = self._undescribed, []
+        return _records_bytes(undescribed)
+
+    monkeypatch.setattr(McapRecordWriter, "_all_descriptions", described_once)
     _, data = write_flushed(path)
     _, end = mcap_chunk_ranges(data)[0]
     (data_end,) = (begin for opcode, begin, _ in file_records(data) if opcode == Opcode.DATA_END)
