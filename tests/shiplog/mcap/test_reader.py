@@ -38,6 +38,7 @@ import shiplog.mcap.decode
 import shiplog.mcap.decompress
 from shiplog import Channel, LogError, LogWriter, TrialLog, UsageError, read, write
 from shiplog.mcap.messages import descriptor_set
+from shiplog.mcap.record_writer import McapRecordWriter, _records_bytes
 from shiplog.mcap.schema import schema_for
 from shiplog.units import GEOGRAPHIC
 
