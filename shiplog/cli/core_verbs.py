@@ -140,17 +140,21 @@ CONVERT = Verb(
 
 
 def _configure_layout(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("table", metavar="TABLE", type=Path, help="a foreign table with a header")
+    parser.add_argument(
+        "table", metavar="FILE", type=Path, help="a foreign table with a header, or an MCAP file"
+    )
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="layout file to write")
 
 
 def _layout(arguments: argparse.Namespace) -> ExitCode:
     from shiplog.files import atomic_write
+    from shiplog.foreign_mcap.mcap_draft import draft_mcap_layout
     from shiplog.tables.draft import draft_layout
 
     require_outputs(arguments.output)
     require_distinct([arguments.output], [arguments.table])
-    draft = draft_layout(arguments.table)
+    is_mcap = arguments.table.name.removesuffix(".part").lower().endswith(".mcap")
+    draft = (draft_mcap_layout if is_mcap else draft_layout)(arguments.table)
     if arguments.output is None:
         print_toml(draft.text)
     else:
@@ -162,8 +166,12 @@ def _layout(arguments: argparse.Namespace) -> ExitCode:
 
 
 LAYOUT = Verb(
-    "draft the layout of a foreign table from its header and values",
+    "draft the layout of a foreign table, or of an MCAP file of another program",
     _configure_layout,
     _layout,
-    ("shiplog layout run.csv -o run.toml", "shiplog convert run.csv run.mcap --layout run.toml"),
+    (
+        "shiplog layout run.csv -o run.toml",
+        "shiplog convert run.csv run.mcap --layout run.toml",
+        "shiplog layout bag.mcap -o ros.toml",
+    ),
 )

@@ -41,7 +41,7 @@ def field_getter(path: str) -> Getter:
 
 
 def optional_value(message: object, path: str) -> Any:  # noqa: ANN401 - of any type of message
-    """Return the value of a field, None where the message cannot have it."""
+    """Return the value of a field, None where the message cannot have it, or is None itself."""
     try:
         return field_getter(path)(message)
     except AttributeError:

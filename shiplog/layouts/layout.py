@@ -125,6 +125,22 @@ class Layout:
         return tuple(source for name, _, source in roles if name in ("latitude", "north"))
 
 
+@dataclass(frozen=True)
+class Draft:
+    """A drafted layout.
+
+    Attributes
+    ----------
+    text
+        The layout file, TOML.
+    remarks
+        One line for each column or topic: what it is read as, and what this is based on.
+    """
+
+    text: str
+    remarks: tuple[str, ...]
+
+
 def load_layout(path: str | os.PathLike[str]) -> Layout:
     """Load a layout from its TOML file.
 

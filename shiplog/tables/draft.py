@@ -1,14 +1,13 @@
 """Draft of a layout, from the header and the values of a foreign table."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from shiplog.errors import LayoutError
 from shiplog.layouts.header_words import named_unit, recognise, split_header
-from shiplog.layouts.layout import HEMISPHERES
+from shiplog.layouts.layout import HEMISPHERES, Draft
 from shiplog.layouts.layout_parser import parse_layout
 from shiplog.units import CATALOGUE, UNITS
 
@@ -20,22 +19,6 @@ from .printed_positions import looks_packed
 POSITION = ("latitude", "longitude", *HEMISPHERES)
 
 USUAL_UNITS = {"yaw_rate": "deg/min", "speed": "kn", "rpm": "rpm"}  # where nothing is stated
-
-
-@dataclass(frozen=True)
-class Draft:
-    """A drafted layout.
-
-    Attributes
-    ----------
-    text
-        The layout file, TOML.
-    remarks
-        One line for each column: what it is read as, and what this is based on.
-    """
-
-    text: str
-    remarks: tuple[str, ...]
 
 
 def draft_layout(path: Path) -> Draft:
