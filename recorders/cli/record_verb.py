@@ -11,11 +11,12 @@ from recorders.source import RecorderCommand
 from recorders.streams.format import GROUP as FORMAT_GROUP
 from recorders.streams.format import StreamFormat
 from shiplog.cli.console import print_line, progress
-from shiplog.cli.paths import require_outputs, require_suffix
 from shiplog.cli.verb import ExitCode, Verb
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import extension_names, load_extension
 from shiplog.files import claimed_name, is_device
+
+from .output_options import add_output_options, recording_output
 
 GROUP = "shiplog.recorders"
 TRIAL = "trial"  # the source that `record FILE.toml` is short for
@@ -73,21 +74,21 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     for name, command in _loaded(GROUP, RecorderCommand, "recorder", sources):
         own = _add_source(sources, name, command.help)
         command.configure(own)
-        _add_output(own, required=True)
+        add_output_options(own, required=True)
         own.set_defaults(recorder=command)
     for name, stream_format in _loaded(FORMAT_GROUP, StreamFormat, "format", sources):
         from .stream_commands import configure_stream
 
         own = _add_source(sources, name, stream_format.help)
         configure_stream(own, stream_format)
-        _add_output(own, required=False)
+        add_output_options(own, required=False)
         _add_dry_run(own)
         own.set_defaults(recorder=stream_format)
     own = _add_source(
         sources, TRIAL, "all sources of a trial file, into one log; `record FILE.toml` for short"
     )
     own.add_argument("trial", metavar="FILE", help="the trial file")
-    _add_output(own, required=False)
+    add_output_options(own, required=False)
     _add_dry_run(own)
     own.set_defaults(recorder=None)
 
@@ -119,12 +120,6 @@ def _add_source(sources: Any, name: str, text: str) -> argparse.ArgumentParser: 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     return parser
-
-
-def _add_output(parser: argparse.ArgumentParser, *, required: bool) -> None:
-    parser.add_argument(
-        "-o", "--output", required=required, metavar="FILE", help="the log to write"
-    )
 
 
 def _add_unloadable(sources: Any, name: str, error: ShiplogError) -> None:  # noqa: ANN401 - argparse's private class
@@ -171,19 +166,12 @@ def _recorded(arguments: argparse.Namespace) -> Recording:
     if arguments.recorder is None:
         from .stream_commands import record_trial
 
-        return record_trial(arguments.trial, arguments.output)
+        return record_trial(arguments)
     if isinstance(arguments.recorder, RecorderCommand):
-        if arguments.output is not None:
-            require_outputs(arguments.output)
-            require_suffix(".mcap", arguments.output)
         return _record_command(arguments.recorder, arguments)
-    if arguments.output is None:
-        raise UsageError("no output; add -o FILE")
     from .stream_commands import record_stream
 
-    require_outputs(arguments.output)
-    require_suffix(".mcap", arguments.output)
-    return record_stream(arguments, arguments.recorder, Path(arguments.output))
+    return record_stream(arguments, arguments.recorder, recording_output(arguments))
 
 
 def _record_command(command: RecorderCommand[Any], arguments: argparse.Namespace) -> Recording:
@@ -194,14 +182,19 @@ def _record_command(command: RecorderCommand[Any], arguments: argparse.Namespace
     """
     if arguments.output is None:  # the source could not be loaded
         command.open(arguments)
-    with claimed_name(arguments.output):
+    output = recording_output(arguments)
+    with claimed_name(output.log):
         source = command.open(arguments)
         from recorders.record import record
 
         with progress() as on_progress:
             on_progress("write")
             recording = record(
-                source, arguments.output, on_chunk=lambda n: on_progress(f"write: {n} samples")
+                source,
+                output.log,
+                rotation=output.rotation,
+                sync_secs=output.sync_secs,
+                on_chunk=lambda n: on_progress(f"write: {n} samples"),
             )
             if not recording.interrupted:
                 command.finish(arguments, source)

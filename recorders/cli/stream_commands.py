@@ -8,7 +8,7 @@ from functools import partial
 from math import inf
 from pathlib import Path
 
-from recorders.record import Recording, Rotation, growing_file, record
+from recorders.record import Recording, growing_file, record
 from recorders.streams.format import StreamFormat
 from recorders.streams.reception_clock import ReceptionClock
 from recorders.streams.stream_source import StreamSource
@@ -25,13 +25,12 @@ from recorders.trial.stream_tables import stream_tables
 from recorders.trial.trial_file import load_trial_file
 from recorders.trial.undecoded import why_undecoded
 from shiplog.cli.console import print_line, print_tables, print_warnings, progress
-from shiplog.cli.paths import require_outputs, require_suffix
-from shiplog.errors import UsageError
 from shiplog.files import is_device
 from shiplog.interrupts import stopped_by_signals
 from shiplog.types import Event
 
 from .live_display import MarkKey, Shown, live_display
+from .output_options import RecordingOutput, recording_output
 
 
 def configure_stream(parser: argparse.ArgumentParser, stream_format: StreamFormat) -> None:
@@ -55,7 +54,7 @@ def configure_stream(parser: argparse.ArgumentParser, stream_format: StreamForma
 
 
 def record_stream(
-    arguments: argparse.Namespace, stream_format: StreamFormat, output: Path
+    arguments: argparse.Namespace, stream_format: StreamFormat, output: RecordingOutput
 ) -> Recording:
     """Record one stream of a format."""
     request = StreamRequest(
@@ -69,28 +68,18 @@ def record_stream(
     return _record([request], output, {}, arguments.vessel)
 
 
-def record_trial(path: str, output: str | None) -> Recording:
+def record_trial(arguments: argparse.Namespace) -> Recording:
     """Record the sources of a trial file."""
-    trial = load_trial_file(path)
-    log = Path(output) if output is not None else trial.output
-    if log is None:
-        raise UsageError(f"no output; add -o FILE, or `file` in [output]: {path}")
-    require_outputs(log)
-    require_suffix(".mcap", log)
-    rotation = (
-        Rotation(trial.rotate_minutes, trial.rotate_megabytes)
-        if trial.rotate_minutes or trial.rotate_megabytes
-        else None
-    )
-    return _record(trial_requests(trial), log, trial_metadata(trial), trial.vessel, rotation)
+    trial = load_trial_file(arguments.trial)
+    output = recording_output(arguments, trial)
+    return _record(trial_requests(trial), output, trial_metadata(trial), trial.vessel)
 
 
 def _record(
     requests: Sequence[StreamRequest],
-    log: Path,
+    output: RecordingOutput,
     metadata: dict[str, str],
     vessel: str | None,
-    rotation: Rotation | None = None,
 ) -> Recording:
     vessel_toml = _vessel_text(vessel)
     clock = ReceptionClock()
@@ -98,16 +87,19 @@ def _record(
     source = open_streams(
         requests, clock, metadata=metadata, vessel_toml=vessel_toml, take_marks=marks.take
     )
-    with _shown(source, log, rotation, marks) as on_chunk:
+    if isinstance(source, LiveSource):
+        source.flush_secs = output.flush_secs
+    with _shown(source, output, marks) as on_chunk:
         recording = record(
             source,
-            log,
-            rotation=rotation,
+            output.log,
+            rotation=output.rotation,
             overwrites=not isinstance(source, LiveSource),  # a trial is not repeated for a log
+            sync_secs=output.sync_secs,
             on_chunk=on_chunk,
         )
     streams = _streams(source)
-    print_tables(stream_tables(streams), to_stderr=is_device(log))
+    print_tables(stream_tables(streams), to_stderr=is_device(output.log))
     print_warnings([text for stream in streams for text in stream.decoder.counts.warnings])
     if isinstance(source, LiveSource):
         print_warnings(
@@ -153,11 +145,12 @@ class _Marks:
 
 @contextmanager
 def _shown(
-    source: LiveSource | RecordedSource, log: Path, rotation: Rotation | None, marks: _Marks
+    source: LiveSource | RecordedSource, output: RecordingOutput, marks: _Marks
 ) -> Iterator[Callable[[int], None]]:
     """Show the status of a live source, which signals end, or the progress of a recorded one."""
     if isinstance(source, LiveSource):
-        shown = Shown(source, log, partial(growing_file, log, rotation))
+        log = output.log
+        shown = Shown(source, log, partial(growing_file, log, output.rotation))
         with (
             marks.listening(log),
             stopped_by_signals(source.stop),

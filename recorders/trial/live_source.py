@@ -52,6 +52,8 @@ class LiveSource:
         The text of the vessel file to keep in the log, or None.
     take_marks
         Returns the events that a person has marked since the last call.
+    flush_secs
+        How often what was received is yielded, s.
     """
 
     inputs: Sequence[LiveInput]
@@ -59,6 +61,7 @@ class LiveSource:
     trial_metadata: Mapping[str, str] = field(default_factory=dict)
     vessel_toml: str | None = None
     take_marks: Callable[[], Sequence[Event]] = tuple
+    flush_secs: float = BATCH_SECS
     status: TrialStatus = field(init=False)
     # no threading.Event: a signal handler that sets one can wait for itself for ever
     _stopped: bool = field(default=False, init=False, repr=False)
@@ -91,7 +94,7 @@ class LiveSource:
         self._stopped = True
 
     def chunks(self) -> Iterator[tuple[Recordable, ...]]:
-        """Yield what was received about every `BATCH_SECS`, until `stop` or the end of all.
+        """Yield what was received about every `flush_secs`, until `stop` or the end of all.
 
         A chunk is empty where nothing was received, so that a display and a rotation go on.
         """
@@ -100,7 +103,7 @@ class LiveSource:
             each.live.start()
         try:
             while not self._stopped and not self._all_ended():
-                time.sleep(BATCH_SECS)
+                self._wait()
                 yield self._step(steps)
         finally:
             for each in self.inputs:  # all at once: a reader may take a while to end
@@ -109,6 +112,12 @@ class LiveSource:
                 each.live.stop()
         if items := self._step(steps, last=True):
             yield items
+
+    def _wait(self) -> None:
+        """Wait for the next batch, or until `stop`."""
+        end = time.monotonic() + self.flush_secs
+        while not self._stopped and (rest := end - time.monotonic()) > 0:
+            time.sleep(min(rest, BATCH_SECS))
 
     def _all_ended(self) -> bool:
         return all(each.live.state is StreamState.ENDED for each in self.inputs)

@@ -23,7 +23,7 @@ from .conditions import CONDITIONS, trim_contradiction
 _KIND = "trial file"
 MAX_SOURCES = 64
 _SECTIONS = ("output", "vessel", "conditions", "source")
-_OUTPUT_KEYS = ("file", "rotate_minutes", "rotate_megabytes")
+_OUTPUT_KEYS = ("file", "rotate_minutes", "rotate_megabytes", "flush_secs", "fsync_secs")
 _SOURCE_KEYS = ("name", "format", "address", "raw")
 _RESERVED = ("operator", "recorder")  # sources of events that are of no stream
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
@@ -72,6 +72,9 @@ class TrialFile:
         The conditions of the trial by name, in the units of `CONDITIONS`.
     rotate_minutes, rotate_megabytes
         When to begin a new part of the log; None for never.
+    flush_secs, fsync_secs
+        How often what was received is made safe from a killed process, and from a power failure;
+        None for the default.
     """
 
     path: Path
@@ -81,6 +84,8 @@ class TrialFile:
     conditions: Mapping[str, float | str] = field(default_factory=dict)
     rotate_minutes: float | None = None
     rotate_megabytes: float | None = None
+    flush_secs: float | None = None
+    fsync_secs: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "conditions", ReadOnlyMapping(self.conditions))
@@ -120,8 +125,7 @@ class _Parser:
         sources = self._sources()
         output_file = self._text(output, "output.file", required=False)
         vessel_file = self._text(vessel, "vessel.file", required=bool(vessel))
-        minutes = self._positive(output, "rotate_minutes")
-        megabytes = self._positive(output, "rotate_megabytes")
+        numbers = [self._positive(output, key) for key in _OUTPUT_KEYS[1:]]
         if self._errors:
             raise UsageError(list_errors(self._errors, _KIND, os.fspath(self._path)))
         return TrialFile(
@@ -130,8 +134,7 @@ class _Parser:
             self._path.parent / output_file if output_file else None,
             self._vessel(vessel_file),
             conditions,
-            minutes,
-            megabytes,
+            *numbers,
         )
 
     def _vessel(self, name: str) -> str | None:

@@ -13,6 +13,7 @@ FULL = """
 [output]
 file = "trial.mcap"
 rotate_minutes = 60
+flush_secs = 0.5
 [vessel]
 file = "table1"
 [conditions]
@@ -51,6 +52,7 @@ def test_a_trial_file_has_sources_conditions_vessel_and_output() -> None:
     assert trial.output == Path("trial.mcap")
     assert trial.rotate_minutes == 60.0
     assert trial.rotate_megabytes is None
+    assert (trial.flush_secs, trial.fsync_secs) == (0.5, None)
     assert trial.vessel == "table1"
     assert dict(trial.conditions) == {
         "draught_forward": 8.0,
@@ -129,6 +131,7 @@ def test_all_faults_are_reported_at_once_with_the_nearest_names() -> None:
         ("output = 1", r"\[output\] must be a section"),
         ("[output]\nrotate_minutes = -1", "rotate_minutes must be a positive number"),
         ("[output]\nrotate_minutes = true", "rotate_minutes must be a positive number"),
+        ("[output]\nfsync_secs = 0", "fsync_secs must be a positive number"),
         ("[output]\nrotate_megabytes = inf", "rotate_megabytes must be a positive number"),
         ("[conditions]\nwater_depth = nan", "water_depth must be a number from 0 to 12000 m"),
         ('[conditions]\nplace = "a\\u001bb"', "place must be a text in one line"),
