@@ -43,8 +43,9 @@ def gain(
     S: float,
     u: StepInputs,
     output: int,
-) -> FloatArray:
-    """Compute the gain (s,) of an output from P c (s,) and S = c' P c + r."""
+    K: FloatArray,
+) -> None:
+    """Set the gain K (s,) of an output, from P c (s,) and S = c' P c + r."""
     raise NotImplementedError(f"no gain for {type(core).__name__}")
 
 
@@ -81,7 +82,8 @@ def output_row(
     u
         The inputs, with the moment and the force at the instant itself.
     slopes
-        (2, s): derivatives of moment and force by the state; zero for the core's own states.
+        (2, s): derivatives of moment and force by the state. Those by the core's own states are
+        work space of the core.
     row
         (10,): set to the five states in rad/s^k and m/s^k, then their variances.
     """

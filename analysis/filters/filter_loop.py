@@ -121,12 +121,14 @@ def run_filter(
     Ps, Fs = np.empty((kept, size, size)), np.empty((kept, size, size))
     Ks, cs = np.zeros((kept, outputs, size)), np.zeros((kept, outputs, size))
     es, Ss = np.zeros((kept, outputs)), np.ones((kept, outputs))
-    F, B, FP, Pc = system.F.copy(), system.B.copy(), np.empty((size, size)), np.empty(size)
+    F, B, FP = system.F.copy(), system.B.copy(), np.empty((size, size))
+    Pc, K = np.empty(size), np.empty(size)
     c, before, slopes = np.empty(size), np.empty(size), np.zeros((2, size))
     for k in range(count):
         delta_dot, n_dot = (delta[k + 1] - delta[k]) / dt, (n[k + 1] - n[k]) / dt
         given = StepInputs(delta[k], delta_dot, n[k], n_dot, 0.0, 0.0)
-        begin_instant(core, x, acting_at_instant(further, x, given))
+        u = acting_at_instant(further, x, given)
+        begin_instant(core, x, u)
         for output in range(outputs):
             copy_vector(c, system.C[output])
             y = linearise_output(further, x, c, measured[k, output], output)
@@ -137,7 +139,7 @@ def run_filter(
             rejected[k, output] = status == REJECTED
             if status != ACCEPTED:
                 continue
-            K = gain(core, x, Pc, S, acting_at_instant(further, x, given), output)
+            gain(core, x, Pc, S, u, output, K)
             correct(x, P, K, Pc, innovation, S)
             if keep:
                 copy_vector(Ks[k, output], K)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import radians
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import block_diag, solve_discrete_lyapunov
 
 from analysis.design.discrete import discretise
@@ -119,7 +120,8 @@ class Arrangement:
 class _Part:
     """States with linear dynamics of their own, and the quantity C x that they give.
 
-    `axis` is 0 for a yaw moment and 1 for a surge force; `shown` whether C x is an estimate.
+    `axis` is 0 for a yaw moment and 1 for a surge force; `shown` whether its first state, which C x
+    is then, is an estimate.
     """
 
     name: str
@@ -179,11 +181,8 @@ def arrange(
     A: FloatArray = block_diag(core.A, *(part.A for part in parts))
     W = block_diag(core.W, *(part.W for part in parts))
     count, linear_end = len(core.A), len(core.A) + sum(len(part.A) for part in linear)
-    mean, now, turn = np.zeros((2, size)), np.zeros((2, size)), np.zeros(size)
     for part in forces:
-        place, axis = places[part.name], part.axis or 0
-        mean[axis, place], now[axis, place] = part.mean_row(dt), part.C
-        A[:count, place] = np.outer(core.inputs[:, axis], part.C)
+        A[:count, places[part.name]] = np.outer(core.inputs[:, part.axis or 0], part.C)
     if "heading" in places:
         A[places["heading"], 0] = 1.0
         if wave is not None:
@@ -197,12 +196,10 @@ def arrange(
     if core.constant:
         F[:count, :count] = F_all[:count, :count]
         B = _input_step(core, dt)[:, : B.shape[1]].copy()
+    turn = np.zeros(size)
     if "heading" in places and wave is not None:
         turn[places["wave"]] = F_all[places["heading"], places["wave"]]
     estimates = [part for part in parts if part.shown]
-    rows = np.zeros((len(estimates), size))
-    for row, part in zip(rows, estimates, strict=True):
-        row[places[part.name]] = part.C
     system = System(
         C=_output_matrix(core, wave, places, size, 2 + len(model.outputs)),
         r=np.concatenate((noise.measurement_std**2, np.square(model.output_stds))),
@@ -214,7 +211,12 @@ def arrange(
         dynamic=linear_end + len(motion),
         shown=len(estimates),
     )
-    further = _places(core, places, mean, now, turn, rows) if model else NoFurther(count)
+    shown_at = np.array([places[part.name].start for part in estimates], np.int64)
+    further = (
+        _places(core, places, _force_rows(forces, places, dt), turn, shown_at)
+        if model
+        else NoFurther(count)
+    )
     state = FilterState(
         np.concatenate([core.x, *(np.r_[part.x, np.zeros(len(part.A) - 1)] for part in parts)]),
         np.ascontiguousarray(block_diag(core.P, *(part.P for part in parts))),
@@ -249,14 +251,30 @@ def _input_step(core: CoreModel, dt: float) -> FloatArray:
     return discretise(driven, np.zeros_like(driven), dt)[0][:c, c:]
 
 
+def _force_rows(
+    forces: list[_Part], places: dict[str, slice], dt: float
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    """Return `forces`, `mean` and `now` of `Further`."""
+    count = sum(len(part.A) for part in forces)
+    at, mean, now = np.zeros(count, np.int64), np.zeros((2, count)), np.zeros((2, count))
+    first = 0
+    for part in forces:
+        place, axis = places[part.name], part.axis or 0
+        own = slice(first, first + len(part.A))
+        at[own] = np.arange(place.start, place.stop)
+        mean[axis, own], now[axis, own] = part.mean_row(dt), part.C
+        first = own.stop
+    return at, mean, now
+
+
 def _places(
     core: CoreModel,
     places: dict[str, slice],
-    mean: FloatArray,
-    now: FloatArray,
+    rows: tuple[NDArray[np.int64], FloatArray, FloatArray],
     turn: FloatArray,
-    shown: FloatArray,
+    shown: NDArray[np.int64],
 ) -> Further:
+    forces, mean, now = rows
     at = {name: place.start for name, place in places.items()}
     return Further(
         core=len(core.A),
@@ -267,6 +285,7 @@ def _places(
         rudder_zero=at.get("rudder", ABSENT),
         current=at.get("current_north", ABSENT),
         drift=at.get("drift_length", ABSENT),
+        forces=forces,
         mean=mean,
         now=now,
         turn=turn,

@@ -7,6 +7,9 @@ takes no longer, to compile or to run, for what others can do.
 from math import cos, pi, sin
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from shiplog.compiled import compiled, overload_for
 from shiplog.ships.paper import rudder_effect
 from shiplog.types import FloatArray
@@ -42,12 +45,14 @@ class Further(NamedTuple):
         The place of the current north, m/s; that east follows.
     drift
         The place of the drift length, m: the sway is minus it times the yaw rate.
+    forces
+        (q,): the places of the states that give moment and force.
     mean, now
-        (2, s): rows that give moment and force, as their means over a step, and at its start.
+        (2, q): their coefficients, for the means of moment and force over a step, and at its start.
     turn
         (s,): the row that gives the heading's change in a step by the wave.
     shown
-        (k, s): rows that give the further estimates.
+        (k,): the places of the further estimates.
     """
 
     core: int
@@ -58,10 +63,11 @@ class Further(NamedTuple):
     rudder_zero: int
     current: int
     drift: int
+    forces: NDArray[np.int64]
     mean: FloatArray
     now: FloatArray
     turn: FloatArray
-    shown: FloatArray
+    shown: NDArray[np.int64]
 
 
 def acting_at_instant(further: Any, x: FloatArray, u: StepInputs) -> StepInputs:  # noqa: ANN401
@@ -180,11 +186,11 @@ def _acting_during_step(further: Further, x: FloatArray, u: StepInputs) -> StepI
 
 
 @compiled
-def _acting(further: Further, forces: FloatArray, x: FloatArray, u: StepInputs) -> StepInputs:
+def _acting(further: Further, rows: FloatArray, x: FloatArray, u: StepInputs) -> StepInputs:
     delta, moment, force = u.delta, 0.0, 0.0
-    for i in range(further.core, len(x)):
-        moment += forces[0, i] * x[i]
-        force += forces[1, i] * x[i]
+    for i in range(len(further.forces)):
+        moment += rows[0, i] * x[further.forces[i]]
+        force += rows[1, i] * x[further.forces[i]]
     if further.rudder_zero >= 0:
         delta -= x[further.rudder_zero]
     return StepInputs(delta, u.delta_dot, u.n, u.n_dot, moment, force)
@@ -216,8 +222,9 @@ def _set_slopes(
     n: float,
     slopes: FloatArray,
 ) -> None:
-    for i in range(further.core, len(x)):
-        slopes[0, i], slopes[1, i] = further.now[0, i], further.now[1, i]
+    for i in range(len(further.forces)):
+        place = further.forces[i]
+        slopes[0, place], slopes[1, place] = further.now[0, i], further.now[1, i]
     if further.rudder_zero >= 0:
         effect = rudder_effect(core.model, x[further.speed], n)
         slopes[0, further.rudder_zero] = -effect * core.model.d
@@ -225,16 +232,10 @@ def _set_slopes(
 
 @overload_for(show, Further)
 def _show(further: Further, x: FloatArray, P: FloatArray, row: FloatArray) -> None:
-    """Sum over the few elements of each estimate's row that are not zero."""
-    count, size = further.shown.shape
+    count = len(further.shown)
     for k in range(count):
-        value = variance = 0.0
-        for i in range(further.core, size):
-            if further.shown[k, i] != 0.0:
-                value += further.shown[k, i] * x[i]
-                for j in range(further.core, size):
-                    variance += further.shown[k, i] * P[i, j] * further.shown[k, j]
-        row[k], row[count + k] = value, max(variance, 0.0)
+        place = further.shown[k]
+        row[k], row[count + k] = x[place], max(P[place, place], 0.0)
 
 
 @overload_for(advance_further, Further)
@@ -250,11 +251,12 @@ def _advance_further(
 ) -> None:
     if B.shape[1] > 0:
         for i in range(further.core):
-            for j in range(further.core, len(x)):
-                F[i, j] = B[i, 0] * further.mean[0, j] + B[i, 1] * further.mean[1, j]
+            for j in range(len(further.forces)):
+                by_force = B[i, 0] * further.mean[0, j] + B[i, 1] * further.mean[1, j]
+                F[i, further.forces[j]] = by_force
             if further.rudder_zero >= 0:
                 effect = rudder_effect(core.model, before[further.speed], n)
-                F[i, further.rudder_zero] -= B[i, 0] * effect * core.model.d
+                F[i, further.rudder_zero] = -B[i, 0] * effect * core.model.d
     if further.heading >= 0:
         _advance_heading(further, x, before, F, dt)
     if further.north >= 0:

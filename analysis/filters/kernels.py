@@ -27,6 +27,17 @@ def output_covariance(P: FloatArray, c: FloatArray, Pc: FloatArray) -> float:
 
 
 @compiled
+def quadratic_form(g: FloatArray, P: FloatArray) -> float:
+    """Return g' P g, the variance of g' x; most elements of g (s,) may be zero."""
+    total = 0.0
+    for i in range(len(g)):
+        if g[i] != 0.0:
+            for j in range(len(g)):
+                total += g[i] * P[i, j] * g[j]
+    return total
+
+
+@compiled
 def innovate(
     x: FloatArray,
     P: FloatArray,
@@ -98,6 +109,13 @@ def is_accepted(
         return True
     rejected_in_a_row[output] = 0 if distance <= gate * gate else rejected_in_a_row[output] + 1
     return bool(rejected_in_a_row[output] == 0 or rejected_in_a_row[output] > MAX_REJECTED_IN_A_ROW)
+
+
+@compiled
+def optimal_gain(Pc: FloatArray, S: float, K: FloatArray) -> None:
+    """Set the gain K (s,) of the Kalman filter, P c / S."""
+    for i in range(len(K)):
+        K[i] = Pc[i] / S
 
 
 @compiled

@@ -22,6 +22,7 @@ from shiplog.vessel.settings import FilterSettings
 from .base import FURTHER_SETTINGS, NOISE_SETTINGS, FilterKind
 from .core import StepInputs, advance, begin_instant, gain, output_row
 from .further_states import CoreModel, arrange
+from .kernels import optimal_gain, quadratic_form
 from .noise_model import NoiseModel
 from .ship_filter import ShipFilter
 
@@ -135,9 +136,15 @@ def _begin_instant(core: PseudoInputCore, x: FloatArray, u: StepInputs) -> None:
 
 @overload_for(gain, PseudoInputCore)
 def _gain(
-    core: PseudoInputCore, x: FloatArray, Pc: FloatArray, S: float, u: StepInputs, output: int
-) -> FloatArray:
-    return Pc / S
+    core: PseudoInputCore,
+    x: FloatArray,
+    Pc: FloatArray,
+    S: float,
+    u: StepInputs,
+    output: int,
+    K: FloatArray,
+) -> None:
+    optimal_gain(Pc, S, K)
 
 
 @overload_for(output_row, PseudoInputCore)
@@ -154,11 +161,8 @@ def _output_row(
     row[2] += u.moment
     row[4] += u.force
     for place, slope in ((2, slopes[0]), (4, slopes[1])):
-        for i in range(5, len(x)):
-            if slope[i] != 0.0:
-                row[5 + place] += 2 * slope[i] * P[i, place]
-                for j in range(5, len(x)):
-                    row[5 + place] += slope[i] * P[i, j] * slope[j]
+        slope[place] = 1.0
+        row[5 + place] = max(quadratic_form(slope, P), 0.0)
 
 
 @overload_for(advance, PseudoInputCore)

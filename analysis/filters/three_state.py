@@ -12,7 +12,7 @@ to the measured yaw rate only, so that the estimated yaw rate is the ship's own 
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +37,11 @@ from .gains import (
     relinearised_gain,
     stated_poles,
 )
+from .kernels import optimal_gain
 from .noise_model import NoiseModel
 from .ship_filter import ShipFilter
-from .ship_step import linearise, predict_ship, ship_row
+from .ship_step import ShipState, jacobian, predict_ship, ship_row, ship_slopes
 
-OPTIMAL, CONSTANT, RELINEARISED = range(3)  # kinds of gain
 _STATES = 3  # w, w' and v; those of a wave follow
 MIN_POLE = 1e-300  # magnitude, so that a pole at zero has a logarithm
 HANDOVER_RATIO = 1.5  # the designed gain replaces the optimal one once that is this close to it
@@ -49,40 +49,61 @@ HANDOVER_RATIO = 1.5  # the designed gain replaces the optimal one once that is 
 PoleDesign = Callable[[LinearAxis, FilterSettings], ComplexArray]
 
 
-class ThreeStateCore(NamedTuple):
-    """The ship's three states, and the design of their gain.
+class Handover(NamedTuple):
+    """When a designed gain replaces the optimal one.
 
     Attributes
     ----------
-    model
-        The coefficients of the identification paper's model.
-    kind
-        `OPTIMAL`, `CONSTANT` or `RELINEARISED`.
-    constant_gain
-        (2, k): the constant gain of each output in the states of ship and wave.
-    poles
-        (k,): poles of yaw and of surge from sample to sample.
     interval
         (2,): sampling intervals, s.
     settling
-        (2,): time constants of the slowest poles, s.
-    wave
-        (k - 3, k - 3): transition matrix of the wave from a sample of the yaw rate to the next.
-    outputs
-        (2, k): the output matrix.
+        (2,): time constants of the slowest poles, s; infinite where the gain stays the optimal one.
     ages
         (2,): seconds since the first correction by each output; updated.
     """
 
-    model: Coefficients
-    kind: int
-    constant_gain: FloatArray
-    poles: NDArray[np.complex128]
     interval: FloatArray
     settling: FloatArray
+    ages: FloatArray
+
+
+class ConstantGain(NamedTuple):
+    """A gain that is constant after the handover: (2, k), of each output in ship and wave."""
+
+    gain: FloatArray
+    handover: Handover
+
+
+class PlacedGain(NamedTuple):
+    """A gain that places the same poles at each instant.
+
+    Attributes
+    ----------
+    poles
+        (k,): poles of yaw and of surge from sample to sample.
+    wave
+        (k - 3, k - 3): transition matrix of the wave from a sample of the yaw rate to the next.
+    outputs
+        (2, k): the output matrix.
+    handover
+        When it replaces the optimal gain.
+    """
+
+    poles: NDArray[np.complex128]
     wave: FloatArray
     outputs: FloatArray
-    ages: FloatArray
+    handover: Handover
+
+
+class ThreeStateCore(NamedTuple):
+    """The ship's three states, and the design of their gain.
+
+    The type of `design` chooses the gain in compiled code, so that the loop of a filter compiles
+    none but its own.
+    """
+
+    model: Coefficients
+    design: ConstantGain | PlacedGain
 
 
 def three_state_filter(
@@ -124,26 +145,19 @@ def three_state_filter(
     yaw_states = [0, 1, *range(_STATES, size)]
     outputs = np.zeros((len(PAPER_OUTPUTS), size))
     outputs[0, yaw_states], outputs[1, 2] = yaw.C[0], 1.0
-    constant_gain, settling = np.zeros_like(outputs), np.zeros(len(PAPER_OUTPUTS))
-    discrete_poles, kind = np.zeros(size, np.complex128), OPTIMAL
+    designed, settling = np.zeros_like(outputs), np.full(len(outputs), np.inf)
+    discrete_poles = np.zeros(size, np.complex128)
     if poles is not None:
-        kind = RELINEARISED if each_tick else CONSTANT
         for output, axis, states in ((0, yaw, yaw_states), (1, surge, [2])):
             placed, at = discrete_gain(axis, poles(axis, settings))
-            constant_gain[output, states], discrete_poles[states] = placed, at
+            designed[output, states], discrete_poles[states] = placed, at
             slowest = max(float(np.abs(at).max()), MIN_POLE)
             settling[output] = -axis.interval_secs / np.log(slowest)
-    core = ThreeStateCore(
-        model=model,
-        kind=kind,
-        constant_gain=constant_gain,
-        poles=discrete_poles,
-        interval=stats.interval_secs,
-        settling=settling,
-        wave=np.ascontiguousarray(expm(wave.A * yaw.interval_secs)),
-        outputs=outputs,
-        ages=np.zeros(len(PAPER_OUTPUTS)),
-    )
+    handover = Handover(stats.interval_secs, settling, np.zeros(len(outputs)))
+    design: ConstantGain | PlacedGain = ConstantGain(designed, handover)
+    if each_tick:
+        between = np.ascontiguousarray(expm(wave.A * yaw.interval_secs))
+        design = PlacedGain(discrete_poles, between, outputs, handover)
     arrangement = arrange(
         _core_model(model, noise, stats),
         wave if len(wave.A) else None,
@@ -152,6 +166,7 @@ def three_state_filter(
         stats,
         settings.gate,
     )
+    core = ThreeStateCore(model, design)
     return ShipFilter(core, arrangement, wave.C if len(wave.A) else None)
 
 
@@ -209,39 +224,75 @@ def _output_row(
 
 @overload_for(gain, ThreeStateCore)
 def _gain(
-    core: ThreeStateCore, x: FloatArray, Pc: FloatArray, S: float, u: StepInputs, output: int
-) -> FloatArray:
-    return _three_state_gain(core, x, Pc, S, u, output)
+    core: ThreeStateCore,
+    x: FloatArray,
+    Pc: FloatArray,
+    S: float,
+    u: StepInputs,
+    output: int,
+    K: FloatArray,
+) -> None:
+    """Set the optimal gain, or the designed one where that has replaced it."""
+    optimal_gain(Pc, S, K)
+    if output < len(PAPER_OUTPUTS):
+        _replace(core.design, core.model, x, u, output, K)
+
+
+def _replace(
+    design: Any,  # noqa: ANN401
+    c: Coefficients,
+    x: FloatArray,
+    u: StepInputs,
+    output: int,
+    K: FloatArray,
+) -> None:
+    """Replace the optimal gain K (s,) of yaw rate or speed by the designed one, once that holds."""
+    raise NotImplementedError(f"no gain for {type(design).__name__}")
+
+
+@overload_for(_replace, ConstantGain)
+def _replace_by_constant(
+    design: ConstantGain,
+    c: Coefficients,
+    x: FloatArray,
+    u: StepInputs,
+    output: int,
+    K: FloatArray,
+) -> None:
+    _hand_over(design.handover, design.gain[output], output, K)
+
+
+@overload_for(_replace, PlacedGain)
+def _replace_by_placed(
+    design: PlacedGain,
+    c: Coefficients,
+    x: FloatArray,
+    u: StepInputs,
+    output: int,
+    K: FloatArray,
+) -> None:
+    slopes = ship_slopes(c, ShipState(x[0], x[1], x[2]), u.delta, u.delta_dot, u.n)
+    placed = relinearised_gain(
+        jacobian(slopes), design.wave, design.outputs[output], design.poles,
+        design.handover.interval[output], output,
+    )  # fmt: skip
+    _hand_over(design.handover, placed, output, K)
 
 
 @compiled
-def _three_state_gain(
-    core: ThreeStateCore, x: FloatArray, Pc: FloatArray, S: float, u: StepInputs, output: int
-) -> FloatArray:
-    """Compute the gain (s,) of an output from P c and S = c' P c + r.
+def _hand_over(handover: Handover, designed: FloatArray, output: int, K: FloatArray) -> None:
+    """Replace the gain K (s,) by the designed one (k,), once that holds.
 
     A designed gain assumes that the initial error has decayed. Until then the optimal gain is used:
     until it has fallen to the designed one, or for the time constant of the slowest pole.
     """
-    K: FloatArray = Pc / S
-    if core.kind == OPTIMAL or output >= len(core.ages):
-        return K
-    interval = core.interval[output]
-    designed: FloatArray = core.constant_gain[output].copy()
-    if core.kind == RELINEARISED:
-        J = np.zeros((3, 3))
-        linearise(core.model, x, u.delta, u.delta_dot, u.n, J)
-        designed = relinearised_gain(
-            J, core.wave, core.outputs[output], core.poles, interval, output
-        )
     measured = 2 * output  # w or v
-    core.ages[output] += interval
+    handover.ages[output] += handover.interval[output]
     if K[measured] <= HANDOVER_RATIO * designed[measured]:
-        core.ages[output] = np.inf
-    if core.ages[output] > core.settling[output]:
+        handover.ages[output] = np.inf
+    if handover.ages[output] > handover.settling[output]:
         for i in range(len(designed)):
             K[i] = designed[i]
-    return K
 
 
 _SETTINGS = (

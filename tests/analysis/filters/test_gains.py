@@ -8,7 +8,7 @@ from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_ly
 
 from analysis.filters.gains import LinearAxis, linear_axes, relinearised_gain
 from analysis.filters.noise_model import NoiseModel, Wave
-from analysis.filters.ship_step import linearise
+from analysis.filters.ship_step import ShipState, jacobian, ship_slopes
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import UsageError, Vessel
 from shiplog.compiled import compiled
@@ -256,9 +256,10 @@ def test_hard_over_the_poles_of_yaw_and_surge_together_deviate_from_those_placed
     vessel: Vessel,
 ) -> None:
     """As the page on the per-tick observer states, there in continuous time."""
-    J, dt, C = np.zeros((3, 3)), 0.1, np.eye(3)[[0, 2]]
-    hard_over = np.array([8.88e-3, 0, 4.43])  # a steady turn at 35° and 80 rpm
-    linearise.py_func(vessel.coefficients, hard_over, np.radians(35), 0.0, 80.0, J)
+    dt, C = 0.1, np.eye(3)[[0, 2]]
+    hard_over = ShipState(8.88e-3, 0.0, 4.43)  # a steady turn at 35° and 80 rpm
+    slopes = ship_slopes.py_func(vessel.coefficients, hard_over, np.radians(35), 0.0, 80.0)
+    J = jacobian.py_func(slopes)
     among = np.exp(np.array([-0.1, -0.1, -0.05]) * dt).astype(complex)
     by_rate, by_speed = (placed(J, np.zeros((0, 0)), c, among, dt, k) for k, c in enumerate(C))
     kept = (np.eye(3) - np.outer(by_speed, C[1])) @ (np.eye(3) - np.outer(by_rate, C[0]))
