@@ -10,7 +10,7 @@ from shiplog.vessel.settings import FILTER_GROUP, FilterSettings
 
 from .base import Estimates, Filter, FilterKind, SmoothableFilter
 from .noise_model import NoiseModel
-from .smoother import SmoothingPass, smoothed
+from .smoother import SmoothingPass, smooth_chunk, trace_chunk
 
 
 def filter_names() -> tuple[str, ...]:
@@ -99,13 +99,13 @@ def filter_states(
         The settings of ``[filter]``; by default those of an empty section.
     """
     settings = settings or FilterSettings()
-    filter_ = make_filter(model, noise, signal_stats(signals, model), settings)
+    stats = signal_stats(signals, model)
+    filter_ = make_filter(model, noise, stats, settings)
     following = last_inputs(signals)
     if not settings.smooth:
         return filter_.step(signals, following)
     tracing = smoothable(filter_)
-    estimates, trace = tracing.trace(signals, following)
-    backward = SmoothingPass()
-    backward.add(trace)
-    (end,) = backward.result()
-    return smoothed(tracing, signals, following, estimates, trace, end)
+    first = SmoothingPass()
+    trace_chunk(tracing, signals, following, first)
+    again = smoothable(make_filter(model, noise, stats, settings))
+    return smooth_chunk(again, signals, following, iter(first.result()))

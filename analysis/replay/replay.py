@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 
 from analysis.filters.base import FilterKind
 from analysis.filters.factory import smoothable
-from analysis.filters.smoother import Adjoint, SmoothingPass
+from analysis.filters.smoother import Adjoint, SmoothingPass, trace_chunk
 from analysis.signals.concat import concatenate
 from analysis.signals.hold import InputHold, held_throughout
 from shiplog import open_log
@@ -142,8 +142,7 @@ class Replay:
         listeners = hold.add_raw, stages.tracker.add_raw
         resampled = resampled_chunks(self._chunked, clock, self._on_progress, "replay", *listeners)
         for signals, held, following in held_throughout(resampled, hold):
-            adjoint = next(adjoints) if adjoints is not None else None
-            yield stages.step(signals, held, following, adjoint)
+            yield stages.step(signals, held, following, adjoints)
         self._findings = stages.findings(self._log)
 
     @property
@@ -154,14 +153,14 @@ class Replay:
         return self._findings
 
     def _backward_pass(self) -> Iterator[Adjoint]:
-        """Return for each chunk, in order, what the measurements after it add: one more pass."""
+        """Return what the measurements after each piece of a chunk add, in order: one more pass."""
         plan = self.plan
         hold, (filter_, _) = InputHold(plan.clock), make_estimators(plan)
         tracing = smoothable(filter_)
-        backward = SmoothingPass()
+        first = SmoothingPass()
         resampled = resampled_chunks(
             self._chunked, plan.clock, self._on_progress, "smooth", hold.add_raw
         )
         for _, held, following in held_throughout(resampled, hold):
-            backward.add(tracing.trace(held, following)[1])
-        return iter(backward.result())
+            trace_chunk(tracing, held, following, first)
+        return iter(first.result())

@@ -1,6 +1,6 @@
 """Stages of a replay, chunk by chunk: filter, disturbance observer, regression, tests, track."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from analysis.disturbance.filter_forces import FilterForces
 from analysis.filters.base import OUTPUT_STATES, Estimates, FurtherStates
 from analysis.filters.factory import smoothable
 from analysis.filters.noise_model import FURTHER_OUTPUTS
-from analysis.filters.smoother import Adjoint, smoothed
+from analysis.filters.smoother import Adjoint, smooth_chunk
 from analysis.regression.changes import ShipChangeTest, determined_changes
 from analysis.regression.coefficients import CoefficientStage
 from shiplog import Signals
@@ -82,7 +82,7 @@ class Stages:
         signals: Signals,
         held: Signals,
         following: Mapping[str, float],
-        adjoint: Adjoint | None,
+        adjoints: Iterator[Adjoint] | None,
     ) -> ReplayChunk:
         """Replay the next chunk.
 
@@ -94,10 +94,11 @@ class Stages:
             The same with the inputs held where they were not measured.
         following
             The inputs at the instant after the chunk.
-        adjoint
-            What the measurements after the chunk add; None where the states are not smoothed.
+        adjoints
+            What the measurements after each piece of the chunk add, as `smooth_chunk` takes it;
+            None where the states are not smoothed.
         """
-        estimates = self._estimates(held, following, adjoint)
+        estimates = self._estimates(held, following, adjoints)
         for i, test in enumerate(self._residual_tests):
             test.add(
                 estimates.innovations[:, i],
@@ -167,16 +168,15 @@ class Stages:
         return disturbance
 
     def _estimates(
-        self, held: Signals, following: Mapping[str, float], adjoint: Adjoint | None
+        self, held: Signals, following: Mapping[str, float], adjoints: Iterator[Adjoint] | None
     ) -> Estimates:
-        """Filter the next chunk, and smooth it where `adjoint` is given."""
+        """Filter the next chunk, and smooth it where there are `adjoints`."""
         try:
-            if adjoint is None:
+            if adjoints is None:
                 estimates = self._filter.step(held, following)
             else:
-                tracing = smoothable(self._filter)
-                filtered, trace = tracing.trace(held, following)
-                estimates = smoothed(tracing, held, following, filtered, trace, adjoint)
+                filter_ = smoothable(self._filter)
+                estimates = smooth_chunk(filter_, held, following, adjoints)
         except np.linalg.LinAlgError as error:  # of a gain that is designed anew at each instant
             raise diverged(self._plan, f" ({error})") from error
         if not np.all(np.isfinite(estimates.states)):

@@ -101,6 +101,26 @@ def held_throughout(
         yield *previous, last_inputs(previous[1])
 
 
+def in_pieces(
+    held: Signals, following: Mapping[str, float], length: int
+) -> Iterator[tuple[Signals, Mapping[str, float]]]:
+    """Yield the pieces of a chunk, of so many instants at most, and the inputs that follow each.
+
+    Parameters
+    ----------
+    held
+        The chunk with its inputs held.
+    following
+        The inputs at the instant after the chunk.
+    length
+        The greatest number of instants of a piece.
+    """
+    for start in range(0, len(held), length):
+        stop = min(start + length, len(held))
+        ahead = {name: float(held[name][stop]) for name in PAPER_INPUTS if stop < len(held)}
+        yield held.part(start, stop), ahead or following
+
+
 def last_inputs(signals: Signals) -> Mapping[str, float]:
     """Return the inputs, rad and 1/min, at the last instant of the signals."""
     return {name: float(signals[name][-1]) for name in PAPER_INPUTS}

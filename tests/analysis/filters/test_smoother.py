@@ -19,10 +19,10 @@ from filter_runs import (
 )
 from gaussian import apart
 
+from analysis.filters import smoother
 from analysis.filters.base import Filter, Trace
 from analysis.filters.factory import filter_states, make_filter
 from analysis.filters.noise_model import NoiseModel, Wave
-from analysis.filters.smoother import SmoothingPass, smoothed
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import signal_stats
 from recorders.simulated.sensors import suite
@@ -200,15 +200,30 @@ def test_the_settings_smooth_what_is_told_and_leave_the_innovations_alone(
     assert not np.array_equal(computed.states, plain.states)
 
 
-def test_a_smoothed_wave_is_told_too(vessel: Vessel, signals: Signals) -> None:
+def test_a_smoothed_wave_is_an_estimate_too(vessel: Vessel, signals: Signals) -> None:
     c, noise = vessel.coefficients, replace(NOISES["extended"], wave=WAVE)
     settings = FilterSettings(kind="extended", smooth=True)
     computed = filter_states(signals, c, noise, settings)
     filtering = made(vessel, signals, "extended", WAVE)
-    estimates, trace, (x, _) = smoothed_run(filtering, signals)
+    _, _, (x, _) = smoothed_run(filtering, signals)
     assert np.array_equal(computed.wave, x[:, 3:] @ filtering._wave)
-    nothing = SmoothingPass()
-    nothing.add(trace)
-    (end,) = nothing.result()
-    again = smoothed(filtering, signals, last_inputs(signals), estimates, trace, end)
-    assert np.array_equal(again.wave, computed.wave)
+
+
+@of_each_run
+def test_a_trial_longer_than_a_piece_is_smoothed_as_a_whole(
+    vessel: Vessel,
+    signals: Signals,
+    kind: str,
+    wave: Wave | None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    c, noise = vessel.coefficients, replace(NOISES[kind], wave=wave)
+    settings = FilterSettings(kind=kind, smooth=True)
+    whole = filter_states(signals, c, noise, settings)
+    monkeypatch.setattr(smoother, "PIECE", 177)
+    pieces = filter_states(signals, c, noise, settings)
+    for name in ("innovations", "innovation_stds", "rejected"):
+        assert np.array_equal(getattr(pieces, name), getattr(whole, name), equal_nan=True), name
+    for name in ("states", "stds"):
+        a, b = getattr(pieces, name), getattr(whole, name)
+        assert np.abs(a - b).max(axis=0) == pytest.approx(0, abs=1e-9 * np.abs(b).max())
