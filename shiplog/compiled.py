@@ -11,11 +11,13 @@ import time
 from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from numba import types
 from numba.extending import overload
+from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from .extensions import extension_sources
 
@@ -151,3 +153,26 @@ def overload_for(generic: Callable[..., object], kind: type) -> Callable[[F], F]
         return function
 
     return registered
+
+
+def element(arrays: Any, i: int) -> Any:  # noqa: ANN401
+    """Return the NamedTuple of the i-th value of each array of a NamedTuple, of the same type.
+
+    In compiled code the arrays are complex.
+    """
+    return type(arrays)(*(array[i] for array in arrays))
+
+
+def _compiled_element(arrays: Any, _: object) -> Callable[..., object]:  # noqa: ANN401
+    kind, count = arrays.instance_class, len(arrays)
+
+    def chosen(arrays: Any, i: int) -> Any:  # noqa: ANN401
+        values = np.empty(count, np.complex128)
+        for field in range(count):
+            values[field] = arrays[field][i]
+        return kind(*to_fixed_tuple(values, count))
+
+    return chosen
+
+
+overload(element, strict=False)(_compiled_element)

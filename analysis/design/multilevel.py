@@ -7,6 +7,8 @@ other numbers, and the part of K_k that V_k does not see, are free.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -143,9 +145,9 @@ class Multilevel:
         start = 0
         for placed in self.placed:
             level = placed.level
-            ends = start + np.cumsum(placed.counts)
-            freedom = _Freedom(*np.split(free[..., start : ends[-1]], ends[:-1] - start, -1))
-            start = ends[-1]
+            edges = [*accumulate(placed.counts, initial=start)]
+            freedom = _Freedom(*(free[..., i:j] for i, j in pairwise(edges)))
+            start = edges[-1]
             T = level.U.T + K @ level.N
             Phi, Psi, half = _dynamics(placed, freedom, below, below @ level.N @ level.A @ level.U)
             hidden = freedom.hidden.reshape(*batch, level.V0.shape[1], len(level.A))
@@ -269,10 +271,15 @@ def _dynamics(
 def _rotation(skew: FloatArray, r: int) -> FloatArray:
     """Return the rotation (..., r, r) of r (r - 1) / 2 numbers: Cayley's transform."""
     S = np.zeros((*skew.shape[:-1], r, r))
-    S[..., *np.triu_indices(r, 1)] = skew
+    S[..., *_above_diagonal(r)] = skew
     S = S - np.swapaxes(S, -1, -2)
     rotation: FloatArray = np.linalg.solve(np.eye(r) + S, np.eye(r) - S)
     return rotation
+
+
+@cache
+def _above_diagonal(r: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    return np.triu_indices(r, 1)
 
 
 def _reflection(v: FloatArray) -> FloatArray:

@@ -62,7 +62,7 @@ SHIP_POLES = (  # of yaw and of surge; the second are those of the steady-state 
     ((-0.0133 - 0.0596j, -0.0133 + 0.0596j), -0.0063),
 )
 SYSTEMS = 30
-NOISY_SYSTEMS = 40
+NOISY_SYSTEMS = 20
 RPM, RUDDER, PERIOD_SECS = 36.0, 0.35, 120.0  # a sinusoidal rudder, rad
 
 INTRODUCTION = """\

@@ -191,7 +191,7 @@ def compute_trajectory(
         _draw_forcing(random_forcing, duration_secs, rng or np.random.default_rng(0)),
         vessel.rudder_max,
         vessel.rudder_rate,
-        duration_secs,
+        float(duration_secs),  # of an integer the loop would be compiled anew
     )
     rows = integrate_run(ship.coefficients, constants, ship.straight_state(speed), plan)
     if not np.all(np.isfinite(rows)):

@@ -48,7 +48,7 @@ def _observed(c: Coefficients, x: ComplexArray) -> tuple[complex, complex, compl
 
 @compiled
 def _integrate(
-    c: Coefficients, x: ComplexArray, offset: complex, path: InputPath, count: int
+    c: Coefficients, x: ComplexArray, offset: ComplexArray, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
 

@@ -97,7 +97,7 @@ def _observed(c: DriftLag, x: ComplexArray) -> tuple[complex, complex, complex, 
 
 @compiled
 def _integrate(
-    c: DriftLag, x: ComplexArray, offset: complex, path: InputPath, count: int
+    c: DriftLag, x: ComplexArray, offset: ComplexArray, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
 

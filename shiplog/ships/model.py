@@ -10,6 +10,7 @@ from pickle import PicklingError
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shiplog.errors import UsageError
 from shiplog.types import FloatArray
@@ -165,7 +166,8 @@ class Model:
         The state, in the order of the equations. One value each is measured by ``yaw_rate`` and
         ``speed``.
     compiled
-        `shiplog.ships.motion.integrate` compiled for this kind, in the model's own module.
+        `shiplog.ships.motion.integrate` compiled for this kind, in the model's own module. It
+        simulates k runs in a call, so that the cost of a call does not multiply with k.
     outputs
         Those of `MODEL_OUTPUTS` that the model predicts.
     dimensionless
@@ -254,14 +256,10 @@ class Model:
         (count, 4) array
             The outputs in SI, in the order of `MODEL_OUTPUTS`; NaN from where the run diverges.
         """
-        out = self._integrate(
-            parameters.astype(np.complex128),
-            initial.astype(np.complex128),
-            complex(offset),
-            scale.scaled(path),
-            count,
+        out, _ = self._integrate(
+            parameters[None], initial[None], np.array([offset]), scale.scaled(path), count
         )
-        return np.asarray(out.real * scale.outputs)
+        return np.asarray(out[0].real * scale.outputs)
 
     def sensitivities(
         self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
@@ -285,34 +283,38 @@ class Model:
         The arguments are those of `sensitivities`. Each derivative is exact to rounding: the run is
         simulated once with the direction as a small imaginary part (see `shiplog.ships.motion`).
         """
-        scaled, p = scale.scaled(path), len(parameters)
-        outputs_by = np.empty((len(directions), count, len(MODEL_OUTPUTS)))
-        ends = np.empty((len(directions), len(initial)), np.complex128)
-        out = np.empty((count, len(MODEL_OUTPUTS)), np.complex128)
-        for i, along in enumerate(directions * (1j * STEP)):
-            ends[i] = initial + along[p:-1]
-            out = self._integrate(
-                parameters + along[:p], ends[i], offset + along[-1], scaled, count
-            )
-            outputs_by[i] = out.imag / STEP * scale.outputs
+        p, along = len(parameters), directions * (1j * STEP)
+        out, ends = self._integrate(
+            parameters + along[:, :p],
+            initial + along[:, p:-1],
+            offset + along[:, -1],
+            scale.scaled(path),
+            count,
+        )
         return Propagation(
-            out.real * scale.outputs, ends[-1].real.copy(), outputs_by, ends.imag / STEP
+            out[-1].real * scale.outputs,
+            ends[-1].real.copy(),
+            out.imag / STEP * scale.outputs,
+            ends.imag / STEP,
         )
 
     def _integrate(
-        self, parameters: ComplexArray, initial: ComplexArray, offset: complex, path: InputPath,
-        count: int,
-    ) -> ComplexArray:  # fmt: skip
-        """Compute the outputs, (count, 4), and overwrite `initial` with the last state.
+        self, parameters: NDArray[Any], initial: NDArray[Any],
+        offset: NDArray[Any], path: InputPath, count: int,
+    ) -> tuple[ComplexArray, ComplexArray]:  # fmt: skip
+        """Compute the outputs, (k, count, 4), and the last states, (k, s), of k runs.
 
         All are NaN where an equation divides by zero, such as by the speed of a stopped ship.
         """
-        coefficients = self.kind(*(complex(value) for value in self.expand(parameters)))
+        rows = [self.expand(row) for row in parameters.astype(np.complex128)]
+        coefficients = self.kind(*np.array(rows, np.complex128).T.copy())
+        states = initial.astype(np.complex128)
         try:
-            return self.compiled(coefficients, initial, complex(offset), path, count)
+            out = self.compiled(coefficients, states, offset.astype(np.complex128), path, count)
         except ZeroDivisionError:  # numba's, of complex numbers
-            initial[:] = np.nan
-            return np.full((count, len(MODEL_OUTPUTS)), np.nan + 0j)
+            states[:] = np.nan
+            out = np.full((len(states), count, len(MODEL_OUTPUTS)), np.nan + 0j)
+        return out, states
 
     def __getstate__(self) -> Mapping[str, Any]:
         """Refer to the compiled function by its module and name, not by its machine code."""

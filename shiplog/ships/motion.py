@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from shiplog.compiled import compiled_in_caller, overload_for
+from shiplog.compiled import compiled_in_caller, element, overload_for
 from shiplog.types import FloatArray
 
 ComplexArray = NDArray[np.complex128]
@@ -133,11 +133,11 @@ def _real_root(x: float) -> float:
 def integrate(
     c: Any,  # noqa: ANN401
     x: ComplexArray,
-    offset: complex,
+    offset: ComplexArray,
     path: InputPath,
     samples: int,
 ) -> ComplexArray:
-    """Integrate a run and return its outputs at the samples.
+    """Integrate k runs under the same inputs and return their outputs at the samples.
 
     Each step of the path is one Runge-Kutta step of order four. Samples within a step are
     interpolated by Hermite's cubic, with the rates at its ends.
@@ -145,12 +145,12 @@ def integrate(
     Parameters
     ----------
     c
-        The coefficients, a NamedTuple of complex numbers of a registered type.
+        The coefficients, a NamedTuple of a registered type, of (k,) complex arrays of one layout.
     x
-        (s,) the initial state in the units of the equations. It is overwritten by the state at the
-        end, NaN where the run diverged.
+        (k, s) the initial states in the units of the equations. They are overwritten by the states
+        at the end, NaN where a run diverged.
     offset
-        Rudder added to that of the path, rad.
+        (k,) rudder added to that of the path, rad.
     path
         The inputs in the units of the equations.
     samples
@@ -158,10 +158,24 @@ def integrate(
 
     Returns
     -------
-    (samples, 4) complex array
-        The outputs in the order of `MODEL_OUTPUTS`; NaN from where the run diverges.
+    (k, samples, 4) complex array
+        The outputs in the order of `MODEL_OUTPUTS`; NaN from where a run diverges.
     """
-    out = np.full((samples, 4), np.nan + 0j)
+    out = np.full((len(x), samples, 4), np.nan + 0j)
+    for i in range(len(x)):
+        _integrate_one(element(c, i), x[i], offset[i], path, out[i])
+    return out
+
+
+@compiled_in_caller
+def _integrate_one(
+    c: Any,  # noqa: ANN401
+    x: ComplexArray,
+    offset: complex,
+    path: InputPath,
+    out: ComplexArray,
+) -> None:
+    """Integrate one run and put its outputs, (samples, 4), into `out`."""
     between, after, at_sample = x.copy(), x.copy(), x.copy()
     _store(out, 0, observed(c, x))
     for k in range(len(path.secs)):
@@ -188,7 +202,6 @@ def integrate(
         x[:] = after
         if count > 0:
             _store(out, path.sample[k], observed(c, x))
-    return out
 
 
 # numba would make the real factor of a complex number complex, at twice the cost

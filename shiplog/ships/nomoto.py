@@ -69,7 +69,7 @@ def _observed(c: Norrbin, x: ComplexArray) -> tuple[complex, complex, complex, c
 
 @compiled
 def _integrate(
-    c: Norrbin, x: ComplexArray, offset: complex, path: InputPath, count: int
+    c: Norrbin, x: ComplexArray, offset: ComplexArray, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
 

@@ -90,7 +90,7 @@ def _observed(c: Slipstream, x: ComplexArray) -> tuple[complex, complex, complex
 
 @compiled
 def _integrate(
-    c: Slipstream, x: ComplexArray, offset: complex, path: InputPath, count: int
+    c: Slipstream, x: ComplexArray, offset: ComplexArray, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
 

@@ -138,7 +138,7 @@ def _observed(c: ThreeDof, x: ComplexArray) -> tuple[complex, complex, complex, 
 
 @compiled
 def _integrate(
-    c: ThreeDof, x: ComplexArray, offset: complex, path: InputPath, count: int
+    c: ThreeDof, x: ComplexArray, offset: ComplexArray, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
 

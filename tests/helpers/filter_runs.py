@@ -98,8 +98,11 @@ def disturbed(
 
 
 def straight(c: Coefficients) -> Coefficients:
-    """A ship whose equations are linear: no drag, a rudder that feels the propeller alone."""
-    return c._replace(b2=0, b3=0, f=0, g=0, alpha1=0, alpha3=0)
+    """A ship whose equations are linear: no drag, a rudder that feels the propeller alone.
+
+    Its coefficients are floats: with integers among them all loops would be compiled a second time.
+    """
+    return c._replace(b2=0.0, b3=0.0, f=0.0, g=0.0, alpha1=0.0, alpha3=0.0)
 
 
 def steered(count: int, dt: float) -> tuple[np.ndarray, np.ndarray]:

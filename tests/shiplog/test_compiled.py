@@ -7,10 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
 
 import shiplog
-from shiplog.compiled import PROJECT_FOLDER, compiled_sources
+from shiplog.compiled import PROJECT_FOLDER, compiled_sources, element
+from shiplog.ships.nomoto import Norrbin
 
 SOURCES = [
     path.relative_to(PROJECT_FOLDER)
@@ -70,6 +73,14 @@ def test_machine_code_of_old_sources_is_deleted_after_a_day(tmp_path: Path) -> N
     words_printed(tmp_path, tmp_path)
     assert not old.exists()
     assert recent.exists()
+
+
+def test_an_element_of_a_named_tuple_of_arrays_is_of_its_type_in_python_and_compiled() -> None:
+    arrays = Norrbin(*np.arange(12.0).reshape(6, 2).astype(complex))
+    expected = Norrbin(1, 3, 5, 7, 9, 11)
+    for got in (element(arrays, 1), numba.njit(lambda c: element(c, 1))(arrays)):
+        assert isinstance(got, Norrbin)
+        assert got == expected
 
 
 def imported_names(tree: ast.Module, path: Path) -> dict[str, Path]:

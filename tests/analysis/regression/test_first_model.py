@@ -35,7 +35,7 @@ def fitted(signals: Signals, name: str) -> Vessel:
 
 def test_the_coefficients_of_a_simple_ship_are_recovered(vessel: Vessel) -> None:
     c = vessel.coefficients._replace(
-        b3=0.0, b2=-2.0, alpha1=1.0, alpha2=0.0, alpha3=0.0, d=2e-5, e=0
+        b3=0.0, b2=-2.0, alpha1=1.0, alpha2=0.0, alpha3=0.0, d=2e-5, e=0.0
     )
     ship = Vessel("simple", c)
     found = fitted(simulated_signals(ship, "zigzag-20-20", 800.0), "x").coefficients

@@ -64,7 +64,7 @@ def test_coefficients_do_not_depend_on_the_assumed_model(vessel: Vessel) -> None
     trial = simulate(vessel, "zigzag-20-20", duration_secs=400.0, sensors=suite("paper"))
     signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
     c = vessel.coefficients
-    wrong = c._replace(a=3 * c.a, b1=0, b2=-c.b2, d=5 * c.d, f=0, g=2 * c.g, h=0)
+    wrong = c._replace(a=3 * c.a, b1=0.0, b2=-c.b2, d=5 * c.d, f=0.0, g=2 * c.g, h=0.0)
     for right_rows, wrong_rows in zip(
         weak_form(signals, c), weak_form(signals, wrong), strict=True
     ):

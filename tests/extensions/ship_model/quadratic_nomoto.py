@@ -50,7 +50,7 @@ def _observed(c: Quadratic, x: ComplexArray) -> tuple[complex, complex, complex,
 
 @compiled
 def _integrate(
-    c: Quadratic, x: ComplexArray, offset: complex, path: InputPath, count: int
+    c: Quadratic, x: ComplexArray, offset: ComplexArray, path: InputPath, count: int
 ) -> ComplexArray:
     return integrate(c, x, offset, path, count)
 

@@ -198,6 +198,20 @@ def test_sensitivities_are_the_derivatives_of_the_outputs(name: str) -> None:
         np.testing.assert_allclose(exact / size, differences / size, atol=2e-5)
 
 
+@pytest.mark.parametrize("name", ["nomoto", "burylin-tied", "three-dof"])
+def test_derivatives_along_many_directions_are_those_along_each_to_the_last_bit(name: str) -> None:
+    model, parameters, state, scale = a_ship(name)
+    path, n = input_path(a_run()), 121
+    directions = np.random.default_rng(5).normal(size=(4, len(parameters) + len(state) + 1))
+    together = model.propagate(parameters, state, path, n, directions, scale=scale)
+    assert np.any(together.outputs_by[0] != together.outputs_by[1])
+    for i in range(len(directions)):
+        alone = model.propagate(parameters, state, path, n, directions[[i]], scale=scale)
+        np.testing.assert_array_equal(alone.outputs_by[0], together.outputs_by[i])
+        np.testing.assert_array_equal(alone.end_by[0], together.end_by[i])
+        np.testing.assert_array_equal(alone.end, together.end)
+
+
 @pytest.fixture(scope="module")
 def trial(vessel: Vessel) -> SimulatedTrial:
     return simulate(vessel, "zigzag-20-20", duration_secs=500.0, sensors=suite("none"))
