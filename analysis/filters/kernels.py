@@ -19,10 +19,11 @@ def output_covariance(P: FloatArray, c: FloatArray, Pc: FloatArray) -> float:
     """Compute P c into `Pc` (s,), and return c' P c, the variance of the predicted output c' x."""
     variance = 0.0
     for i in range(len(c)):
-        Pc[i] = 0.0
+        total = 0.0
         for j in range(len(c)):
-            Pc[i] += P[i, j] * c[j]
-        variance += c[i] * Pc[i]
+            total += P[i, j] * c[j]
+        Pc[i] = total
+        variance += c[i] * total
     return variance
 
 
@@ -148,15 +149,16 @@ def propagate(P: FloatArray, F: FloatArray, Q: FloatArray, FP: FloatArray, dynam
     n = len(P)
     for i in range(dynamic):
         for j in range(n):
-            FP[i, j] = 0.0
+            total = 0.0
             for k in range(n):
-                FP[i, j] += F[i, k] * P[k, j]
+                total += F[i, k] * P[j, k]  # P is symmetric
+            FP[i, j] = total
     for i in range(dynamic):
         for j in range(i + 1):
-            P[i, j] = Q[i, j]
+            total = Q[i, j]
             for k in range(n):
-                P[i, j] += FP[i, k] * F[j, k]
-            P[j, i] = P[i, j]
+                total += FP[i, k] * F[j, k]
+            P[i, j] = P[j, i] = total
     for i in range(dynamic, n):
         for j in range(i + 1):
             P[i, j] = Q[i, j] + (FP[j, i] if j < dynamic else P[i, j])
