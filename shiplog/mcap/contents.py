@@ -13,6 +13,7 @@ from .clock_repair import MixedTimes
 from .damage import Damage
 from .locate import Offsets, record_sizes
 from .pauses import Pauses
+from .record_walk import Record
 from .records import MESSAGE_HEAD
 
 
@@ -30,6 +31,8 @@ class SampleBlock:
         The number of the MCAP chunk, or run of messages outside of MCAP chunks, in the file.
     offsets
         (n,) offsets of the messages in its data.
+    sequences
+        The sequence numbers of the first and the last message.
     """
 
     received: TimeArray
@@ -37,6 +40,7 @@ class SampleBlock:
     values: FloatArray | list[bytes]
     number: int
     offsets: Offsets
+    sequences: tuple[int, int] = (0, 0)
 
 
 @dataclass
@@ -140,6 +144,11 @@ class McapContents:
         Selects the channels whose messages are kept as they are in `kept`; none where it is None.
     kept
         The messages kept and not yet taken, by channel id, in the order of the file.
+    keep_records
+        Whether to keep the intact records in `records` too.
+    records
+        Those not yet taken, in the order of the file; of an MCAP chunk and of a run of messages
+        outside of them, its data.
     event_messages
         The events not yet decoded.
     events
@@ -162,6 +171,10 @@ class McapContents:
         The damaged parts so far.
     reading
         The offsets, start and end, of the record that is being read.
+    block_starts
+        The offset of each MCAP chunk, or run of messages outside of them, by its number.
+    is_whole
+        Whether no samples were taken by `drain` so far.
     mcap_chunks_read
         The offsets of the MCAP chunks read so far, by their heads.
     data_blocks
@@ -186,6 +199,8 @@ class McapContents:
     not_decoded: dict[int, MessageCount] = field(default_factory=dict)
     keeps: Keeps | None = None
     kept: dict[int, list[KeptMessages]] = field(default_factory=dict)
+    keep_records: bool = False
+    records: list[Record] = field(default_factory=list)
     event_messages: list[EventMessage] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     foreign_records: dict[str, None] = field(default_factory=dict)
@@ -197,6 +212,8 @@ class McapContents:
     truncated: bool = False
     damage: list[Damage] = field(default_factory=list)
     reading: tuple[int, int] = (0, 0)
+    block_starts: list[int] = field(default_factory=list)
+    is_whole: bool = True
     mcap_chunks_read: dict[bytes, int] = field(default_factory=dict)
     data_blocks: int = 0
     clock_warnings: list[str] = field(default_factory=list)
@@ -206,7 +223,13 @@ class McapContents:
     def drain(self) -> dict[int, list[SampleBlock]]:
         """Return the blocks collected so far, by channel id, and release them."""
         blocks, self.blocks, self.pending_samples = self.blocks, {}, 0
+        self.is_whole = False
         return blocks
+
+    def keep(self, opcode: int, content: bytes) -> None:
+        """Keep the record that is being read, where records are kept."""
+        if self.keep_records:
+            self.records.append(Record(opcode, *self.reading, content))
 
     def report(self, text: str) -> None:
         """Report damage in the record that is being read, by which something is lost."""

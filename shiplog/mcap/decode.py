@@ -63,6 +63,7 @@ def collect_messages(data: bytes, indexes: list[bytes], contents: McapContents) 
     found
         Whether there were any messages.
     """
+    contents.keep(Opcode.CHUNK, data)
     start = _read_descriptions(data, contents)
     located = (
         locate_by_size(data, start)
@@ -72,6 +73,7 @@ def collect_messages(data: bytes, indexes: list[bytes], contents: McapContents) 
     for channel_id, offsets in located.items():
         _collect_channel(data, channel_id, offsets, contents.data_blocks, contents)
     contents.data_blocks += 1
+    contents.block_starts.append(contents.reading[0])
     return bool(located)
 
 
@@ -100,6 +102,7 @@ def read_record(opcode: int, content: bytes, contents: McapContents) -> None:
     """Add a record other than a message to the contents; report it if it is damaged."""
     try:
         _read_record(opcode, content, contents)
+        contents.keep(opcode, content)
     except MALFORMED as error:
         contents.report(f"a record was not used: {str(error) or 'it cannot be read'}")
 
@@ -232,7 +235,7 @@ def _fixed_width_block(
         return None
     values = np.stack([rows[name] for name in schema.fields], axis=1)
     received, measured = rows["received"].astype(np.int64), rows["measured"].astype(np.int64)
-    return SampleBlock(received, measured, values, number, offsets)
+    return SampleBlock(received, measured, values, number, offsets, _sequences(rows))
 
 
 def _event_messages(data: bytes, offsets: Offsets, number: int) -> Iterator[EventMessage]:
@@ -243,13 +246,18 @@ def _event_messages(data: bytes, offsets: Offsets, number: int) -> Iterator[Even
 
 def _undecoded_block(data: bytes, offsets: Offsets, number: int) -> SampleBlock:
     kept = _kept_messages(data, offsets, number)
-    return SampleBlock(kept.received, kept.measured, kept.messages, number, offsets)
+    sequences = _sequences(gather(data, offsets, MESSAGE_HEAD))
+    return SampleBlock(kept.received, kept.measured, kept.messages, number, offsets, sequences)
 
 
 def _kept_messages(data: bytes, offsets: Offsets, number: int) -> KeptMessages:
     heads, messages = _undecoded(data, offsets)
     received, measured = heads["received"].astype(np.int64), heads["measured"].astype(np.int64)
     return KeptMessages(received, measured, messages, number, offsets)
+
+
+def _sequences(heads: NDArray[np.void]) -> tuple[int, int]:
+    return int(heads["sequence"][0]), int(heads["sequence"][-1])
 
 
 def _undecoded(data: bytes, offsets: Offsets) -> tuple[NDArray[np.void], list[bytes]]:

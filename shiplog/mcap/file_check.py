@@ -44,7 +44,8 @@ class FileCheck:
     is_finished
         Whether the file ends as a complete one.
     is_intact
-        Whether the checksum of the data section is right; None where there is none.
+        Whether the checksum of the data section is right; None where there is none, and no other
+        one is wrong.
     data_end
         The offset at which the data section ends; None if unknown.
     summary
@@ -187,6 +188,8 @@ def _with_verified_summary(stream: IO[bytes], check: FileCheck) -> FileCheck:
     summary = check.summary
     if summary is None or check.data_end is None:
         return replace(check, summary=None)
+    if summary.has_damaged_records:
+        return replace(check, is_intact=False)
     if not _has_indexed_mcap_chunks(stream, summary):
         text = "the summary contradicts the data; it was not used"
         size = stream.seek(0, os.SEEK_END)

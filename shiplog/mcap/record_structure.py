@@ -82,7 +82,7 @@ def opcode_of(content: bytes) -> int | None:
     Kinds without structure, and those of which an error here could give wrong values, are omitted.
     """
     kinds = (Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA)
-    for opcode in (*kinds, Opcode.HEADER, Opcode.DATA_END):
+    for opcode in kinds:
         if content and content_size(opcode, content) == len(content):
             return opcode
     return None

@@ -29,6 +29,8 @@ class McapRecordWriter:
     ----------
     path
         The file; it is overwritten.
+    profile
+        The profile of the file's header, such as ``ros2``.
 
     Raises
     ------
@@ -36,7 +38,7 @@ class McapRecordWriter:
         The file cannot be written.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], profile: str = "") -> None:
         try:
             self._stream = Path(path).open("wb")  # noqa: SIM115 - closed by `close`
         except OSError as error:
@@ -53,7 +55,7 @@ class McapRecordWriter:
         self._compressor = zstandard.ZstdCompressor()
         self._append(MAGIC)
         library = f"shiplog {__version__} mcap {mcap.__version__}"
-        self._append(_record_bytes(records.Header(profile="", library=library)))
+        self._append(_record_bytes(records.Header(profile=profile, library=library)))
 
     @property
     def closed(self) -> bool:
@@ -72,23 +74,19 @@ class McapRecordWriter:
         self._metadata_indexes.append(index)
         self._append(data)
 
-    def write_attachment(self, name: str, media_type: str, content: bytes) -> None:
-        """Append an attachment, without times, so that the same log gives the same bytes."""
+    def write_attachment(self, attachment: records.Attachment) -> None:
+        """Append an attachment."""
         self.close_mcap_chunk()
-        data = _record_bytes(
-            records.Attachment(
-                create_time=0, log_time=0, name=name, media_type=media_type, data=content
-            )
-        )
+        data = _record_bytes(attachment)
         self._attachment_indexes.append(
             records.AttachmentIndex(
                 offset=self._size,
                 length=len(data),
-                log_time=0,
-                create_time=0,
-                data_size=len(content),
-                name=name,
-                media_type=media_type,
+                log_time=attachment.log_time,
+                create_time=attachment.create_time,
+                data_size=len(attachment.data),
+                name=attachment.name,
+                media_type=attachment.media_type,
             )
         )
         self._append(data)

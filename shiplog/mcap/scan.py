@@ -12,6 +12,7 @@ from mcap.opcode import Opcode
 
 from shiplog.errors import LogError
 
+from .chunk_order import restore_order
 from .contents import McapContents
 from .damage import Damage, gap_damage, lost_messages_text
 from .decode import MALFORMED, collect_messages, collect_undescribed, read_record
@@ -67,8 +68,10 @@ def scan(file: McapFile, contents: McapContents, skip: Collection[int] = ()) -> 
     if not walk.is_complete:
         _read_truncated_end(file, walk, contents)
     _use_summary(file.check.summary, contents)
-    _report_damage(file, walk, contents)
     collect_undescribed(contents)
+    if contents.is_whole:
+        restore_order(contents)
+    _report_damage(file, walk, contents)
     yield
 
 
@@ -77,9 +80,11 @@ def _with_indexes(walk: RecordWalk) -> Iterator[tuple[Record, list[bytes]]]:
     mcap_chunk: Record | None = None
     indexes: list[bytes] = []
     loose, loose_start = bytearray(), 0
+    end = 0  # of the record before
     for record in walk:
+        follows, end = record.start == end, record.end
         if record.opcode == Opcode.MESSAGE_INDEX:
-            if sum(map(len, indexes)) <= MAX_RECORD_BYTES:
+            if follows and sum(map(len, indexes)) <= MAX_RECORD_BYTES:
                 indexes.append(record.content)
             continue
         if mcap_chunk is not None:

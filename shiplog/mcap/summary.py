@@ -13,8 +13,8 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 from .limits import MAX_RECORD_BYTES, MAX_SUMMARY_BYTES
-from .metadata_record import read_metadata
-from .record_structure import content_size, read_attachment
+from .metadata_record import metadata_is_intact, read_metadata
+from .record_structure import attachment_is_intact, content_size, read_attachment
 from .records import FOOTER_BYTES, INDEX_ENTRY, INDEX_HEAD, MAGIC, RECORD_HEAD, crc32_of_range
 from .schema import METADATA_NAME, VESSEL_ATTACHMENT
 
@@ -59,6 +59,8 @@ class McapSummary:
         The offsets of the indexed attachments and metadata records.
     is_verified
         Whether a checksum covers the summary.
+    has_damaged_records
+        Whether an attachment or a metadata record of shiplog is damaged, and thus not in it.
     """
 
     schemas: dict[int, records.Schema]
@@ -70,6 +72,7 @@ class McapSummary:
     attachment_offsets: tuple[int, ...]
     metadata_offsets: tuple[int, ...]
     is_verified: bool
+    has_damaged_records: bool
 
     def mcap_chunk_locations(self) -> tuple[McapChunkLocation, ...] | None:
         """Return the locations of the MCAP chunks in the order of the file.
@@ -139,16 +142,18 @@ def _read_summary(stream: IO[bytes]) -> McapSummary | None:
     described = {id_ for id_, channel in by_id.items() if channel.schema_id in schema_ids}
     if len(statistics) != 1 or not described.issuperset(statistics[0].channel_message_counts):
         return None
+    metadata, vessel_toml, is_damaged = _own_records(stream, by_opcode)
     return McapSummary(
         {schema.id: schema for schema in schemas},
         by_id,
         statistics[0],
-        _metadata(stream, by_opcode),
-        _vessel_toml(stream, by_opcode),
+        metadata,
+        vessel_toml,
         tuple(by_opcode.get(Opcode.CHUNK_INDEX, [])),
         _offsets(by_opcode.get(Opcode.ATTACHMENT_INDEX, [])),
         _offsets(by_opcode.get(Opcode.METADATA_INDEX, [])),
         bool(crc),
+        is_damaged,
     )
 
 
@@ -174,24 +179,27 @@ def _offsets(indexes: list[bytes]) -> tuple[int, ...]:
     return tuple(int.from_bytes(content[:8], "little") for content in indexes)
 
 
-def _metadata(stream: IO[bytes], by_opcode: dict[int, list[bytes]]) -> dict[str, str]:
+def _own_records(
+    stream: IO[bytes], by_opcode: dict[int, list[bytes]]
+) -> tuple[dict[str, str], str | None, bool]:
+    """Return the metadata, the vessel file, and whether one of their records is damaged."""
     metadata: dict[str, str] = {}
+    vessel_toml, is_damaged = None, False
     for entry in _streams(by_opcode, Opcode.METADATA_INDEX):
         index = records.MetadataIndex.read(entry)
         if index.name == METADATA_NAME:
             content = _indexed_record(stream, index.offset, index.length, Opcode.METADATA)
-            metadata |= read_metadata(content).metadata
-    return metadata
-
-
-def _vessel_toml(stream: IO[bytes], by_opcode: dict[int, list[bytes]]) -> str | None:
-    text = None
+            is_damaged |= not metadata_is_intact(content)
+            metadata |= {} if is_damaged else read_metadata(content).metadata
     for entry in _streams(by_opcode, Opcode.ATTACHMENT_INDEX):
         index = records.AttachmentIndex.read(entry)
         if index.name == VESSEL_ATTACHMENT:
             content = _indexed_record(stream, index.offset, index.length, Opcode.ATTACHMENT)
-            text = read_attachment(content).data.decode()
-    return text
+            if attachment_is_intact(content):
+                vessel_toml = read_attachment(content).data.decode()
+            else:
+                is_damaged = True
+    return metadata, vessel_toml, is_damaged
 
 
 def _indexed_record(stream: IO[bytes], offset: int, length: int, opcode: Opcode) -> bytes:

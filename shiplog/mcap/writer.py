@@ -92,8 +92,15 @@ class LogWriter:
         self._metadata: dict[str, str] = {}
         self.update_metadata(dict(metadata or {}) | _versions())
         if vessel_toml is not None:
-            content = vessel_toml.encode()
-            self._file.write_attachment(VESSEL_ATTACHMENT, "application/toml", content)
+            self._file.write_attachment(
+                records.Attachment(  # without times: the same log gives the same bytes
+                    create_time=0,
+                    log_time=0,
+                    name=VESSEL_ATTACHMENT,
+                    media_type="application/toml",
+                    data=vessel_toml.encode(),
+                )
+            )
 
     def __enter__(self) -> Self:
         return self
