@@ -1,7 +1,9 @@
 """Heading and position as channels of single values, which the filter takes as measurements.
 
 The heading that is interpolated on the clock repeats each sample at several instants. These
-channels have one value for each sample, at the instant next to it.
+channels have one value for each sample, at the instant next to it. Up to half a step lies between
+the two, in which a turning ship changes its heading by more than a compass errs: a heading is
+extrapolated to the instant.
 """
 
 from collections.abc import Iterator
@@ -15,8 +17,10 @@ from shiplog import Channel
 from shiplog.checks.channel_stats import ChannelStats, LogStats
 from shiplog.geodesy import LocalFrame, positions_of
 from shiplog.resampling import Clock
+from shiplog.types import FloatArray
 
 COMPASS, NORTH, EAST = FURTHER_OUTPUTS
+MIN_SLOPE_SECS, MAX_SLOPE_SECS = 0.9, 5.0  # over which a heading's rate of change is taken
 
 
 def with_measured_channels(clock: Clock, log_stats: LogStats) -> Clock:
@@ -65,13 +69,13 @@ class MeasuredChannels:
     """
 
     def __init__(self, log: RawChunks, clock: Clock, log_stats: LogStats) -> None:
-        self._log = log
+        self._log, self._clock = log, clock
         self._heading = log_stats["heading"] if COMPASS in clock.channels else None
         self._position = log_stats["position"] if NORTH in clock.channels else None
 
     def chunks(self) -> Iterator[tuple[Channel, ...]]:
         """Yield the chunks of the log, with the channels added."""
-        self._last_heading: float | None = None
+        self._last = np.zeros(0), np.zeros(0)  # times, s, and values of the last headings
         self._frame: LocalFrame | None = None  # its datum is the first position
         for chunk in self._log.chunks():
             heading = self._heading.select(chunk) if self._heading else None
@@ -82,13 +86,18 @@ class MeasuredChannels:
             yield (*chunk, *added)
 
     def _compass(self, heading: Channel) -> Channel:
-        """Return the heading without jumps by full turns, so that samples can be averaged."""
+        """Return the heading at the clock's instants, without jumps by full turns."""
         values = heading.values.copy()
         known = np.flatnonzero(np.isfinite(values))
-        if len(known):
-            first = values[known[0]] if self._last_heading is None else self._last_heading
-            values[known] = np.unwrap(np.concatenate(([first], values[known])))[1:]
-            self._last_heading = float(values[known[-1]])
+        secs = (heading.measured_ns[known] - self._clock.start_ns) * 1e-9
+        before, dt = len(self._last[0]), self._clock.dt_secs
+        times = np.concatenate((self._last[0], secs))
+        angles = np.unwrap(np.concatenate((self._last[1], values[known])))
+        to_instant = np.floor(secs / dt + 0.5) * dt - secs
+        values[known] = angles[before:] + _slopes(times, angles)[before:] * to_instant
+        if len(times):
+            kept = np.searchsorted(times, times[-1] - MAX_SLOPE_SECS)
+            self._last = times[kept:], angles[kept:]
         return replace(heading, name=COMPASS, values=values)
 
     def _coordinates(self, position: Channel) -> list[Channel]:
@@ -102,3 +111,13 @@ class MeasuredChannels:
             replace(position, name=name, unit="m", fields=(), values=values)
             for name, values in ((NORTH, local.north), (EAST, local.east))
         ]
+
+
+def _slopes(times: FloatArray, angles: FloatArray) -> FloatArray:
+    """Return the rate of change up to each sample (n,); 0 where there is none shortly before."""
+    before = np.searchsorted(times, times - MIN_SLOPE_SECS, side="right") - 1
+    secs = times - times[before]
+    near = (before >= 0) & (secs <= MAX_SLOPE_SECS)
+    slopes = np.zeros(len(times))
+    slopes[near] = (angles - angles[before])[near] / secs[near]
+    return slopes
