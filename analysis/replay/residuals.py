@@ -44,7 +44,8 @@ class ResidualSummary:
         Mean of the normalised innovation squared, (innovation / expected std)²; 1 if the filter's
         noise is right. NaN where the output is constant: it has no noise to compare with.
     nis_band
-        The 99 % band of that mean for white innovations.
+        The 99 % band of that mean for white innovations; from 0 where the noise that the filter
+        expects is an upper bound.
     whiteness_p
         The p-value of the whiteness test; NaN with too few samples, or for a constant output.
     correlation, correlation_lag_secs
@@ -87,6 +88,11 @@ class ResidualSummary:
         low, high = self.nis_band
         return low <= self.mean_nis <= high
 
+    @property
+    def small(self) -> bool:
+        """Whether the innovations are smaller than those of the noise that the filter expects."""
+        return self.judged and self.mean_nis < 2 - self.nis_band[1]
+
     def gate_warning(self, remedy: str) -> str:
         """Return a warning where the gate rejected more than spikes explain; else empty."""
         share = self.rejected / max(self.rejected + self.count, 1)
@@ -110,6 +116,8 @@ class ResidualTest:
     noise_measured
         Whether the noise that the filter expects was estimated from the same log, by its third
         differences (`signal_stats.NoiseLevel`), so that it is itself uncertain.
+    noise_is_bound
+        Whether that noise is an upper bound: innovations that are smaller contradict nothing.
     constant
         Whether the measured output never changes, as that of a dead sensor: nothing is judged.
     """
@@ -122,10 +130,11 @@ class ResidualTest:
         dt_secs: float,
         *,
         noise_measured: bool,
+        noise_is_bound: bool = False,
         constant: bool = False,
     ) -> None:
         self._name, self._unit, self._noise_measured = name, unit, noise_measured
-        self._constant = constant
+        self._noise_is_bound, self._constant = noise_is_bound, constant
         self._innovations, self._normalised = Moments(), Moments()
         self._products, self._rejected = _Products(median_step), 0
         self._interval_secs = median_step * dt_secs
@@ -163,7 +172,7 @@ class ResidualTest:
             count=count,
             rms=sqrt(self._innovations.mean_square),
             mean_nis=self._normalised.mean_square if judged else nan,
-            nis_band=(1 - half_width, 1 + half_width),
+            nis_band=(0.0 if self._noise_is_bound else 1 - half_width, 1 + half_width),
             whiteness_p=found.p if judged else nan,
             correlation=found.largest if judged else nan,
             correlation_lag_secs=found.lag * self._interval_secs if judged else nan,

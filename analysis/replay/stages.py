@@ -241,5 +241,6 @@ def _further_residual_test(plan: Plan, output: str) -> ResidualTest:
         float(np.median(steps)) if len(steps) else 1.0,
         plan.clock.dt_secs,
         noise_measured=stated is None,
+        noise_is_bound=stated is None,  # it contains the slow errors of the sensor
         constant=bool(np.ptp(values[np.isfinite(values)]) == 0),
     )

@@ -101,21 +101,18 @@ def _further_remarks(findings: Findings, residuals: Sequence[ResidualSummary]) -
     its samples do not show: that is intended, and such innovations need not be white.
     """
     stds = findings.plan.noise.further.output_stds
-    small = [r.judged and r.mean_nis < r.nis_band[0] for r in residuals]
-    yield from (
-        residual_remark(r) for r, is_small in zip(residuals, small, strict=True) if not is_small
-    )
+    yield from (residual_remark(r) for r in residuals if not r.small)
     assumed = [
         f"{_words(r.name)} {std * factor:.2g} {unit}"
-        for r, std, is_small in zip(residuals, stds, small, strict=True)
-        if is_small
+        for r, std in zip(residuals, stds, strict=True)
+        if r.small
         for unit, factor in [display_conversion(r.name, r.unit)]
     ]
     if assumed:
         keys = dict.fromkeys(
             "filter.heading_std" if r.name == "heading" else "filter.position_std"
-            for r, is_small in zip(residuals, small, strict=True)
-            if is_small
+            for r in residuals
+            if r.small
         )
         yield (
             f"Innovations smaller than the noise assumed, which allows for slow errors of the "
