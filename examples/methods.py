@@ -633,11 +633,10 @@ def kvlcc2_filters(runs: Sequence[Replays]) -> None:
     paragraph(
         f"The gyro bias found by the smoother is {number(min(free), 2)} to {number(max(free), 2)}"
         f" °/s in the free-running tests, and {number(min(carriage), 2)} to"
-        f" {number(max(carriage), 2)} °/s on the carriage. With sensor errors the yaw rate in a gap"
-        " is predicted worse in the median, because it is in all runs on the carriage: the yaw rate"
-        " has almost no noise there, and the heading departs from its integral by slow errors of"
-        " some hundredths of a degree, which the filter takes for white noise of 0.01°, the least"
-        " that it assumes without `filter.heading_std`."
+        f" {number(max(carriage), 2)} °/s on the carriage. The heading departs from the integral"
+        " of the yaw rate by slow errors of some hundredths of a degree, which are a state of the"
+        " filter: where the yaw rate has almost no noise, as on the carriage, the heading adds"
+        " little to it; in the free-running tests it improves the prediction."
     )
 
 

@@ -39,15 +39,16 @@ rate w and the speed v of the ship, what is measured is, without waves and white
 
     yaw rate   w + b_gyro
     speed      (1 + s_log) v + b_log
-    heading    ψ + b_compass    ψ' = w
+    heading    ψ + b_compass + e    ψ' = w,  e' = −e/T + noise
     north      N                N' = v cos ψ + l w sin ψ + c_north
     east       E                E' = v sin ψ − l w cos ψ + c_east
 
-and the rudder acts as δ − δ0. l is the drift length (the sway is −l w), c the current; both are
-states where there are positions. With `--smooth` the disturbances of `--disturbance` are states
-too: a random walk of the yaw moment and of the surge force for `constant`, its integral for `ramp`,
-a harmonic of random amplitude for `wave`. The errors begin at zero with the standard deviations of
-the table, and are random walks:"""
+and the rudder acts as δ − δ0. e is the slow error of the heading, whose standard deviation and
+correlation time T are estimated from the log. l is the drift length (the sway is −l w), c the
+current; both are states where there are positions. With `--smooth` the disturbances of
+`--disturbance` are states too: a random walk of the yaw moment and of the surge force for
+`constant`, its integral for `ramp`, a harmonic of random amplitude for `wave`. The errors begin
+at zero with the standard deviations of the table, and are random walks:"""
 REASONS = """\
 `auto` selects the gyro and the speed log where the log determines them; others are added by name,
 such as `--sensor-bias auto,compass`. What cannot be distinguished, by Hautus's test, is refused

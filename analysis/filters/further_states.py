@@ -169,7 +169,11 @@ def arrange(
     """
     model, dt = noise.further, stats.dt_secs
     forces = _force_parts(c, noise, stats)
-    linear = [*_wave_parts(wave, dt), *(part for part in forces if part.A.any())]
+    linear = [
+        *_wave_parts(wave, dt),
+        *_heading_error_parts(model),
+        *(part for part in forces if part.A.any()),
+    ]
     motion = _motion_parts(model, stats)
     static = [*_constant_parts(model), *(part for part in forces if not part.A.any())]
     parts = [*linear, *motion, *static]
@@ -301,7 +305,9 @@ def _output_matrix(
     C[0, 0], C[1, core.speed] = 1.0, 1.0
     if wave is not None:
         C[0, places["wave"]] = wave.C
-    rows = {"gyro": 0, "log": 1, "heading": 2, "compass": 2, "north": 3, "east": 4}
+    rows = {
+        "gyro": 0, "log": 1, "heading": 2, "heading_error": 2, "compass": 2, "north": 3, "east": 4,
+    }  # fmt: skip
     for name, row in rows.items():
         if name in places:
             C[row, places[name]] = 1.0
@@ -314,6 +320,15 @@ def _wave_parts(wave: WaveModel | None, dt: float) -> list[_Part]:
         return []
     P = solve_discrete_lyapunov(*discretise(wave.A, wave.W, dt))
     return [_Part("wave", "rad/s", wave.A, wave.W, P, wave.C, shown=False)]
+
+
+def _heading_error_parts(model: FurtherModel) -> list[_Part]:
+    """Return the slow error of the heading; at the start it is in its steady state."""
+    error = model.heading_error
+    if error is None:
+        return []
+    A, P = np.array([[-1 / error.secs]]), np.array([[error.std**2]])
+    return [_Part("heading_error", "rad", A, -2 * A * P, P, np.ones(1), shown=False)]
 
 
 def _motion_parts(model: FurtherModel, stats: SignalStats) -> list[_Part]:

@@ -47,6 +47,22 @@ class Wave:
 
 
 @dataclass(frozen=True)
+class SlowError:
+    """An error that lasts for some time: a Gauss-Markov process of first order.
+
+    Attributes
+    ----------
+    std
+        Standard deviation, in the unit of the measurement.
+    secs
+        Correlation time, s.
+    """
+
+    std: float
+    secs: float
+
+
+@dataclass(frozen=True)
 class ForceNoise:
     """A yaw moment or a surge force of known kind and unknown size, as a state of the filter.
 
@@ -80,6 +96,8 @@ class FurtherModel:
         The sensor errors, some of `shiplog.vessel.settings.SENSOR_ERRORS`.
     yaw, surge
         The yaw moment and the surge force; None where the filter has no such state.
+    heading_error
+        The slow error of the heading, rad; None where its noise is white.
     """
 
     outputs: tuple[str, ...] = ()
@@ -87,6 +105,7 @@ class FurtherModel:
     sensors: tuple[str, ...] = ()
     yaw: ForceNoise | None = None
     surge: ForceNoise | None = None
+    heading_error: SlowError | None = None
 
     def __bool__(self) -> bool:
         """Whether there is any further state."""

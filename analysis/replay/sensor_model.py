@@ -19,7 +19,9 @@ from shiplog.errors import UsageError
 from shiplog.ships.paper import Coefficients, yaw_stiffness
 from shiplog.vessel.settings import SENSOR_ERRORS, DisturbanceSettings, FilterSettings
 
-MIN_HEADING_STD = radians(0.01)
+from .heading_errors import heading_errors
+
+MIN_HEADING_STD = radians(0.001)
 MIN_POSITION_STD = 0.5  # m
 MIN_SAMPLES = 20  # of a heading or a position, to be used
 # 1 - R² of the headings, as of a half circle: the sway of a zig-zag lags behind its yaw rate, which
@@ -169,7 +171,10 @@ def sensor_model(
     sensors, omitted = _choose_sensors(settings.sensors, evidence, ship)
     outputs = FURTHER_OUTPUTS[: 3 if evidence.has_track else int(evidence.heading)]
     stds = [_output_std(stats, settings, name) for name in outputs]
-    return FurtherModel(outputs, tuple(stds), sensors), omitted
+    heading_error = None
+    if outputs and settings.heading_std is None:
+        stds[0], heading_error = heading_errors(stats, stds[0])
+    return FurtherModel(outputs, tuple(stds), sensors, heading_error=heading_error), omitted
 
 
 def _output_std(stats: SignalStats, settings: FilterSettings, output: str) -> float:

@@ -45,6 +45,12 @@ def _sensor_remarks(findings: Findings) -> Iterator[str]:
         f"{measured}Values at the end of the trial. States and disturbances are corrected for "
         "these errors, coefficients are not."
     )
+    slow = findings.plan.noise.further.heading_error
+    if slow is not None:
+        yield (
+            f"The heading departs from the integral of the yaw rate by {degrees(slow.std):.2g} deg "
+            f"over {slow.secs:.2g} s, more than white noise explains: a slow error of the heading."
+        )
 
 
 def _reason(error: SensorError) -> str:

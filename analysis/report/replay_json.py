@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from analysis.disturbance.disturbances import DisturbanceSummary
-from analysis.filters.noise_model import NoiseModel, Wave
+from analysis.filters.noise_model import FURTHER_OUTPUTS, NoiseModel, Wave
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit
 from analysis.replay.current import Current
@@ -141,7 +141,11 @@ def _noise(noise: NoiseModel, output: int) -> JsonObject:
     """Return the noise that the filter assumes of an output; the further ones have no process."""
     further = output - len(noise.measurement_std)
     if further >= 0:
-        return {"measurement_std": noise.further.output_stds[further]}
+        stated: JsonObject = {"measurement_std": noise.further.output_stds[further]}
+        slow = noise.further.heading_error
+        if slow is not None and noise.further.outputs[further] == FURTHER_OUTPUTS[0]:
+            stated |= {"slow_error_std": slow.std, "slow_error_secs": slow.secs}
+        return stated
     return {
         "measurement_std": float(noise.measurement_std[output]),
         "measurement_std_origin": "log" if noise.measured[output] else "vessel file",

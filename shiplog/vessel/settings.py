@@ -89,7 +89,8 @@ class FilterSettings:
         Sensor errors that are states of the filter, some of `SENSOR_ERRORS`; ``auto`` selects those
         that the log determines. Heading and position are then measurements of the filter too.
     heading_std, position_std
-        Standard deviation of the white noise of one sample of heading, rad, and position, m.
+        Standard deviation of the white noise of one sample of heading, rad, and position, m. A
+        heading for which it is stated has no slow error.
     """
 
     SECTION: ClassVar[str] = "filter"

@@ -138,5 +138,5 @@ def test_small_innovations_of_heading_and_position_are_explained(
     sensor_analysis: Analysis,
 ) -> None:
     page = replay_markdown(sensor_analysis.findings)
-    assert "heading 0.01 deg, north 0.5 m, east 0.5 m" in page
+    assert "heading 0.001 deg, north 0.5 m, east 0.5 m" in page
     assert "heading: innovations smaller" not in page
