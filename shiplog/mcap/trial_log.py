@@ -23,6 +23,8 @@ from .decode import is_foreign, schema_of
 from .schema import FORMAT_VERSION, Schema
 from .unset_times import replace_unset_times
 
+FOREIGN_TOPICS = "topics of other programs"
+FOREIGN_RECORDS = "attachments and metadata records of other programs"
 MAX_NAMES = 8  # of ignored records that a warning lists
 _CHANNEL_KEYS = {"channel", "source", "unit", "positive"}  # of the metadata: attributes of Channel
 
@@ -128,6 +130,12 @@ def _decode_events(
             contents.report(f"skipped an event: {error}")
 
 
+def concerns_kept(warning: str, *, with_topics: bool) -> bool:
+    """Whether a warning of a log is about what a copy keeps; see `kept_groups`."""
+    kept = (FOREIGN_TOPICS, FOREIGN_RECORDS) if with_topics else (FOREIGN_RECORDS,)
+    return warning.startswith("ignored ") and any(words in warning for words in kept)
+
+
 def _shift_at(
     position: int,
     as_recorded: Mapping[int, MessageColumns],
@@ -160,13 +168,13 @@ def _warnings(contents: McapContents) -> list[str]:
         if is_foreign(channel, contents.schemas)
     ]
     if foreign:
-        warnings.append(f"ignored {len(foreign)} topics of other programs: {', '.join(foreign)}")
+        warnings.append(f"ignored {len(foreign)} {FOREIGN_TOPICS}: {', '.join(foreign)}")
     if contents.foreign_records:
         names = list(contents.foreign_records)
         more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
         warnings.append(
-            f"ignored {len(names)} attachments and metadata records of other programs, which a "
-            f"conversion does not keep: {', '.join(names[:MAX_NAMES])}{more}"
+            f"ignored {len(names)} {FOREIGN_RECORDS}, which a table does not keep: "
+            f"{', '.join(names[:MAX_NAMES])}{more}"
         )
     return warnings
 

@@ -1,7 +1,7 @@
 """Writing of logs: whole trials, and samples, raw packets and events as they are recorded."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from types import TracebackType
@@ -17,6 +17,7 @@ from shiplog.units import CATALOGUE, GEOGRAPHIC, conversion_factor
 from shiplog.version import __version__
 
 from .encode import MAX_MCAP_CHUNK_BYTES, McapChunk, MessageBatch, encode_mcap_chunks
+from .kept_records import ForeignMessages, KeptGroup
 from .metadata_record import with_checksum
 from .record_writer import McapRecordWriter
 from .schema import (
@@ -82,8 +83,8 @@ class LogWriter:
         vessel_toml: str | None = None,
     ) -> None:
         self._file = McapRecordWriter(path)
-        self._schema_ids: dict[str, int] = {}  # by name
-        self._channel_ids: dict[str, int] = {}  # by topic
+        self._schema_ids: dict[tuple[str, str, bytes], int] = {}  # by name, encoding and data
+        self._channel_ids: dict[Hashable, int] = {}  # by topic; of others by all of the record
         self._counts: dict[int, int] = {}  # of messages, by channel id
         self._samples = 0
         self._pending: list[MessageBatch] = []
@@ -118,14 +119,15 @@ class LogWriter:
         """The number of samples written so far; raw packets and events are none."""
         return self._samples
 
-    def write(self, *items: Channel | RawPackets | Event) -> None:
-        """Append samples, raw packets and events, interleaved in the order of reception.
+    def write(self, *items: Channel | RawPackets | ForeignMessages | Event) -> None:
+        """Append samples, packets, messages and events, interleaved in the order of reception.
 
         Parameters
         ----------
         items
-            The next samples of each channel, the next packets of each source, and events. The first
-            of a topic fixes its unit, fields and metadata, or its format.
+            The next samples of each channel, the next packets of each source, messages of other
+            programs, and events. The first of a topic fixes its unit, fields and metadata, or its
+            format.
 
         Raises
         ------
@@ -141,6 +143,10 @@ class LogWriter:
             elif isinstance(item, RawPackets):
                 size = _SAMPLE_BYTES * len(item) + sum(map(len, item.data))
                 self._append(self._register_packets(item), serialise_packets(item), size)
+            elif isinstance(item, ForeignMessages):
+                messages = item.messages
+                size = _SAMPLE_BYTES * len(item) + sum(map(len, messages.messages))
+                self._append(self._register_foreign(item), messages, size)
         if events:
             messages = serialise_events(events, self._latest_ns)
             self._append(self._register_events(), messages, _SAMPLE_BYTES * len(events))
@@ -157,6 +163,15 @@ class LogWriter:
         if changed:
             self._metadata |= changed
             self._file.write_metadata(METADATA_NAME, with_checksum(changed))
+
+    def write_records(
+        self, attachments: Iterable[records.Attachment], metadata: Iterable[records.Metadata]
+    ) -> None:
+        """Append attachments and metadata records of other programs."""
+        for attachment in attachments:
+            self._file.write_attachment(attachment)
+        for record in metadata:
+            self._file.write_metadata(record.name, record.metadata)
 
     def flush(self) -> None:
         """Hand all to the operating system, so that a killed process does not lose it."""
@@ -199,33 +214,41 @@ class LogWriter:
             return self._channel_ids[EVENTS_TOPIC]
         return self._describe(EVENTS_TOPIC, EVENT, {})
 
+    def _register_foreign(self, foreign: ForeignMessages) -> int:
+        channel, schema = foreign.channel, foreign.schema
+        schema_id = self._add_schema(schema.name, schema.encoding, schema.data) if schema else 0
+        metadata = tuple(sorted(channel.metadata.items()))
+        key = channel.topic, schema_id, channel.message_encoding, metadata
+        return self._add_channel(key, channel, schema_id)
+
     def _describe(self, topic: str, schema: Schema, metadata: dict[str, str]) -> int:
         """Describe a channel of the file, and return its id."""
-        channel_id = len(self._channel_ids) + 1
-        self._file.add_channel(
-            records.Channel(
-                id=channel_id,
-                topic=topic,
-                message_encoding=ENCODING,
-                metadata=metadata,
-                schema_id=self._register_schema(schema),
-            )
-        )
-        self._channel_ids[topic] = channel_id
-        self._counts[channel_id] = 0
-        return channel_id
-
-    def _register_schema(self, schema: Schema) -> int:
         from .messages import descriptor_set  # noqa: PLC0415 - protobuf takes long to import
 
-        if schema.name not in self._schema_ids:
+        schema_id = self._add_schema(schema.name, ENCODING, descriptor_set(schema))
+        record = records.Channel(
+            id=0, topic=topic, message_encoding=ENCODING, metadata=metadata, schema_id=schema_id
+        )
+        return self._add_channel(topic, record, schema_id)
+
+    def _add_channel(self, key: Hashable, channel: records.Channel, schema_id: int) -> int:
+        """Return the id of a channel record, which is described when its key is new."""
+        if key not in self._channel_ids:
+            channel_id = len(self._channel_ids) + 1
+            self._file.add_channel(replace(channel, id=channel_id, schema_id=schema_id))
+            self._channel_ids[key] = channel_id
+            self._counts[channel_id] = 0
+        return self._channel_ids[key]
+
+    def _add_schema(self, name: str, encoding: str, data: bytes) -> int:
+        """Return the id of a schema, which is described when it is new."""
+        key = name, encoding, data
+        if key not in self._schema_ids:
             schema_id = len(self._schema_ids) + 1
-            record = records.Schema(
-                id=schema_id, name=schema.name, encoding=ENCODING, data=descriptor_set(schema)
-            )
+            record = records.Schema(id=schema_id, name=name, encoding=encoding, data=data)
             self._file.add_schema(record)
-            self._schema_ids[schema.name] = schema_id
-        return self._schema_ids[schema.name]
+            self._schema_ids[key] = schema_id
+        return self._schema_ids[key]
 
     def _encode_pending(self) -> Iterator[McapChunk]:
         """Yield the messages that are not yet in the file."""
@@ -237,11 +260,7 @@ class LogWriter:
                 self._latest_ns = max(self._latest_ns, mcap_chunk.last_ns)
 
 
-def write(
-    log: TrialLog,
-    path: str | os.PathLike[str],
-    raw: Iterable[Sequence[RawPackets]] = (),
-) -> None:
+def write(log: TrialLog, path: str | os.PathLike[str], kept: Iterable[KeptGroup] = ()) -> None:
     """Write a whole trial to an MCAP file.
 
     Parameters
@@ -250,8 +269,8 @@ def write(
         The trial.
     path
         The file. It appears only when it is complete; until then an existing one is kept.
-    raw
-        The raw packets to keep beside it, in groups in the order of reception.
+    kept
+        What to keep beside it as it is, in groups in the order of reception.
 
     Raises
     ------
@@ -265,9 +284,12 @@ def write(
         LogWriter(part, metadata=log.metadata, vessel_toml=log.vessel_toml) as writer,
     ):
         rest: tuple[Channel | Event, ...] = (*log.channels, *log.events)
-        for group in raw:
-            now, rest = _split_at(rest, max(int(p.received_ns.max()) for p in group if len(p)))
-            writer.write(*now, *group)
+        for group in kept:
+            writer.write_records(group.attachments, group.metadata)
+            if group.messages:
+                latest = max(int(messages.received_ns.max()) for messages in group.messages)
+                now, rest = _split_at(rest, latest)
+                writer.write(*now, *group.messages)
         writer.write(*rest)
 
 

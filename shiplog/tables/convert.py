@@ -15,11 +15,13 @@ from shiplog.foreign_mcap.foreign_log import read_foreign_mcap
 from shiplog.layouts.layout import load_layout
 from shiplog.layouts.mcap_layout import load_mcap_layout
 from shiplog.mcap.clock_repair import MixedTimes, refuse_mixed_times
+from shiplog.mcap.kept_records import KeptGroup, kept_groups
 from shiplog.mcap.raw_reader import raw_groups
 from shiplog.mcap.reader import read_unchecked
+from shiplog.mcap.trial_log import concerns_kept
 from shiplog.mcap.writer import write
 from shiplog.screening import DerivedLog, plan_derivations, screen_values
-from shiplog.types import RawPackets, TrialLog, concatenate_channels
+from shiplog.types import TrialLog, concatenate_channels
 from shiplog.types.time_cut import resolve_cut
 
 from .csv_form import CSV_MARK, read_csv, write_csv
@@ -47,7 +49,8 @@ def convert(
         A log (`.mcap`), a table that shiplog wrote (`.csv`, `.parquet`), or a foreign table.
     target
         File to write, in the format of its suffix: one of `SUFFIXES`. From MCAP to MCAP each
-        channel is sorted by measured time.
+        channel is sorted by measured time; attachments and metadata records of other programs are
+        kept, and their topics too unless a layout states what is converted.
     layout
         Layout file of a foreign table, or of an MCAP file of another program.
     start, end
@@ -80,7 +83,7 @@ def convert(
         raise UsageError(f"source and target are the same file; name another target: {target}")
     is_mcap = _suffix(source) == ".mcap"
     log, mixed = _read_mcap(source, layout) if is_mcap else (_read_table(source, layout), [])
-    is_copy = is_mcap and target.suffix.lower() == ".mcap"
+    is_copy = is_mcap and layout is None and target.suffix.lower() == ".mcap"
     if not (is_copy and any(raw_groups(source))):  # a recording of raw packets alone is kept
         _require_samples(log, source)
     whole = log
@@ -100,8 +103,8 @@ def convert(
             refuse_contradictions(findings)
         warnings += [finding.text for finding in findings]
     if target.suffix.lower() == ".mcap":
-        write(log, target, _raw_within(source, whole, start, end) if is_mcap else ())
-        return log, warnings
+        write(log, target, _kept_within(source, whole, start, end, layout) if is_mcap else ())
+        return log, [each for each in warnings if not concerns_kept(each, with_topics=not layout)]
     warnings += _dropped_raw(source) if is_mcap else []
     writers = {".csv": write_csv, ".parquet": write_parquet}
     writers[target.suffix.lower()](log, target)
@@ -115,17 +118,21 @@ def _read_mcap(source: Path, layout: Path | None) -> tuple[TrialLog, list[MixedT
     return read_foreign_mcap(source, load_mcap_layout(layout))
 
 
-def _raw_within(
-    source: Path, whole: TrialLog, start: float | str | None, end: float | str | None
-) -> Iterator[list[RawPackets]]:
-    """Yield the raw packets received within a cut of the whole log."""
+def _kept_within(
+    source: Path,
+    whole: TrialLog,
+    start: float | str | None,
+    end: float | str | None,
+    layout: Path | None,
+) -> Iterator[KeptGroup]:
+    """Yield what is kept as it is, of messages those received within a cut of the whole log.
+
+    Where a layout states what is converted, topics of other programs are not kept.
+    """
     cut = None
     if start is not None or end is not None:
         cut = resolve_cut(start, end, whole.span_ns, whole.name)
-    for group in raw_groups(source):
-        kept = group if cut is None else list(map(cut.packets_within, group))
-        if any(map(len, kept)):
-            yield [packets for packets in kept if len(packets)]
+    return kept_groups(source, cut, with_topics=layout is None)
 
 
 def _dropped_raw(source: Path) -> list[str]:

@@ -51,16 +51,17 @@ class TimeCut:
     def events_within(self, events: Iterable[Event]) -> tuple[Event, ...]:
         """Return the events within the cut; one that begins or ends with the log is open there."""
         events = list(events)
-        rows = self._rows(np.array([event.time_ns for event in events], np.int64))
+        rows = self.rows_within(np.array([event.time_ns for event in events], np.int64))
         return tuple(events[row] for row in rows)
 
     def packets_within(self, packets: RawPackets) -> RawPackets:
         """Return the raw packets received within the cut, which is open as for events."""
-        rows = self._rows(packets.received_ns)
+        rows = self.rows_within(packets.received_ns)
         data = tuple(packets.data[row] for row in rows)
         return replace(packets, received_ns=packets.received_ns[rows], data=data)
 
-    def _rows(self, times: TimeArray) -> NDArray[np.intp]:
+    def rows_within(self, times: TimeArray) -> NDArray[np.intp]:
+        """Return the rows of the times (n,) within the cut, which is open as for events."""
         after = (times >= self.start_ns) | (self.start_ns <= self.log_span_ns[0])
         before = (times < self.end_ns) | (self.end_ns > self.log_span_ns[1])
         return np.flatnonzero(after & before)
