@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 from pathlib import Path
+from uuid import uuid4
 
 from shiplog.errors import ShiplogError
 from shiplog.files import claimed_name, is_device, replace_durably, write_error
@@ -17,6 +18,7 @@ from shiplog.mcap.writer import LogWriter
 from shiplog.types import Channel, Event
 
 from .disk_sync import SYNC_SECS, DiskSync
+from .part_series import PartSeries
 from .source import Recordable, Source
 
 _PART = ".part"  # appended to the name of a file that grows
@@ -198,20 +200,17 @@ def _record_files(
 ) -> Recording:
     """Write one file after the other until the source ends."""
     topics, finals, samples = set[str](), list[Path](), 0
+    set_id, index = uuid4().hex, dict[str, str]()
     first: tuple[Recordable, ...] | None = None
     while True:
         final = files.final(len(finals) + 1)
-        part = _RecordedPart(source, final, files)
+        series = None if files.rotation is None else PartSeries(set_id, len(finals) + 1, index)
+        part = _RecordedPart(source, final, files, series)
         end = part.write(first, chunks, partial(_report, on_chunk, samples))
         topics |= part.topics
         samples += part.samples
         finals.append(final)
-        first = None
-        if end is _End.ROTATED:
-            try:
-                first = _next_chunk(chunks)
-            except KeyboardInterrupt:
-                end = _End.INTERRUPTED
+        first = part.following
         if first is None:
             interrupted = take_waiting() or end is _End.INTERRUPTED
             return Recording(samples, len(topics), interrupted, tuple(finals))
@@ -239,13 +238,17 @@ class _End(Enum):
 class _RecordedPart:
     """One file of a recording."""
 
-    def __init__(self, source: Source, final: Path, files: _Files) -> None:
+    def __init__(
+        self, source: Source, final: Path, files: _Files, series: PartSeries | None
+    ) -> None:
         self._source, self._final, self._files = source, final, files
         self._rotation = files.rotation or Rotation()
         self._part = final if is_device(final) else final.with_name(final.name + _PART)
         self._has_data = False  # samples or raw packets: a log of events alone is worth nothing
+        self._series = series
         self.topics = set[str]()
         self.samples = 0
+        self.following: tuple[Recordable, ...] | None = None  # the chunk of the next part
 
     def write(
         self,
@@ -270,8 +273,11 @@ class _RecordedPart:
             A signal came before there was anything to keep; no file is left.
         """
         self._create()
+        own = self._series.beginning() if self._series else {}
         writer = LogWriter(
-            self._part, metadata=self._source.metadata, vessel_toml=self._source.vessel_toml
+            self._part,
+            metadata={**self._source.metadata, **own},
+            vessel_toml=self._source.vessel_toml,
         )
         try:
             end = self._write_all(writer, first, chunks, on_chunk)
@@ -290,6 +296,12 @@ class _RecordedPart:
             self._rename()
         self.samples = writer.samples
         return end
+
+    def _following_name(self) -> str:
+        """Return the name of the part in which the recording goes on; empty where in none."""
+        if self._series is None or self.following is None:
+            return ""
+        return self._files.final(self._series.number + 1).name
 
     def _create(self) -> None:
         """Create the file that grows."""
@@ -322,6 +334,8 @@ class _RecordedPart:
             with _write_errors(), writer:
                 # those that have changed, such as counts of rejected packets
                 writer.update_metadata(self._source.metadata)
+                if self._series:
+                    writer.update_metadata(self._series.end(self._following_name()))
 
     def _write_chunks(
         self,
@@ -341,11 +355,14 @@ class _RecordedPart:
                 disk.check()
                 size = self._part.stat().st_size  # fails, too, where the file was deleted
             self.topics.update(item.topic for item in chunk if isinstance(item, Channel))
+            if self._series:
+                self._series.add(chunk)
             with interruptible():
                 on_chunk(writer.samples)
-            if self._rotation.is_due(time.monotonic() - opened, size):
-                return _End.ROTATED
             chunk = _next_chunk(chunks)
+            if chunk is not None and self._rotation.is_due(time.monotonic() - opened, size):
+                self.following = chunk
+                return _End.ROTATED
         return _End.SOURCE
 
     def _rename(self) -> None:

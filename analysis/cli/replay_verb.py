@@ -17,6 +17,7 @@ from shiplog.cli.paths import (
 from shiplog.cli.verb import ExitCode, Verb
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import extension_names
+from shiplog.mcap.part_names import log_stem
 from shiplog.vessel.settings import DISTURBANCES, SENSOR_ERRORS
 
 from .shared_options import add_reading_options, reading_options, show_review
@@ -120,7 +121,7 @@ def _replay_output(arguments: argparse.Namespace) -> Path:
     """Return the path of the review, after a check of all paths."""
     if Path(arguments.log).suffix == ".rrd":
         raise UsageError(f"a review, not a log; open it with: rerun {arguments.log}")
-    output = Path(arguments.output or f"{Path(arguments.log).stem}.rrd")
+    output = Path(arguments.output or f"{log_stem(Path(arguments.log))}.rrd")
     require_suffix(".rrd", output)
     require_distinct([output, arguments.json], [arguments.log, arguments.vessel])
     require_inputs(arguments.log)

@@ -10,8 +10,12 @@ StrPath = str | Path
 
 
 def require_inputs(*paths: StrPath | None) -> None:
-    """Refuse a log that is missing or a folder; raises `LogError`."""
+    """Refuse a log that is missing or a folder without any; raises `LogError`."""
+    from shiplog.mcap.part_names import part_files
+
     for path in (Path(path) for path in paths if path):
+        if part_files(path) != (path,):
+            continue
         if not path.exists():
             raise LogError(f"no such file: {path}")
         if path.is_dir():

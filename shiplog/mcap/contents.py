@@ -185,6 +185,8 @@ class McapContents:
         Steps of clocks that were not repaired in the samples drained so far.
     pauses
         Gaps in all channels in the samples drained so far.
+    part_warnings, is_part_missing
+        What is missing between the parts of a log that has several files, and whether one is.
     """
 
     schemas: dict[int, records.Schema] = field(default_factory=dict)
@@ -219,6 +221,8 @@ class McapContents:
     clock_warnings: list[str] = field(default_factory=list)
     mixed_times: list[MixedTimes] = field(default_factory=list)
     pauses: Pauses = field(default_factory=Pauses)
+    part_warnings: tuple[str, ...] = ()
+    is_part_missing: bool = False
 
     def drain(self) -> dict[int, list[SampleBlock]]:
         """Return the blocks collected so far, by channel id, and release them."""

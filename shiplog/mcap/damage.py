@@ -24,6 +24,8 @@ class Damage:
         The topics that lost messages, as far as they are known.
     span_ns
         The times of reception of the lost messages, ns, the last included; None if unknown.
+    file
+        The name of the file, where a log has several.
     """
 
     start: int
@@ -32,11 +34,12 @@ class Damage:
     is_lost: bool = True
     topics: tuple[str, ...] = ()
     span_ns: tuple[int, int] | None = None
+    file: str = ""
 
     def __str__(self) -> str:
         is_one = self.end == self.start + 1
         where = f"byte {self.start}" if is_one else f"bytes {self.start} to {self.end}"
-        return f"damaged at {where}: {self.text}"
+        return f"damaged at {where}{f' of {self.file}' if self.file else ''}: {self.text}"
 
 
 def span_text(span_ns: tuple[int, int]) -> str:

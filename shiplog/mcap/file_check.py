@@ -9,7 +9,7 @@ import os
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -24,6 +24,9 @@ from .record_walk import RecordWalk
 from .records import FOOTER_BYTES, MAGIC, MCAP_CHUNK_HEAD, RECORD_HEAD, crc32_of_range
 from .single_bit import wrong_bit
 from .summary import McapSummary, read_summary
+
+if TYPE_CHECKING:
+    from .part_set import LogParts
 
 _DATA_END_HEAD = RECORD_HEAD.pack(Opcode.DATA_END, 4)
 _DATA_END_BYTES = len(_DATA_END_HEAD) + 4
@@ -55,6 +58,8 @@ class FileCheck:
         The byte and the bit in it that are inverted in reading; None for none.
     damage
         What is damaged, unless it was left to the walk over the records.
+    parts
+        The files of a log that has several, of which then nothing else is known here.
     """
 
     is_finished: bool
@@ -63,6 +68,7 @@ class FileCheck:
     summary: McapSummary | None = None
     wrong_bit: tuple[int, int] | None = None
     damage: tuple[Damage, ...] = ()
+    parts: "LogParts | None" = None
 
 
 def check_file(stream: IO[bytes]) -> FileCheck:

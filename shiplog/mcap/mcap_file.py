@@ -1,8 +1,9 @@
 """An MCAP file opened for reading, of which all checksums are known."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import IO
 
@@ -13,6 +14,8 @@ from shiplog.errors import LogError
 from .file_check import FileCheck, check_file
 from .inverted_bit import with_inverted_bit
 from .limits import MAX_DESCRIPTION_BYTES
+from .part_names import part_files
+from .part_set import LogParts, join_parts, read_part
 from .record_structure import content_size
 from .records import MAGIC, RECORD_HEAD
 
@@ -33,15 +36,22 @@ def open_mcap(path: Path, check: FileCheck | None = None) -> Iterator[McapFile]:
     Parameters
     ----------
     path
-        The file.
+        The file, or what names the parts of a log; see `part_files`.
     check
         What its checksums showed before, so that they are not computed again.
 
     Raises
     ------
     LogError
-        The file is missing, empty or not MCAP, or reading it fails within the block.
+        The file is missing, empty or not MCAP, reading it fails within the block, or the files
+        are not the parts of one log.
     """
+    files = part_files(path)
+    if len(files) > 1:
+        check = check or _check_parts(path, files)
+        yield McapFile(path, BytesIO(), check)
+        return
+    path = files[0]
     try:
         with path.open("rb") as stream:
             _require_mcap(path, stream)
@@ -49,6 +59,21 @@ def open_mcap(path: Path, check: FileCheck | None = None) -> Iterator[McapFile]:
             yield McapFile(path, with_inverted_bit(stream, check.wrong_bit), check)
     except OSError as error:
         raise LogError(_read_failure(path, error)) from error
+
+
+def _check_parts(path: Path, files: Sequence[Path]) -> FileCheck:
+    """Verify the checksums of all parts of a log, and return them in their order."""
+    parts = []
+    for file in files:
+        try:
+            with file.open("rb") as stream:
+                if file.stat().st_size:  # one of no bytes was just begun
+                    _require_mcap(file, stream)
+                    parts.append(read_part(file, stream))
+        except OSError as error:
+            raise LogError(_read_failure(file, error)) from error
+    joined = join_parts(parts, path) if len(parts) > 1 else LogParts(tuple(parts))
+    return FileCheck(all(part.check.is_finished for part in parts), parts=joined)
 
 
 def _require_mcap(path: Path, stream: IO[bytes]) -> None:

@@ -24,7 +24,9 @@ from .decompress import (
 )
 from .limits import MAX_MESSAGES_PER_BYTE, MAX_RECORD_BYTES
 from .locate import complete_records, gather, locate_by_index
-from .mcap_file import McapFile
+from .mcap_file import McapFile, open_mcap
+from .part_contents import PartContents
+from .part_set import LogParts
 from .record_walk import Record, RecordWalk
 from .records import MCAP_CHUNK_HEAD, MESSAGE_HEAD, RECORD_HEAD, index_entries
 from .summary import McapSummary
@@ -49,6 +51,9 @@ def scan(file: McapFile, contents: McapContents, skip: Collection[int] = ()) -> 
     LogError
         The file holds more messages than one of its size can.
     """
+    if file.check.parts is not None:
+        yield from _scan_parts(file.check.parts, contents)
+        return
     contents.damage += file.check.damage
     contents.finished = file.check.is_finished
     walk = RecordWalk(file.stream, skip, file.check.data_end)
@@ -72,6 +77,22 @@ def scan(file: McapFile, contents: McapContents, skip: Collection[int] = ()) -> 
     if contents.is_whole:
         restore_order(contents)
     _report_damage(file, walk, contents)
+    yield
+
+
+def _scan_parts(parts: LogParts, contents: McapContents) -> Iterator[None]:
+    """Go through the parts of a log, one after the other."""
+    contents.part_warnings = parts.warnings
+    contents.is_part_missing = parts.is_missing
+    contents.finished = all(part.check.is_finished for part in parts.parts)
+    for part in parts.parts:
+        joined = PartContents(part.path, contents)
+        with open_mcap(part.path, part.check) as file:
+            for _ in scan(file, joined.own):
+                joined.move()
+                yield
+                joined.own.keep_undescribed &= contents.keep_undescribed
+        joined.finish()
     yield
 
 

@@ -15,6 +15,10 @@ from shiplog.units import GEOGRAPHIC
 
 FORMAT_VERSION = "1"
 METADATA_NAME = "shiplog"  # of the metadata record
+PART_KEY = "part."  # of metadata of a file that is a part of a recording
+PART_SET, PART_NUMBER = f"{PART_KEY}set", f"{PART_KEY}number"
+PART_NEXT = f"{PART_KEY}continued_in"  # the name of the file that follows
+PART_INDEX = f"{PART_KEY}index."  # followed by a part's number: what it holds, in words
 VESSEL_ATTACHMENT = "vessel.toml"
 ENCODING = "protobuf"
 

@@ -1,6 +1,6 @@
 """Conversion of a file's scanned contents to a `TrialLog`."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from shiplog.types import (
     concatenate_channels,
     is_sorted,
 )
-from shiplog.units import CATALOGUE, conversion_factor
+from shiplog.units import CATALOGUE, conversion_factor, utc_text
 
 from .clock_repair import MessageColumns, drop_impossible_times, repair_clock_steps
 from .contents import McapContents, SampleBlock
@@ -57,8 +57,8 @@ def build_trial_log(path: Path, contents: McapContents) -> TrialLog:
         channels,
         contents.metadata,
         contents.vessel_toml,
-        tuple(_warnings(contents)),
-        contents.truncated or is_any_lost(contents.damage),
+        tuple(_warnings(contents, channels)),
+        contents.truncated or contents.is_part_missing or is_any_lost(contents.damage),
         tuple(contents.events),
     )
 
@@ -153,14 +153,20 @@ def _shift_at(
     return shift
 
 
-def _warnings(contents: McapContents) -> list[str]:
-    is_lost = is_any_lost(contents.damage)
+def _warnings(contents: McapContents, channels: Collection[Channel]) -> list[str]:
+    is_lost = contents.is_part_missing or is_any_lost(contents.damage)
     pauses = [] if is_lost else contents.pauses.warnings()  # else of the lost samples
-    warnings = [*map(str, contents.damage), *contents.clock_warnings, *pauses]
+    warnings = [
+        *contents.part_warnings,
+        *map(str, contents.damage),
+        *contents.clock_warnings,
+        *pauses,
+    ]
     if not contents.finished:
         warnings.append(
             "the file was not finished (the recorder was stopped or killed); "
             f"its {contents.total_samples} complete samples were read"
+            f"{_last_reception(channels)}; the end is missing"
         )
     foreign = [
         channel.topic
@@ -177,6 +183,12 @@ def _warnings(contents: McapContents) -> list[str]:
             f"{', '.join(names[:MAX_NAMES])}{more}"
         )
     return warnings
+
+
+def _last_reception(channels: Iterable[Channel]) -> str:
+    """Return in words when the last sample of a file was received."""
+    last = [int(channel.received_ns.max()) for channel in channels if len(channel)]
+    return f", the last one received at {utc_text(max(last) * 1e-9)}" if last else ""
 
 
 def _channel(

@@ -16,6 +16,7 @@ from shiplog.layouts.layout import load_layout
 from shiplog.layouts.mcap_layout import load_mcap_layout
 from shiplog.mcap.clock_repair import MixedTimes, refuse_mixed_times
 from shiplog.mcap.kept_records import KeptGroup, kept_groups
+from shiplog.mcap.part_names import part_files
 from shiplog.mcap.raw_reader import raw_groups
 from shiplog.mcap.reader import read_unchecked
 from shiplog.mcap.trial_log import concerns_kept
@@ -81,7 +82,7 @@ def convert(
         )
     if source.resolve() == target.resolve():
         raise UsageError(f"source and target are the same file; name another target: {target}")
-    is_mcap = _suffix(source) == ".mcap"
+    is_mcap = _suffix(source) == ".mcap" or part_files(source) != (source,)
     log, mixed = _read_mcap(source, layout) if is_mcap else (_read_table(source, layout), [])
     is_copy = is_mcap and layout is None and target.suffix.lower() == ".mcap"
     if not (is_copy and any(raw_groups(source))):  # a recording of raw packets alone is kept
@@ -93,7 +94,7 @@ def convert(
     if derive:
         log, derived = _with_derived(log, derive)
         warnings += derived
-    if source.suffix.lower() == target.suffix.lower() == ".mcap":
+    if is_copy:
         log, sort_warnings = sorted_by_time(log)
         warnings += sort_warnings
     if layout is not None:
