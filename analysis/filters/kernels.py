@@ -113,7 +113,7 @@ def is_accepted(
 
 
 @compiled
-def optimal_gain(Pc: FloatArray, S: float, K: FloatArray) -> None:
+def kalman_gain_of_scalar(Pc: FloatArray, S: float, K: FloatArray) -> None:
     """Set the gain K (s,) of the Kalman filter, P c / S."""
     for i in range(len(K)):
         K[i] = Pc[i] / S

@@ -22,7 +22,7 @@ from shiplog.vessel.settings import FilterSettings
 from .base import FURTHER_SETTINGS, NOISE_SETTINGS, FilterKind
 from .core import StepInputs, advance, begin_instant, gain, output_row
 from .further_states import CoreModel, arrange
-from .kernels import optimal_gain, quadratic_form
+from .kernels import kalman_gain_of_scalar, quadratic_form
 from .noise_model import NoiseModel
 from .ship_filter import ShipFilter
 
@@ -144,7 +144,7 @@ def _gain(
     output: int,
     K: FloatArray,
 ) -> None:
-    optimal_gain(Pc, S, K)
+    kalman_gain_of_scalar(Pc, S, K)
 
 
 @overload_for(output_row, PseudoInputCore)

@@ -37,7 +37,7 @@ from .gains import (
     relinearised_gain,
     stated_poles,
 )
-from .kernels import optimal_gain
+from .kernels import kalman_gain_of_scalar
 from .noise_model import NoiseModel
 from .ship_filter import ShipFilter
 from .ship_step import ShipState, jacobian, predict_ship, ship_row, ship_slopes
@@ -233,7 +233,7 @@ def _gain(
     K: FloatArray,
 ) -> None:
     """Set the optimal gain, or the designed one where that has replaced it."""
-    optimal_gain(Pc, S, K)
+    kalman_gain_of_scalar(Pc, S, K)
     if output < len(PAPER_OUTPUTS):
         _replace(core.design, core.model, x, u, output, K)
 
