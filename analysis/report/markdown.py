@@ -64,4 +64,4 @@ def _cell(text: str) -> str:
 
 def _inline(text: str) -> str:
     """Return a text in one line without links, images and HTML, as it may come from a file."""
-    return re.sub(r"\\|\](?=[(\[:])|<", r"\\\g<0>", printable(text))
+    return re.sub(r"\\|\](?=[(\[:])|<(?=[A-Za-z/!?])", r"\\\g<0>", printable(text))
