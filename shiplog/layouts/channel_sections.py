@@ -67,6 +67,12 @@ class SectionParser:
 
     # ---- what a layout of another kind has instead
 
+    def parse_top(self, key: str, value: object) -> None:
+        """Parse the value of one of `top_keys`."""
+
+    def parse_time(self, section: Mapping[str, Any]) -> None:
+        """Parse the section of the time."""
+
     def further_keys(self, role: str) -> tuple[str, ...]:  # noqa: ARG002
         """Return the keys that a section has beside those of its columns."""
         return ()
@@ -96,6 +102,24 @@ class SectionParser:
                 self.parse_channel(key, value)
         self.find_shared_columns()
         return self.found, self.errors
+
+    def parse_file(self) -> None:
+        """Parse the values of the top level, the time, and the sections of channels."""
+        for key, value in self.table.items():
+            if key in self.top_keys:
+                self.parse_top(key, value)
+            elif not isinstance(value, dict):
+                known = key in ROLES
+                self.errors.append(
+                    f"[{key}] must be a section" if known
+                    else unknown_key(key, (*self.top_keys, *ROLES))
+                )  # fmt: skip
+            elif key == "time":
+                self.parse_time(value)
+            elif key.partition(".")[0] == "position":
+                self.parse_position(key, value)
+            else:
+                self.parse_channel(key, value)
 
     def parse_channel(self, key: str, section: Mapping[str, Any]) -> None:
         """Parse the columns of a quantity: its own, and one for each source that is named."""

@@ -11,14 +11,13 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 from shiplog.errors import LayoutError
-from shiplog.toml_text import list_errors, parse_toml, unknown_key
+from shiplog.toml_text import list_errors, parse_toml
 from shiplog.units import CATALOGUE
 
 from .channel_sections import SectionParser
 from .layout import (
     DATE_ORDERS,
     DELIMITERS,
-    ROLES,
     VELOCITIES,
     Column,
     Layout,
@@ -94,21 +93,7 @@ class _LayoutParser(SectionParser):
                 "a layout of an MCAP file, but the file is a table; `shiplog layout FILE` drafts "
                 f"one for it: {self.where}"
             )
-        for key, value in self.table.items():
-            if key in _KINDS:
-                self._top[key] = self._top_value(key, value)
-            elif not isinstance(value, dict):
-                known = key in ROLES
-                self.errors.append(
-                    f"[{key}] must be a section" if known
-                    else unknown_key(key, (*_KINDS, *ROLES))
-                )  # fmt: skip
-            elif key == "time":
-                self._parse_time(value)
-            elif key.partition(".")[0] == "position":
-                self.parse_position(key, value)
-            else:
-                self.parse_channel(key, value)
+        self.parse_file()
         self._find_contradictions()
         if self.errors:
             raise LayoutError(list_errors(self.errors, KIND, self.where))
@@ -136,19 +121,19 @@ class _LayoutParser(SectionParser):
 
     # ---- the top level
 
-    def _top_value(self, key: str, value: object) -> object:
-        """Check a value of the top level."""
+    def parse_top(self, key: str, value: object) -> None:
+        """Parse a value of the top level."""
         kind, words = _KINDS[key]
         good = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
         if good:
             good = _TOP_CHECKS.get(key, lambda _: True)(value)
         if not good:
             self.errors.append(f"{key} must be {words}, got {value!s:.60}")
-        return value
+        self._top[key] = value
 
     # ---- the sections
 
-    def _parse_time(self, section: Mapping[str, Any]) -> None:
+    def parse_time(self, section: Mapping[str, Any]) -> None:
         self.check_keys("time", section, _TIME_KEYS)
         self.require("time", section, ("column",))
         self._check_rebuild("time", section)

@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from shiplog.errors import LayoutError
-from shiplog.toml_text import list_errors, parse_toml, unknown_key
+from shiplog.toml_text import list_errors, parse_toml
 from shiplog.units import CATALOGUE, GEOGRAPHIC
 
 from .channel_sections import SectionParser
 from .field_paths import parse_path
-from .layout import DEGREES_MINUTES, ROLES, VELOCITIES, Column
+from .layout import DEGREES_MINUTES, VELOCITIES, Column
 from .layout_parser import KIND
 from .mcap_layout import (
     ASSUMABLE,
@@ -63,7 +63,7 @@ class _McapLayoutParser(SectionParser):
 
     place_key = "field"
     place_words = "a path of fields such as 'twist.linear.x' or 'data[0]'"
-    top_keys = ("name", "source", "time")
+    top_keys = ("name", "source")
     position_texts = ()
 
     def __init__(self, table: Mapping[str, Any], where: str) -> None:
@@ -81,21 +81,7 @@ class _McapLayoutParser(SectionParser):
                 "a layout of a table, but the file is MCAP; `shiplog layout FILE.mcap` drafts one "
                 f"for it, and a log of shiplog needs none: {self.where}"
             )
-        for key, value in self.table.items():
-            if key in ("name", "source"):
-                self._parse_name(key, value)
-            elif not isinstance(value, dict):
-                known = key in ROLES
-                self.errors.append(
-                    f"[{key}] must be a section" if known
-                    else unknown_key(key, (*self.top_keys, *ROLES))
-                )  # fmt: skip
-            elif key == "time":
-                self._parse_time(value)
-            elif key.partition(".")[0] == "position":
-                self.parse_position(key, value)
-            else:
-                self.parse_channel(key, value)
+        self.parse_file()
         self._find_contradictions()
         if self.errors:
             raise LayoutError(list_errors(self.errors, KIND, self.where))
@@ -157,14 +143,14 @@ class _McapLayoutParser(SectionParser):
             )
         self._assumed += [f"{name} of {role}" for name in names]
 
-    def _parse_name(self, key: str, value: object) -> None:
+    def parse_top(self, key: str, value: object) -> None:
         good = isinstance(value, str) and bool(value) and value.isprintable()
         if not good or (key == "source" and "/" in str(value)):
             without = " without '/'" if key == "source" else ""
             self.errors.append(f"{key} must be a string{without}, got {value!s:.60}")
         self._top[key] = str(value)
 
-    def _parse_time(self, section: Mapping[str, Any]) -> None:
+    def parse_time(self, section: Mapping[str, Any]) -> None:
         """Parse the time of measurement that all messages have."""
         self.check_keys("time", section, ("stamp", "unit"))
         self.require("time", section, ("stamp",))

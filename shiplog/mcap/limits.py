@@ -9,10 +9,7 @@ MAX_WINDOW_BYTES = 1 << 27  # of zstd, at its highest level of compression
 MAX_RECORD_BYTES = 1 << 26  # of other records; a longer attachment is not read
 MAX_DESCRIPTION_BYTES = 1 << 24  # of a header, schema, channel or metadata record
 MAX_MAP_ENTRIES = 1 << 14  # of the metadata of a channel or of the file
-MAX_DESCRIPTIONS = 1 << 14  # schema and channel records in one MCAP chunk
-MAX_CHANNELS = 1 << 14  # of a file
 MAX_SUMMARY_BYTES = 1 << 28  # 1.8 million MCAP chunks of 6 channels
-MAX_UNDESCRIBED_BYTES = 1 << 27  # of MCAP chunks kept because a channel is not described yet
 # Messages are at least 31 bytes with two times that grow; the best compression of a real log,
 # constant values at a steady rate, leaves some bytes of each.
 MAX_MESSAGES_PER_BYTE = 8

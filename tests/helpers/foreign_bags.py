@@ -6,10 +6,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
 from mcap.writer import Writer
 from mcap_ros2.writer import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
+
+from shiplog.mcap.messages import descriptor_set, encode_messages
+from shiplog.mcap.schema import schema_for
+from shiplog.types import Channel
+from shiplog.units import GEOGRAPHIC
 
 START_NS = 1_700_000_000 * 10**9
 STEP_NS = 10**8
@@ -64,6 +70,18 @@ def write_messages(
 def write_json(path: Path, messages: Iterable[Any]) -> Path:
     """Write messages in JSON."""
     return write_messages(path, (json.dumps(message).encode() for message in messages))
+
+
+def write_location_fixes(path: Path, number: int) -> tuple[Path, np.ndarray]:
+    """Write fixes of the type of Foxglove at their stamps, and return them too."""
+    at = START_NS + STEP_NS * np.arange(number)
+    columns = [54.0 + np.arange(number) * 1e-5, np.full(number, 10.0), np.full(number, 3.0)]
+    fixes = np.column_stack(columns)
+    schema = schema_for(GEOGRAPHIC)
+    data = encode_messages(Channel("position", "x", "deg", at, at, fixes, GEOGRAPHIC))
+    described = (schema.name, "protobuf", descriptor_set(schema))
+    bag = write_messages(path, data, topic="/gps", encoding="protobuf", schema=described)
+    return bag, fixes
 
 
 def protobuf_type() -> tuple[tuple[str, str, bytes], Callable[..., Any]]:

@@ -13,6 +13,7 @@ from foreign_bags import (
     protobuf_type,
     stamp,
     write_json,
+    write_location_fixes,
     write_messages,
     write_ros2,
 )
@@ -22,8 +23,6 @@ from mcap.writer import Writer
 from shiplog import LayoutError, LogError, LogWriter, TrialLog
 from shiplog.foreign_mcap.foreign_log import read_foreign_mcap
 from shiplog.layouts.mcap_layout_parser import parse_mcap_layout
-from shiplog.mcap.messages import descriptor_set, encode_messages
-from shiplog.mcap.schema import schema_for
 from shiplog.types import Channel
 from shiplog.units import GEOGRAPHIC
 
@@ -204,17 +203,7 @@ def test_protobuf_is_read_by_the_descriptors_in_the_file(tmp_path: Path) -> None
 
 
 def test_a_location_fix_of_another_program_is_a_position_at_its_own_time(tmp_path: Path) -> None:
-    at = START_NS + STEP_NS * np.arange(N)
-    fixes = np.column_stack([54.0 + np.arange(N) * 1e-5, np.full(N, 10.0), np.full(N, 3.0)])
-    schema = schema_for(GEOGRAPHIC)
-    data = encode_messages(Channel("position", "x", "deg", at, at, fixes, GEOGRAPHIC))
-    bag = write_messages(
-        tmp_path / "bag.mcap",
-        data,
-        topic="/gps",
-        encoding="protobuf",
-        schema=(schema.name, "protobuf", descriptor_set(schema)),
-    )
+    bag, fixes = write_location_fixes(tmp_path / "bag.mcap", N)
     layout = (
         "[position]\ntype = 'foxglove.LocationFix'\nlatitude = 'latitude'\n"
         "longitude = 'longitude'\naltitude = 'altitude'\nunit = 'deg'\n"

@@ -3,7 +3,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign_bags import START_NS, STEP_NS, stamp, write_json, write_messages, write_ros2
+from foreign_bags import (
+    START_NS,
+    STEP_NS,
+    stamp,
+    write_json,
+    write_location_fixes,
+    write_messages,
+    write_ros2,
+)
 from mcap.writer import Writer
 
 from shiplog import LayoutError
@@ -11,12 +19,8 @@ from shiplog.cli.main import main
 from shiplog.foreign_mcap.mcap_draft import draft_mcap_layout
 from shiplog.foreign_mcap.ready_layouts import ready_layouts
 from shiplog.layouts.mcap_layout_parser import parse_mcap_layout
-from shiplog.mcap.messages import descriptor_set, encode_messages
 from shiplog.mcap.reader import read
-from shiplog.mcap.schema import schema_for
 from shiplog.tables.convert import convert
-from shiplog.types import Channel
-from shiplog.units import GEOGRAPHIC
 
 N = 20
 
@@ -97,17 +101,7 @@ def test_a_frame_that_names_its_axes_is_followed(tmp_path: Path) -> None:
 
 
 def test_a_location_fix_is_converted_by_its_draft(tmp_path: Path) -> None:
-    at = START_NS + STEP_NS * np.arange(N)
-    fixes = np.column_stack([54.0 + np.arange(N) * 1e-5, np.full(N, 10.0), np.full(N, 3.0)])
-    schema = schema_for(GEOGRAPHIC)
-    data = encode_messages(Channel("position", "x", "deg", at, at, fixes, GEOGRAPHIC))
-    bag = write_messages(
-        tmp_path / "bag.mcap",
-        data,
-        topic="/gps",
-        encoding="protobuf",
-        schema=(schema.name, "protobuf", descriptor_set(schema)),
-    )
+    bag, fixes = write_location_fixes(tmp_path / "bag.mcap", N)
     values, warnings = convert_by_draft(bag)
     np.testing.assert_array_equal(values["/position/gps"], fixes)
     assert not any("assumes" in text for text in warnings)
