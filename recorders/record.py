@@ -14,14 +14,13 @@ from uuid import uuid4
 from shiplog.errors import ShiplogError
 from shiplog.files import claimed_name, is_device, replace_durably, write_error
 from shiplog.interrupts import deferred, handled_signals, interruptible, take_waiting
+from shiplog.mcap.part_names import UNFINISHED
 from shiplog.mcap.writer import LogWriter
 from shiplog.types import Channel, Event
 
 from .disk_sync import SYNC_SECS, DiskSync
 from .part_series import PartSeries
 from .source import Recordable, Source
-
-_PART = ".part"  # appended to the name of a file that grows
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,7 @@ def growing_file(path: Path, rotation: Rotation | None) -> Path:
     """Return the file to which a running recording of a log is written at the moment."""
     if is_device(path):
         return path
-    parts = [file for file in _files_of(path, rotation) if file.name.endswith(_PART)]
+    parts = [file for file in _files_of(path, rotation) if file.name.endswith(UNFINISHED)]
     return parts[-1] if parts else path
 
 
@@ -139,7 +138,7 @@ def _require_free(path: Path, rotation: Rotation | None, *, overwrites: bool) ->
     if path.is_dir() or not path.parent.is_dir():
         raise write_error(path, FileNotFoundError())
     for file in _files_of(path, rotation):
-        if file.name.endswith(_PART):
+        if file.name.endswith(UNFINISHED):
             raise _unfinished(file)
         if not overwrites:
             raise ShiplogError(
@@ -152,7 +151,7 @@ def _files_of(path: Path, rotation: Rotation | None) -> list[Path]:
     """Return the files that a recording of a log has, or an older one has, by name."""
     number = "" if rotation is None else r"\.\d{3,}"
     name = re.compile(
-        rf"{re.escape(path.stem)}{number}{re.escape(path.suffix)}({re.escape(_PART)})?"
+        rf"{re.escape(path.stem)}{number}{re.escape(path.suffix)}({re.escape(UNFINISHED)})?"
     )
     return sorted(file for file in path.parent.iterdir() if name.fullmatch(file.name))
 
@@ -243,7 +242,7 @@ class _RecordedPart:
     ) -> None:
         self._source, self._final, self._files = source, final, files
         self._rotation = files.rotation or Rotation()
-        self._part = final if is_device(final) else final.with_name(final.name + _PART)
+        self._part = final if is_device(final) else final.with_name(final.name + UNFINISHED)
         self._has_data = False  # samples or raw packets: a log of events alone is worth nothing
         self._series = series
         self.topics = set[str]()

@@ -149,11 +149,12 @@ def _configure_layout(parser: argparse.ArgumentParser) -> None:
 def _layout(arguments: argparse.Namespace) -> ExitCode:
     from shiplog.files import atomic_write
     from shiplog.foreign_mcap.mcap_draft import draft_mcap_layout
+    from shiplog.mcap.part_names import SUFFIX, log_suffix
     from shiplog.tables.draft import draft_layout
 
     require_outputs(arguments.output)
     require_distinct([arguments.output], [arguments.table])
-    is_mcap = arguments.table.name.removesuffix(".part").lower().endswith(".mcap")
+    is_mcap = log_suffix(arguments.table) == SUFFIX
     draft = (draft_mcap_layout if is_mcap else draft_layout)(arguments.table)
     if arguments.output is None:
         print_toml(draft.text)

@@ -32,6 +32,17 @@ def part_files(path: Path) -> tuple[Path, ...]:
     return tuple(sorted(found)) or (path,)
 
 
+def log_suffix(path: Path) -> str:
+    """Return the suffix of a log in small letters, of an unfinished one that of its final name.
+
+    Examples
+    --------
+    >>> log_suffix(Path("trial.MCAP.part"))
+    '.mcap'
+    """
+    return Path(path.name.removesuffix(UNFINISHED)).suffix.lower()
+
+
 def log_stem(path: Path) -> str:
     """Return what a log is called, without the suffix, as the beginning of names of its outputs.
 

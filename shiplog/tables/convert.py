@@ -16,7 +16,7 @@ from shiplog.layouts.layout import load_layout
 from shiplog.layouts.mcap_layout import load_mcap_layout
 from shiplog.mcap.clock_repair import MixedTimes, refuse_mixed_times
 from shiplog.mcap.kept_records import KeptGroup, kept_groups
-from shiplog.mcap.part_names import part_files
+from shiplog.mcap.part_names import log_suffix, part_files
 from shiplog.mcap.raw_reader import raw_groups
 from shiplog.mcap.reader import read_unchecked
 from shiplog.mcap.trial_log import concerns_kept
@@ -82,7 +82,7 @@ def convert(
         )
     if source.resolve() == target.resolve():
         raise UsageError(f"source and target are the same file; name another target: {target}")
-    is_mcap = _suffix(source) == ".mcap" or part_files(source) != (source,)
+    is_mcap = log_suffix(source) == ".mcap" or part_files(source) != (source,)
     log, mixed = _read_mcap(source, layout) if is_mcap else (_read_table(source, layout), [])
     is_copy = is_mcap and layout is None and target.suffix.lower() == ".mcap"
     if not (is_copy and any(raw_groups(source))):  # a recording of raw packets alone is kept
@@ -164,14 +164,9 @@ def _require_samples(log: TrialLog, source: Path) -> None:
         raise LogError(f"nothing to convert, no samples of shiplog: {causes}: {source}")
 
 
-def _suffix(source: Path) -> str:
-    """Return the suffix of a file, of an unfinished recording without its ``.part``."""
-    return Path(source.name.removesuffix(".part")).suffix.lower()
-
-
 def _read_table(source: Path, layout: Path | None) -> TrialLog:
     """Read a table of shiplog, or a foreign one by its layout."""
-    suffix = _suffix(source)
+    suffix = log_suffix(source)
     if layout is not None:
         if suffix == ".parquet" or (suffix == ".csv" and _is_shiplog_csv(source)):
             raise UsageError(
