@@ -301,7 +301,8 @@ def _run_child(work: Callable[[], int], place: Path) -> Ending:
         stderr = os.open(errors, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(stderr, 2)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
+        # the command makes streams of its own, after which the end of these closes nothing
+        sys.stdout, sys.stderr = (os.fdopen(each, "w", closefd=False) for each in (1, 2))
         return work()
 
     _, status = os.waitpid(_forked(in_place), 0)
