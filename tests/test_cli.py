@@ -17,7 +17,7 @@ from shiplog import Channel, LogWriter, TrialLog, read, write
 from shiplog.cli.main import main
 from shiplog.cli.verb import ExitCode
 
-OK, FAILURE, USAGE, DATA_LOST = ExitCode
+OK, FAILURE, USAGE, DATA_LOST, _ = ExitCode
 
 
 @pytest.fixture(autouse=True)

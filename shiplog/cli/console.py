@@ -237,5 +237,6 @@ def write_json(value: object, where: str) -> None:
         part.write_text(text, encoding="utf-8")
 
 
-def _is_unicode(encoding: str) -> bool:
-    return encoding.lower().startswith("utf")
+def _is_unicode(encoding: str | None) -> bool:
+    """Whether an encoding has all characters; None, of a text in memory, has them."""
+    return encoding is None or encoding.lower().startswith("utf")

@@ -115,6 +115,32 @@ class KeptMessages:
 Keeps = Callable[[records.Channel, Mapping[int, records.Schema]], bool]
 
 
+@dataclass(frozen=True)
+class LostMcapChunk:
+    """An MCAP chunk that cannot be read.
+
+    Attributes
+    ----------
+    start, end
+        The offsets of its first byte and of the byte after its last.
+    messages
+        The number of its messages; 0 if unknown.
+    channel_ids
+        Their channels, as far as known.
+    span_ns
+        Their times of reception, ns, the last included.
+    cause
+        Why it cannot be read, in words.
+    """
+
+    start: int
+    end: int
+    messages: int
+    channel_ids: tuple[int, ...]
+    span_ns: tuple[int, int]
+    cause: str
+
+
 @dataclass
 class McapContents:
     """What the scan of a file has collected so far.
@@ -163,12 +189,16 @@ class McapContents:
         Whether each MCAP chunk was received after the one before, by its own times.
     latest_ns
         The last time of reception in the MCAP chunks so far, ns.
+    last_sample_ns
+        The last time of reception of the samples in the logs made so far, ns; None for none.
     finished
         Whether the file has its footer.
     truncated
         Whether an unfinished file ends within a record.
     damage
         The damaged parts so far.
+    lost_mcap_chunks
+        The lost MCAP chunks that are not yet in `damage`, as a later record may name their topics.
     reading
         The offsets, start and end, of the record that is being read.
     block_starts
@@ -210,9 +240,11 @@ class McapContents:
     vessel_toml: str | None = None
     in_order: bool = True
     latest_ns: int = 0
+    last_sample_ns: int | None = None
     finished: bool = False
     truncated: bool = False
     damage: list[Damage] = field(default_factory=list)
+    lost_mcap_chunks: list[LostMcapChunk] = field(default_factory=list)
     reading: tuple[int, int] = (0, 0)
     block_starts: list[int] = field(default_factory=list)
     is_whole: bool = True

@@ -13,7 +13,7 @@ from mcap.opcode import Opcode
 from shiplog.errors import LogError
 
 from .chunk_order import restore_order
-from .contents import McapContents
+from .contents import LostMcapChunk, McapContents
 from .damage import Damage, gap_damage, lost_messages_text
 from .decode import MALFORMED, collect_messages, collect_undescribed, read_record
 from .decompress import (
@@ -130,7 +130,7 @@ def _read_mcap_chunk(record: Record, indexes: list[bytes], contents: McapContent
     try:
         data = mcap_chunk_data(record.content)
     except MALFORMED as error:
-        contents.damage.append(_lost_mcap_chunk(record, indexes, contents, str(error)))
+        contents.lost_mcap_chunks.append(_lost_mcap_chunk(record, indexes, str(error)))
         return
     size, crc = struct.unpack_from("<QI", key, 16)
     if size and crc and key in contents.mcap_chunks_read:
@@ -159,9 +159,7 @@ def _check_indexes(record: Record, indexes: list[bytes], contents: McapContents)
         contents.damage.append(Damage(record.end, end, text, is_lost=False))
 
 
-def _lost_mcap_chunk(
-    record: Record, indexes: list[bytes], contents: McapContents, cause: str
-) -> Damage:
+def _lost_mcap_chunk(record: Record, indexes: list[bytes], cause: str) -> LostMcapChunk:
     """Return what is lost by an MCAP chunk, according to its message indexes or else its head."""
     ids, times = [], []
     for index in indexes:
@@ -173,11 +171,16 @@ def _lost_mcap_chunk(
     head = np.frombuffer(record.content[:16].ljust(16, b"\0"), np.int64)
     received = np.concatenate(times) if times else head
     span = int(received.min()), int(received.max())
-    topics = tuple(contents.channels[id_].topic for id_ in ids if id_ in contents.channels)
-    text = lost_messages_text(messages, topics, span)
-    return Damage(
-        record.start, record.end, f"{text}: MCAP chunk, {cause}", topics=topics, span_ns=span
+    return LostMcapChunk(record.start, record.end, messages, tuple(ids), span, cause)
+
+
+def _damage_of(lost: LostMcapChunk, contents: McapContents) -> Damage:
+    """Return the damage by a lost MCAP chunk; its topics may be described anywhere in the file."""
+    topics = tuple(
+        contents.channels[id_].topic for id_ in lost.channel_ids if id_ in contents.channels
     )
+    text = f"{lost_messages_text(lost.messages, topics, lost.span_ns)}: MCAP chunk, {lost.cause}"
+    return Damage(lost.start, lost.end, text, topics=topics, span_ns=lost.span_ns)
 
 
 def _collect_mcap_chunk(
@@ -221,6 +224,8 @@ def _read_truncated_end(file: McapFile, walk: RecordWalk, contents: McapContents
 def _report_damage(file: McapFile, walk: RecordWalk, contents: McapContents) -> None:
     """Report what the walk found, and a wrong checksum of the data that no damage explains."""
     summary, data_end = file.check.summary, file.check.data_end
+    contents.damage += [_damage_of(lost, contents) for lost in contents.lost_mcap_chunks]
+    contents.lost_mcap_chunks.clear()
     contents.damage += walk.remarks
     contents.damage += [gap_damage(start, end, summary) for start, end in walk.gaps]
     contents.damage.sort(key=lambda damage: damage.start)

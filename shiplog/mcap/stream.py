@@ -241,7 +241,7 @@ def _log_file(
 def _need_repair(path: Path, check: FileCheck, described: McapContents) -> bool:
     """Whether some times of a file may have to be changed or dropped, by one pass over it.
 
-    Where none has, the contents that describe the file receive its events.
+    Where none has, the contents that describe the file receive its events and its last time.
     """
     contents = McapContents(
         dict(described.schemas), dict(described.channels), keep_undescribed=False
@@ -253,6 +253,7 @@ def _need_repair(path: Path, check: FileCheck, described: McapContents) -> bool:
             if times.need_repair():
                 return True
     described.event_messages = contents.event_messages
+    described.last_sample_ns = times.last_received_ns
     return False
 
 

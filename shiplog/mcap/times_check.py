@@ -39,6 +39,11 @@ class TimesCheck:
     is_steady: bool = True
     _last: dict[str, _LastSamples] = field(default_factory=dict)
 
+    @property
+    def last_received_ns(self) -> int | None:
+        """The last time of reception, ns, where the times need no repair; None without samples."""
+        return max((last.received_ns for last in self._last.values()), default=None)
+
     def need_repair(self) -> bool:
         """Whether some of the times so far may have to be changed or dropped."""
         is_empty = self.first_ns > self.last_ns

@@ -1,6 +1,6 @@
 """Conversion of a file's scanned contents to a `TrialLog`."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -45,19 +45,22 @@ def build_trial_log(path: Path, contents: McapContents) -> TrialLog:
         The format version is another one, a unit is unknown, or a message is not of its schema.
     """
     version = contents.metadata.get("format_version", FORMAT_VERSION)
-    if version != FORMAT_VERSION and not contents.damage:
+    if version != FORMAT_VERSION and not (contents.damage or contents.lost_mcap_chunks):
         raise LogError(
             f"written in format {version}, this shiplog reads format {FORMAT_VERSION}; "
             f"install a newer shiplog: {path}"
         )
     channels = merge_by_topic(channels_by_id(path, contents).values())
     contents.pauses.add(channels)
+    last = [int(channel.received_ns.max()) for channel in channels if len(channel)]
+    before = [] if contents.last_sample_ns is None else [contents.last_sample_ns]
+    contents.last_sample_ns = max(last + before, default=None)
     return TrialLog(
         path.name,
         channels,
         contents.metadata,
         contents.vessel_toml,
-        tuple(_warnings(contents, channels)),
+        tuple(_warnings(contents)),
         contents.truncated or contents.is_part_missing or is_any_lost(contents.damage),
         tuple(contents.events),
     )
@@ -153,7 +156,7 @@ def _shift_at(
     return shift
 
 
-def _warnings(contents: McapContents, channels: Collection[Channel]) -> list[str]:
+def _warnings(contents: McapContents) -> list[str]:
     is_lost = contents.is_part_missing or is_any_lost(contents.damage)
     pauses = [] if is_lost else contents.pauses.warnings()  # else of the lost samples
     warnings = [
@@ -166,7 +169,7 @@ def _warnings(contents: McapContents, channels: Collection[Channel]) -> list[str
         warnings.append(
             "the file was not finished (the recorder was stopped or killed); "
             f"its {contents.total_samples} complete samples were read"
-            f"{_last_reception(channels)}; the end is missing"
+            f"{_last_reception(contents.last_sample_ns)}; the end is missing"
         )
     foreign = [
         channel.topic
@@ -185,10 +188,9 @@ def _warnings(contents: McapContents, channels: Collection[Channel]) -> list[str
     return warnings
 
 
-def _last_reception(channels: Iterable[Channel]) -> str:
-    """Return in words when the last sample of a file was received."""
-    last = [int(channel.received_ns.max()) for channel in channels if len(channel)]
-    return f", the last one received at {utc_text(max(last) * 1e-9)}" if last else ""
+def _last_reception(time_ns: int | None) -> str:
+    """Return in words when the last sample of a file was received; nothing where it has none."""
+    return "" if time_ns is None else f", the last one received at {utc_text(time_ns * 1e-9)}"
 
 
 def _channel(

@@ -251,7 +251,7 @@ def _list_error(label: str, value: object, allowed: Sequence[str]) -> str | None
     unknown = [each for each in value if each not in allowed]
     if unknown:
         hint = _nearest(unknown[0], allowed)
-        return f"{label} must be a list of some of {choices}, got {list(value)!r}{hint}"
+        return f"{label} must be a list of some of {choices}, got {value!r}{hint}"
     if NONE in value and set(value) != {NONE}:
         others = ", ".join(each for each in value if each != NONE)
         return f"{label} has {NONE} beside {others}; remove one of them"
