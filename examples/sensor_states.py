@@ -10,7 +10,7 @@ from papers.markdown_page import number, paragraph, table
 from scipy.interpolate import CubicSpline
 
 from analysis import Analysis, ReadingOptions, analyse
-from analysis.filters.further_states import CURRENT_WALK, DRIFT_WALK, SENSOR_WALKS
+from analysis.filters.further_parts import CURRENT_WALK, DRIFT_WALK, SENSOR_WALKS
 from analysis.replay.sensor_errors import SensorError, further_display
 from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import Gust

@@ -31,7 +31,8 @@ class FurtherStates:
     names, units
         The k estimates: ``heading``, ``north``, ``east``, the sensor errors (`SENSOR_ERRORS` of the
         settings), ``current_north``, ``current_east``, ``drift_length``, ``yaw_moment``,
-        ``surge_force`` and the waves of these, as far as the filter has them.
+        ``surge_force`` and the waves of these, and the coefficients of the wind (`WIND_TERMS`), as
+        far as the filter has them.
     prior_stds
         Their standard deviations before anything is measured.
     values, stds

@@ -2,7 +2,8 @@
 
 The states are those of the core (`core`), then a wave in the yaw rate and disturbances with
 dynamics of their own, then heading and position, then the states that change by noise alone: sensor
-errors, current, and disturbances that are random walks (`arrangement` orders them). What only the
+errors, current, disturbances that are random walks, and the coefficients of the wind (`arrange` in
+`further_states` orders them). What only the
 further states need is chosen by the type of `further` (`further_steps`).
 """
 
@@ -19,6 +20,7 @@ from .further_steps import (
     acting_at_instant,
     acting_during_step,
     advance_further,
+    begin_wind,
     linearise_output,
     set_slopes,
     show,
@@ -125,6 +127,7 @@ def run_filter(
     Pc, K = np.empty(size), np.empty(size)
     c, before, slopes = np.empty(size), np.empty(size), np.zeros((2, size))
     for k in range(count):
+        begin_wind(further, k)
         delta_dot, n_dot = (delta[k + 1] - delta[k]) / dt, (n[k + 1] - n[k]) / dt
         given = StepInputs(delta[k], delta_dot, n[k], n_dot, 0.0, 0.0)
         u = acting_at_instant(further, x, given)
@@ -182,6 +185,7 @@ def output_rows(
     rows, further_rows = np.empty((len(states), 10)), np.empty((len(states), 2 * shown))
     slopes = np.zeros((2, states.shape[1]))
     for k in range(len(states)):
+        begin_wind(further, k)
         x, rate = states[k], (delta[k + 1] - delta[k]) / dt
         u = acting_at_instant(further, x, StepInputs(delta[k], rate, n[k], 0.0, 0.0, 0.0))
         set_slopes(further, core, x, n[k], slopes)

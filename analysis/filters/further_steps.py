@@ -46,13 +46,19 @@ class Further(NamedTuple):
     drift
         The place of the drift length, m: the sway is minus it times the yaw rate.
     forces
-        (q,): the places of the states that give moment and force.
+        (q,): the places of the states that give moment and force; the coefficients of the wind are
+        the last of them.
     mean, now
-        (2, q): their coefficients, for the means of moment and force over a step, and at its start.
+        (2, q): their coefficients, for the means of moment and force over a step, and at its start;
+        those of the wind are updated at each instant.
     turn
         (s,): the row that gives the heading's change in a step by the wave.
     shown
         (k,): the places of the further estimates.
+    wind_axes
+        (w,): 0 for each coefficient of the wind that gives a moment, 1 for one that gives a force.
+    regressors
+        (n, w): what these are multiplied by, at the instants of the chunk and in the steps after.
     """
 
     core: int
@@ -68,6 +74,13 @@ class Further(NamedTuple):
     now: FloatArray
     turn: FloatArray
     shown: NDArray[np.int64]
+    wind_axes: NDArray[np.int64]
+    regressors: FloatArray
+
+
+def begin_wind(further: Any, k: int) -> None:  # noqa: ANN401
+    """Set the coefficients `mean` and `now` of the wind's states to those of an instant k."""
+    raise NotImplementedError(f"no further states in {type(further).__name__}")
 
 
 def acting_at_instant(further: Any, x: FloatArray, u: StepInputs) -> StepInputs:  # noqa: ANN401
@@ -128,6 +141,11 @@ def advance_further(
     raise NotImplementedError(f"no further states in {type(further).__name__}")
 
 
+@overload_for(begin_wind, NoFurther)
+def _begin_no_wind(further: NoFurther, k: int) -> None:
+    pass
+
+
 @overload_for(acting_at_instant, NoFurther)
 def _given_at_instant(further: NoFurther, x: FloatArray, u: StepInputs) -> StepInputs:
     return u
@@ -173,6 +191,15 @@ def _advance_nothing(
     dt: float,
 ) -> None:
     pass
+
+
+@overload_for(begin_wind, Further)
+def _begin_wind(further: Further, k: int) -> None:
+    first = len(further.forces) - len(further.wind_axes)
+    for j in range(len(further.wind_axes)):
+        axis = further.wind_axes[j]
+        further.now[axis, first + j] = further.regressors[k, j]
+        further.mean[axis, first + j] = further.regressors[k, j]
 
 
 @overload_for(acting_at_instant, Further)

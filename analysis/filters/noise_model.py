@@ -98,6 +98,8 @@ class FurtherModel:
         The yaw moment and the surge force; None where the filter has no such state.
     heading_error
         The slow error of the heading, rad; None where its noise is white.
+    wind
+        The terms of the wind, some of `analysis.filters.wind_terms.WIND_TERMS`.
     """
 
     outputs: tuple[str, ...] = ()
@@ -106,10 +108,11 @@ class FurtherModel:
     yaw: ForceNoise | None = None
     surge: ForceNoise | None = None
     heading_error: SlowError | None = None
+    wind: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         """Whether there is any further state."""
-        return bool(self.outputs or self.sensors or self.yaw or self.surge)
+        return bool(self.outputs or self.sensors or self.yaw or self.surge or self.wind)
 
 
 NO_FURTHER = FurtherModel()

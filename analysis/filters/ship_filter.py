@@ -11,7 +11,7 @@ from shiplog.types import FloatArray, Signals
 from .base import Estimates, FurtherStates, Trace
 from .filter_loop import output_rows, run_filter
 from .further_states import Arrangement
-from .further_steps import COMPASS
+from .further_steps import COMPASS, Further, NoFurther
 from .noise_model import FURTHER_OUTPUTS
 
 
@@ -32,7 +32,7 @@ class ShipFilter:
     def __init__(self, core: NamedTuple, arrangement: Arrangement, wave: FloatArray | None) -> None:
         self._core, self._further_states = core, arrangement.further
         self._system, self._state = arrangement.system, arrangement.state
-        self._shown = arrangement.shown
+        self._shown, self._wind = arrangement.shown, arrangement.wind
         self._wave = wave
         self._has_heading = False
 
@@ -42,8 +42,9 @@ class ShipFilter:
         Parameters
         ----------
         chunk
-            Signals with `PAPER_OUTPUTS` and `PAPER_INPUTS`, and the further outputs that the filter
-            uses; an output that is NaN is not used.
+            Signals with `PAPER_OUTPUTS` and `PAPER_INPUTS`, the further outputs that the filter
+            uses, and the regressors of the wind, m²/s², by the names of its terms; an output that
+            is NaN is not used.
         following
             The inputs at the instant after the chunk, by name.
         """
@@ -63,7 +64,7 @@ class ShipFilter:
         """Return w, w', w'', v, v' (n, 5), their standard deviations, the wave, and the others."""
         delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
         rows, further_rows = output_rows(
-            self._core, self._further_states, states, covariances, delta, n, chunk.dt_secs,
+            self._core, self._in_wind(chunk), states, covariances, delta, n, chunk.dt_secs,
             len(self._shown),
         )  # fmt: skip
         further = self._further(further_rows)
@@ -74,7 +75,7 @@ class ShipFilter:
     ) -> tuple[Estimates, Trace]:
         delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
         states, rows, further_rows, innovations, rejected, trace = run_filter(
-            self._core, self._further_states, self._system, self._state, self._measured(chunk),
+            self._core, self._in_wind(chunk), self._system, self._state, self._measured(chunk),
             delta, n, chunk.dt_secs, keep,
         )  # fmt: skip
         outputs = rejected.shape[1]
@@ -84,6 +85,13 @@ class ShipFilter:
             self._further(further_rows),
         )  # fmt: skip
         return estimates, Trace(states, *trace)
+
+    def _in_wind(self, chunk: Signals) -> Further | NoFurther:
+        """Return the further states with the regressors of the wind in a chunk."""
+        if not self._wind or isinstance(self._further_states, NoFurther):
+            return self._further_states
+        regressors = np.ascontiguousarray(np.column_stack([chunk[name] for name in self._wind]))
+        return self._further_states._replace(regressors=regressors)
 
     def _measured(self, chunk: Signals) -> FloatArray:
         """Return the outputs (n, m); a position is not used before the first heading is known."""

@@ -27,7 +27,8 @@ from shiplog.vessel.settings import FilterSettings
 
 from .base import FURTHER_SETTINGS, NOISE_SETTINGS, WAVE_SETTINGS, FilterKind
 from .core import StepInputs, advance, begin_instant, gain, output_row
-from .further_states import CoreModel, WaveModel, arrange
+from .further_parts import WaveModel
+from .further_states import CoreModel, arrange
 from .gains import (
     LinearAxis,
     discrete_gain,

@@ -6,7 +6,7 @@ from math import nan
 
 import numpy as np
 
-from analysis.filters.further_states import HOUR, SENSOR_WALKS
+from analysis.filters.further_parts import HOUR, SENSOR_WALKS
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.units import display_conversion
 

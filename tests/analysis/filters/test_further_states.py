@@ -20,7 +20,7 @@ from gaussian import LinearRun, apart, band, held, normalised_squared
 from scipy.linalg import block_diag, expm
 
 from analysis.filters.factory import make_filter
-from analysis.filters.further_states import (
+from analysis.filters.further_parts import (
     FIRST_HEADING_STD,
     FORCE_SHARE,
     HOUR,
