@@ -30,10 +30,12 @@ settings of the sensors yaw_rate, speed, rudder, rpm, heading, position and sway
   bias                           constant error
   spikes, spike_size             fraction of samples with a spike, its size
   dropout, dropout_secs          fraction of samples lost, length of one loss
-  sway is measured only where a setting of it is given
+  sway is measured only where a setting of it is given; in a wind also apparent_wind_speed and
+  apparent_wind_angle, and, where a setting is given, wind_speed, wind_direction, true_wind_angle
 examples:
   shiplog record simulate zigzag-20-20 --seed 1 -o trial.mcap
   shiplog record simulate zigzag-20-20 --gust 2@200 --noise white -o gust.mcap
+  shiplog record simulate turning-circle --wind 12,45 -o wind.mcap
   shiplog record simulate spiral --sensor yaw_rate.bias=1e-4 --sensor sway.white=0.05 -o s.mcap"""
 
 
@@ -84,6 +86,12 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         "over one second, in degrees of rudder at the approach speed and in mm/s²",
     )
     parser.add_argument(
+        "--wind",
+        metavar="SPEED,FROM",
+        help="a steady wind of SPEED m/s from FROM degrees, 0 from north and 90 from east, which "
+        "turns and brakes the ship, and which an anemometer on board measures",
+    )
+    parser.add_argument(
         "--truth", metavar="FILE", help="another log, of the true motion and disturbances at 10 Hz"
     )
 
@@ -98,9 +106,11 @@ def _open(arguments: argparse.Namespace) -> "SimulatedTrial":
     from .sensors import suite
     from .simulate import simulate
     from .trajectory import Gust, RandomForcing, WaveMoment
+    from .wind import APPARENT_WIND, Wind
 
     vessel, text = load_vessel(arguments.vessel)
     wave, forcing = arguments.wave, arguments.random_forcing
+    wind = None if arguments.wind is None else Wind(*_wind(arguments.wind))
     sensor_settings = assigned_numbers(arguments.sensor, "--sensor", "yaw_rate.bias=1e-4")
     with progress("recorders") as on_progress:
         on_progress("simulate")
@@ -109,10 +119,16 @@ def _open(arguments: argparse.Namespace) -> "SimulatedTrial":
             arguments.manoeuvre,
             duration_secs=arguments.duration,
             seed=arguments.seed,
-            sensors=suite(arguments.noise, sensor_settings, angle_unit=vessel.angle_unit),
+            sensors=suite(
+                arguments.noise,
+                sensor_settings,
+                angle_unit=vessel.angle_unit,
+                also=APPARENT_WIND if wind else (),
+            ),
             gusts=tuple(Gust(*_gust(each)) for each in arguments.gust),
             wave=WaveMoment(*_wave(wave)) if wave else None,
             random_forcing=None if forcing is None else RandomForcing(*_random_forcing(forcing)),
+            wind=wind,
             vessel_toml=text,
         )
 
@@ -148,6 +164,14 @@ def _random_forcing(text: str) -> tuple[float, float]:
     if not match:
         raise UsageError(f"--random-forcing takes DEG[,MM], such as 0.2,5, not {text!r}")
     return radians(float(match[1])), float(match[2] or 0) / 1000
+
+
+def _wind(text: str) -> tuple[float, float]:
+    """Parse `12,45`: the speed in m/s and where the wind blows from, in rad."""
+    match = re.fullmatch(rf"{NUMBER},{NUMBER}", text)
+    if not match:
+        raise UsageError(f"--wind takes SPEED,FROM in m/s and degrees, such as 12,45, not {text!r}")
+    return float(match[1]), radians(float(match[2]))
 
 
 SIMULATE = RecorderCommand("a simulated trial", _configure, _open, _write_truth)

@@ -21,6 +21,8 @@ from shiplog.ships.under_way import (
 )
 from shiplog.types import FloatArray, TimeArray
 
+from .wind import WindLoad, wind_on_ship
+
 RUN_STEP_SECS = 0.1  # Runge-Kutta's error is then below 1e-10
 INSTANT_SECS = 1e-9  # times closer than this are the same
 TIME = 0  # the column of the time in a row; the state follows it
@@ -42,6 +44,8 @@ class RunPlan(NamedTuple):
         The amplitude, rad of rudder, and the frequency, rad/s, of a sinusoidal yaw moment.
     forcing
         (k, 2) the random moment and force of each step, the last row for all that follow.
+    wind
+        The wind, which acts in each step as at its start.
     rudder_max, rudder_rate
         The limits of the steering gear, rad and rad/s.
     duration
@@ -55,6 +59,7 @@ class RunPlan(NamedTuple):
     wave: float
     wave_frequency: float
     forcing: FloatArray
+    wind: WindLoad
     rudder_max: float
     rudder_rate: float
     duration: float
@@ -99,6 +104,13 @@ def integrate_run(
         delta, delta_dot, arrival = _steer(delta, order, t, plan.rudder_max, plan.rudder_rate)
         random_moment, force = plan.forcing[min(step, len(plan.forcing)) - 1]
         moment = schedule[at, 3] + random_moment
+        if plan.wind.acts:
+            _, ahead, sway, heading = observed_real(c, state)
+            turning, braking = wind_on_ship(
+                plan.wind, heading, constants.speed * ahead, constants.speed * sway
+            )
+            moment += turning
+            force += braking
         u = Excitation(
             delta, delta_dot, schedule[at, 2], moment, plan.wave, plan.wave_frequency, force
         )

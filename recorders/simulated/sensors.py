@@ -11,6 +11,8 @@ from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 from shiplog.units import did_you_mean
 
+from .wind import WIND_SENSORS
+
 DEG = pi / 180
 
 
@@ -65,12 +67,21 @@ _PERFECT = {
     "rpm": Sensor(),
     **_NAVIGATION,
 }
-_ON_REQUEST = {"sway": Sensor()}  # rare on ships: present only where a setting names it
+# present only where a setting or the trial asks for it
+_ON_REQUEST = {"sway": Sensor(), **dict.fromkeys(WIND_SENSORS, Sensor(rate_hz=1.0))}
+_ANEMOMETER = {
+    name: Sensor(rate_hz=1.0, white=0.3 if name.endswith("speed") else 2 * DEG)
+    for name in WIND_SENSORS
+}
 SUITES = ("none", "white", "paper")
 
 
 def suite(
-    name: str, settings: Mapping[str, float] | None = None, *, angle_unit: str = "deg"
+    name: str,
+    settings: Mapping[str, float] | None = None,
+    *,
+    angle_unit: str = "deg",
+    also: tuple[str, ...] = (),
 ) -> Suite:
     """Make a set of sensors.
 
@@ -81,10 +92,13 @@ def suite(
         for the noise of the identification paper: w (1 + 0.02 nu) + 5e-5 sin(t/10) and
         v + 0.2 nu + 0.05 sin(t/10), with nu uniform on [-1, 1].
     settings
-        Changed settings, such as ``{"yaw_rate.bias": 1e-4}``. A setting of ``sway`` adds a sensor
-        of it.
+        Changed settings, such as ``{"yaw_rate.bias": 1e-4}``. A setting of ``sway`` or of the wind
+        adds a sensor of it.
     angle_unit
         The unit of the paper's yaw rate, ``deg`` or ``rad``: its table can be read in either.
+    also
+        Further sensors, of ``sway`` or of the wind; with noise, an anemometer errs by 0.3 m/s and
+        2 degrees.
 
     Returns
     -------
@@ -114,10 +128,12 @@ def suite(
             "yaw_rate": Sensor(uniform_relative=0.02, wave=wave),
             "speed": Sensor(uniform=0.2, wave=0.05),
         }
+    on_request = _ON_REQUEST if name == "none" else _ON_REQUEST | _ANEMOMETER
+    sensors |= {channel: on_request[channel] for channel in also}
     for key, value in (settings or {}).items():
         channel, _, setting = key.partition(".")
-        if channel in _ON_REQUEST:
-            sensors.setdefault(channel, _ON_REQUEST[channel])
+        if channel in on_request:
+            sensors.setdefault(channel, on_request[channel])
         _check_known(channel, setting, sensors)
         sensors[channel] = replace(sensors[channel], **{setting: value})
         _check_range(channel, sensors[channel])

@@ -14,6 +14,7 @@ from shiplog.units import CATALOGUE
 from .manoeuvres import manoeuvre
 from .sensors import Suite, corrupt, delays, sample_times, suite
 from .trajectory import Gust, RandomForcing, Trajectory, WaveMoment, compute_trajectory
+from .wind import WIND_SENSORS, Wind
 
 CHUNK_SECS = 60.0  # of reception: a damaged chunk loses no more
 MAX_SAMPLES = 50_000_000  # of one sensor
@@ -83,6 +84,7 @@ def simulate(
     gusts: tuple[Gust, ...] = (),
     wave: WaveMoment | None = None,
     random_forcing: RandomForcing | None = None,
+    wind: Wind | None = None,
     vessel_toml: str | None = None,
 ) -> SimulatedTrial:
     """Simulate a manoeuvre and measure it; the same seed gives the same samples to the last bit.
@@ -100,7 +102,7 @@ def simulate(
         the noise of the others unchanged.
     sensors
         The sensors by channel, from `recorders.simulated.sensors.suite`; the paper's by default.
-    gusts, wave, random_forcing
+    gusts, wave, random_forcing, wind
         The disturbances.
     vessel_toml
         The text of the vessel file to keep in the log.
@@ -108,8 +110,8 @@ def simulate(
     Raises
     ------
     UsageError
-        The manoeuvre is unknown, the duration is not positive, a gust lies outside the trial, or a
-        random forcing is negative or not finite.
+        The manoeuvre is unknown, the duration is not positive, a gust lies outside the trial, a
+        random forcing is negative or not finite, or the wind is measured and there is none.
 
     Examples
     --------
@@ -120,6 +122,10 @@ def simulate(
     """
     sensors = suite("paper") if sensors is None else sensors
     _require_valid(duration_secs, seed, sensors, gusts, random_forcing)
+    if wind is None and (anemometers := set(sensors) & set(WIND_SENSORS)):
+        raise UsageError(
+            f"{min(anemometers)} is measured in a wind only; add one, such as --wind 10,45"
+        )
     orders_seed, *sensor_seeds = np.random.SeedSequence(seed).spawn(1 + len(CATALOGUE))
     ordered = manoeuvre(
         manoeuvre_name, duration_secs, vessel.approach_rpm, np.random.default_rng(orders_seed)
@@ -132,6 +138,7 @@ def simulate(
         gusts=gusts,
         wave=wave,
         random_forcing=random_forcing,
+        wind=wind,
         rng=np.random.default_rng(random_forcing_seed),
     )
     channels = []
@@ -140,6 +147,8 @@ def simulate(
             rng = np.random.default_rng(sensor_seed)
             times = sample_times(sensors[name], duration_secs, rng)
             values = corrupt(sensors[name], times, trajectory.at(times)[name], rng)
+            if name.endswith("wind_speed"):
+                values = np.maximum(values, 0.0)  # an anemometer measures no negative speed
             received = np.maximum.accumulate(times + delays(sensors[name], len(times), rng))
             channels.append(_channel(name, "simulated", _stamps(times), _stamps(received), values))
     metadata = {"source": "simulation", "manoeuvre": ordered.name, "seed": str(seed)}

@@ -13,6 +13,7 @@ from shiplog.vessel.ship import ship_from_vessel
 
 from .integration import INSTANT_SECS, RUN_STEP_SECS, TIME, RunPlan, integrate_run, outputs_at
 from .manoeuvres import Manoeuvre
+from .wind import Wind, measured_wind, wind_load
 
 _INPUTS, _DISTURBANCES = slice(-7, -4), slice(-4, None)  # of the excitation at the end of a row
 
@@ -81,12 +82,15 @@ class Trajectory:
         (n, s + 10) the time, the state with the position, and the excitation, a row for each step.
     has_random_forcing
         Whether a random forcing acts.
+    wind
+        The wind; None for none.
     """
 
     ship: Ship
     constants: ShipConstants
     rows: FloatArray
     has_random_forcing: bool = False
+    wind: Wind | None = None
 
     def at(self, times_secs: FloatArray) -> dict[str, FloatArray]:
         """Compute the true motion at any times, integrated from the step before.
@@ -100,11 +104,12 @@ class Trajectory:
         -------
         dict
             By name, in SI: yaw_rate, yaw_acceleration, speed, sway, heading, rudder, rpm and
-            yaw_disturbance, (n,) each; position, (n, 2), north and east; with a random forcing also
-            surge_disturbance, (n,), in m/s².
+            yaw_disturbance, (n,) each; position, (n, 2), north and east; with a random forcing or
+            a wind also surge_disturbance, (n,), in m/s², and with a wind its channels.
         """
         before = acting = self._rows_before(times_secs)
-        if self.has_random_forcing:
+        has_steps = self.has_random_forcing or self.wind is not None
+        if has_steps:
             # 3 * 0.1 > 0.3: at 0.3 s the forcing is that of the step that starts there
             acting = self._rows_before(times_secs + INSTANT_SECS)
         outputs = outputs_at(
@@ -130,7 +135,9 @@ class Trajectory:
             "rpm": rpm,
             "yaw_disturbance": per_rudder * (moment + wave * np.sin(frequency * times_secs)),
         }
-        return truth | {"surge_disturbance": force} if self.has_random_forcing else truth
+        if self.wind is not None:
+            truth |= measured_wind(self.wind, *(truth[n] for n in ("heading", "speed", "sway")))
+        return truth | {"surge_disturbance": force} if has_steps else truth
 
     def _rows_before(self, times_secs: FloatArray) -> TimeArray:
         return np.searchsorted(self.rows[:, TIME], times_secs, side="right") - 1
@@ -144,6 +151,7 @@ def compute_trajectory(
     gusts: tuple[Gust, ...] = (),
     wave: WaveMoment | None = None,
     random_forcing: RandomForcing | None = None,
+    wind: Wind | None = None,
     rng: np.random.Generator | None = None,
 ) -> Trajectory:
     """Compute the true motion of a ship through a manoeuvre.
@@ -156,7 +164,7 @@ def compute_trajectory(
         The manoeuvre.
     duration_secs
         The length of the run, s.
-    gusts, wave, random_forcing
+    gusts, wave, random_forcing, wind
         The disturbances.
     rng
         Draws the random forcing; seeded with 0 by default.
@@ -164,7 +172,8 @@ def compute_trajectory(
     Raises
     ------
     UsageError
-        The model diverges in this manoeuvre, or has no steady speed to start from.
+        The model diverges in this manoeuvre, or has no steady speed to start from; or the wind is
+        out of range.
 
     Examples
     --------
@@ -189,6 +198,7 @@ def compute_trajectory(
         *((zigzag.start_secs, zigzag.rudder, zigzag.heading) if zigzag else (inf, 0.0, 0.0)),
         *((wave.rudder, 2 * pi / wave.period_secs) if wave else (0.0, 0.0)),
         _draw_forcing(random_forcing, duration_secs, rng or np.random.default_rng(0)),
+        wind_load(wind),
         vessel.rudder_max,
         vessel.rudder_rate,
         float(duration_secs),  # of an integer the loop would be compiled anew
@@ -199,7 +209,7 @@ def compute_trajectory(
             f"the simulation of {vessel.name} diverges in {ordered.name}: the model is unstable "
             "there; correct its coefficients or choose a gentler manoeuvre"
         )
-    return Trajectory(ship, constants, rows, random_forcing is not None)
+    return Trajectory(ship, constants, rows, random_forcing is not None, wind)
 
 
 def _draw_forcing(

@@ -24,7 +24,6 @@ from analysis.filters.noise_model import ForceNoise, FurtherModel, NoiseModel
 from analysis.filters.wind_terms import (
     WIND_CHANGE,
     WIND_TERMS,
-    apparent_wind,
     wind_prior_std,
     wind_regressors,
 )
