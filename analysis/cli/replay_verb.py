@@ -1,7 +1,6 @@
 """The verb replay: estimate states, disturbances and coefficients from a log."""
 
 import argparse
-import tomllib
 from pathlib import Path
 
 from shiplog.cli.console import print_tables, print_warnings, progress, write_json
@@ -18,6 +17,7 @@ from shiplog.cli.verb import ExitCode, Verb
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import extension_names
 from shiplog.mcap.part_names import log_stem
+from shiplog.toml_text import parse_toml
 from shiplog.vessel.settings import DISTURBANCES, SENSOR_ERRORS
 
 from .shared_options import add_reading_options, reading_options, show_review
@@ -135,8 +135,9 @@ def replay_settings(parsed: argparse.Namespace) -> dict[str, object]:
     for text in parsed.set:
         name, equals, value = text.partition("=")
         try:
-            found[name] = tomllib.loads(f"value = {value}")["value"] if equals else None
-        except tomllib.TOMLDecodeError:
+            table = parse_toml(f"value = {value}", text, "setting", UsageError)
+            found[name] = table["value"] if equals else None
+        except UsageError:
             found[name] = value  # a word needs no quotes here
         if not (name and value):
             raise UsageError(f"--set takes KEY=VALUE, such as filter.gate=4, not {text!r}")

@@ -144,7 +144,7 @@ def test_all_faults_are_reported_at_once_with_the_nearest_names() -> None:
             "source 1.name 'operator' is that of events",
         ),
         ("[vessel]\nfile = 1", "vessel.file must be a text"),
-        ("a" * 200_000, "too long for a trial file"),
+        ("a" * 1_000_001, "too long for a trial file"),
     ],
 )
 def test_a_wrong_trial_file_is_a_usage_error(text: str, message: str) -> None:
