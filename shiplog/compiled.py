@@ -1,7 +1,9 @@
 """Compilation of numerical loops by numba, with a cache of machine code on disk.
 
-`compiled` is numba's `njit` with a type. Its cache folder is named after all sources that the
-machine code depends on, so that a change in any of them compiles everything anew.
+`compiled` is numba's `njit` with a type. Its cache folder is named after all of our sources that
+the machine code depends on, so that a change in any of them compiles everything anew. What is
+compiled for types of other packages, such as a ship model's, is in a folder within it, named after
+their sources too: such a package is compiled anew when it changes, and our own loops are not.
 """
 
 import os
@@ -9,6 +11,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable
+from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -16,6 +19,8 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 from numba import types
+from numba.core.caching import FunctionCache
+from numba.core.sigutils import normalize_signature
 from numba.extending import overload
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
@@ -24,6 +29,7 @@ from .extensions import extension_sources
 F = TypeVar("F", bound=Callable[..., object])
 
 PROJECT_FOLDER = Path(__file__).parents[1]
+OWN_PACKAGES = ("shiplog", "recorders", "analysis")
 # Folders and files with compiled functions, or with what these call and read; a test checks it.
 COMPILED_SOURCES = (
     "shiplog/compiled.py",
@@ -47,18 +53,30 @@ def compiled_sources() -> list[Path]:
 
 
 def _cache_folder() -> Path:
-    """Return the folder of the machine code, named after a hash of all sources it depends on.
+    """Return the folder of the machine code, named after a hash of our sources it depends on.
 
     Numba's own cache checks only the file of a compiled function. The machine code also contains
     the functions it calls, the constants it reads and the layout of the NamedTuples it takes;
-    after a change in another file, outdated machine code would run. The equations of a ship model
-    of another package become a part of our loops, too.
+    after a change in another file, outdated machine code would run.
     """
-    digest = sha256()
-    for path in sorted({*compiled_sources(), *extension_sources("shiplog.ship_models")}):
-        digest.update(path.read_bytes())
     parent = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _default_cache_parent()
-    return parent / f"shiplog-{digest.hexdigest()[:16]}"
+    return parent / f"shiplog-{_digest(compiled_sources())}"
+
+
+@cache
+def _extension_folder() -> Path:
+    """Return the folder of the machine code that the installed ship models are a part of."""
+    sources = extension_sources("shiplog.ship_models")
+    folder = CACHE_FOLDER / f"extensions-{_digest(sources)}"
+    _delete_outdated_caches(folder)
+    return folder
+
+
+def _digest(paths: list[Path]) -> str:
+    digest = sha256()
+    for path in sorted(set(paths)):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _default_cache_parent() -> Path:
@@ -78,7 +96,7 @@ def _default_cache_parent() -> Path:
 
 
 def _delete_outdated_caches(current: Path) -> None:
-    for other in current.parent.glob("shiplog-*"):
+    for other in current.parent.glob(f"{current.name.partition('-')[0]}-*"):
         if other != current and time.time() - other.stat().st_mtime > MIN_AGE_TO_DELETE_SECS:
             shutil.rmtree(other, ignore_errors=True)
 
@@ -88,19 +106,62 @@ numba.config.CACHE_DIR = str(CACHE_FOLDER)
 _delete_outdated_caches(CACHE_FOLDER)
 
 
+class _CacheByTypes(FunctionCache):  # type: ignore[misc]
+    """Numba's cache of a function, but for types of other packages in the folder of these."""
+
+    def load_overload(self, signature: Any, context: Any) -> Any:  # noqa: ANN401
+        if self._is_own(signature):
+            return super().load_overload(signature, context)
+        return self._of_extensions.load_overload(signature, context)
+
+    def save_overload(self, signature: Any, result: Any) -> None:  # noqa: ANN401
+        if self._is_own(signature):
+            super().save_overload(signature, result)
+        else:
+            self._of_extensions.save_overload(signature, result)
+
+    def _is_own(self, signature: Any) -> bool:  # noqa: ANN401
+        arguments, _ = normalize_signature(signature)
+        return _is_of_own_package(self._py_func) and all(map(_is_own_type, arguments))
+
+    @cached_property
+    def _of_extensions(self) -> FunctionCache:
+        numba.config.CACHE_DIR = str(_extension_folder())
+        try:
+            return FunctionCache(self._py_func)
+        finally:
+            numba.config.CACHE_DIR = str(CACHE_FOLDER)
+
+
+def _is_own_type(kind: types.Type) -> bool:
+    """Whether no other package has a part in what is compiled for a type of argument."""
+    if isinstance(kind, types.BaseNamedTuple) and not _is_of_own_package(kind.instance_class):
+        return False
+    if isinstance(kind, types.BaseTuple):
+        return all(map(_is_own_type, kind))
+    plain = types.Number, types.Boolean, types.Array, types.NoneType, types.Omitted
+    return isinstance(kind, plain)
+
+
+def _is_of_own_package(thing: Callable[..., object]) -> bool:
+    return thing.__module__.partition(".")[0] in OWN_PACKAGES
+
+
 def compiled(function: F) -> F:
     """Compile `function` on its first call, and keep the machine code for later runs.
 
     It releases the GIL, so that threads run it at the same time.
     """
-    return cast("F", numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+    dispatcher = numba.njit(error_model="numpy", nogil=True)(function)
+    dispatcher._cache = _CacheByTypes(function)  # noqa: SLF001, what its enable_caching() does
+    return cast("F", dispatcher)
 
 
 def is_compiled(package: str) -> bool:
     """Whether the cache has machine code of a package, such as "analysis", from an earlier run."""
     own = (path for path in compiled_sources() if path.is_relative_to(PROJECT_FOLDER / package))
     folders = {path.parent.name for path in own}
-    return any(next(CACHE_FOLDER.rglob(f"{folder}_*/*.nbi"), None) for folder in folders)
+    return any(next(CACHE_FOLDER.glob(f"{folder}_*/*.nbi"), None) for folder in folders)
 
 
 def compiled_in_caller(function: F) -> F:

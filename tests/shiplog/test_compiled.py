@@ -10,6 +10,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from extensions import declare
 
 import shiplog
 from shiplog.compiled import PROJECT_FOLDER, compiled_sources, element
@@ -29,13 +30,30 @@ from shiplog.ships.paper import Coefficients, rudder_effect, surge_acceleration
 c = Coefficients(*[1.0] * 12)
 print(rudder_effect(c, 0.0, 2.0), is_compiled("shiplog"), is_compiled("analysis"))
 """
+# coefficients of a ship model of another package, with which our loops are compiled
+FOREIGN = """
+from typing import NamedTuple
+class Foreign(NamedTuple):
+    alpha1: float = 1.0
+    alpha2: float = 0.0
+    alpha3: float = 0.0
+"""
+# prints how often machine code of a loop is found, with our own coefficients and with the others
+FOREIGN_CODE = """
+from foreign import Foreign
+from shiplog.ships.paper import Coefficients, rudder_effect
+for c in Coefficients(*[1.0] * 12), Foreign():
+    rudder_effect(c, 0.0, 2.0)
+    print(sum(rudder_effect.stats.cache_hits.values()))
+"""
 
 
-def words_printed(cache: Path, cwd: Path) -> list[str]:
-    """Run `CODE` with the given cache folder and return the words it prints."""
+def words_printed(cache: Path, cwd: Path, code: str = CODE) -> list[str]:
+    """Run code with the given cache folder and return the words it prints."""
+    path = os.pathsep.join((str(cwd), os.environ.get("PYTHONPATH", "")))
     done = subprocess.run(
-        [sys.executable, "-c", CODE],
-        env=os.environ | {"NUMBA_CACHE_DIR": str(cache)},
+        [sys.executable, "-c", code],
+        env=os.environ | {"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": path},
         cwd=cwd,
         capture_output=True,
         text=True,
@@ -63,6 +81,19 @@ def test_machine_code_of_other_sources_is_not_used(tmp_path: Path) -> None:
     changed = tmp_path / "analysis" / "signals" / "signal_stats.py"  # compiles nothing
     changed.write_text(changed.read_text(encoding="utf-8") + "\n", encoding="utf-8")
     assert words_printed(cache, tmp_path)[0] == "False"
+
+
+def test_a_change_of_another_package_compiles_our_loops_anew_for_its_types_alone(
+    tmp_path: Path,
+) -> None:
+    source, cache = tmp_path / "foreign.py", tmp_path / "cache"
+    source.write_text(FOREIGN, encoding="utf-8")
+    assert words_printed(cache, tmp_path, FOREIGN_CODE) == ["0", "0"]
+    declare(tmp_path, "foreign", "shiplog.ship_models", foreign="foreign:FOREIGN")
+    assert words_printed(cache, tmp_path, FOREIGN_CODE) == ["1", "1"]
+    assert words_printed(cache, tmp_path, FOREIGN_CODE) == ["1", "2"]
+    source.write_text(FOREIGN + "\n", encoding="utf-8")
+    assert words_printed(cache, tmp_path, FOREIGN_CODE) == ["1", "1"]
 
 
 def test_machine_code_of_old_sources_is_deleted_after_a_day(tmp_path: Path) -> None:
