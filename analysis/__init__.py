@@ -8,6 +8,8 @@ estimate
     Estimate the states of any linear system, given by a system file, from a log.
 identify
     Fit a ship model to one or several logs, with intervals and validation.
+analyse_trial
+    Find the manoeuvres in a log: indices with intervals, and verdicts of the norm.
 ReadingOptions
     The vessel, the sources and the strictness with which these read a log.
 compare
@@ -35,6 +37,9 @@ if TYPE_CHECKING:
     from analysis.replay.reading_options import ReadingOptions
     from analysis.replay.replay import Replay, analyse
     from analysis.replay.replay_results import Analysis, Findings, ReplayChunk
+    from analysis.trial.analyse_trial import analyse_trial
+    from analysis.trial.trial_analysis import TrialAnalysis
+    from analysis.trial.trial_options import TrialOptions
 
 _MODULES = {
     "Analysis": "replay.replay_results",
@@ -46,7 +51,10 @@ _MODULES = {
     "Replay": "replay.replay",
     "ReplayChunk": "replay.replay_results",
     "SystemEstimate": "linear.estimate",
+    "TrialAnalysis": "trial.trial_analysis",
+    "TrialOptions": "trial.trial_options",
     "analyse": "replay.replay",
+    "analyse_trial": "trial.analyse_trial",
     "compare": "check.compare",
     "estimate": "linear.estimate",
     "identify": "identification.identify",
@@ -63,7 +71,10 @@ __all__ = [
     "Replay",
     "ReplayChunk",
     "SystemEstimate",
+    "TrialAnalysis",
+    "TrialOptions",
     "analyse",
+    "analyse_trial",
     "compare",
     "estimate",
     "identify",

@@ -14,6 +14,7 @@ from analysis.replay.channel_warnings import (
     late_channel_warnings,
 )
 from analysis.replay.passes import resampled_chunks
+from analysis.replay.position_fixes import PositionFixes
 from analysis.replay.reading_options import DEFAULT_OPTIONS, ReadingOptions
 from shiplog.checks.consistency.consistency_check import ConsistencyCheck
 from shiplog.checks.consistency.findings import (
@@ -33,8 +34,6 @@ from shiplog.types import (
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, IdentifierSettings
 from shiplog.vessel.vessel import Vessel
 from shiplog.vessel.vessel_parser import parse_vessel
-
-from .run_fixes import RunFixes
 
 REQUIRED_CHANNELS = ("yaw_rate", "speed", "rudder", "rpm")
 OPTIONAL_CHANNELS = ("sway", "heading")
@@ -111,7 +110,7 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     gear = options.vessel or vessel or Vessel("", None)
     clock = choose_clock(screened, stats, None, REQUIRED_CHANNELS, OPTIONAL_CHANNELS)
     clock = with_steering_gear(clock, gear.rudder_rate)
-    consistency, fixes = ConsistencyCheck(stats), RunFixes(stats.get("position"))
+    consistency, fixes = ConsistencyCheck(stats), PositionFixes(stats.get("position"))
     listeners = consistency.add, fixes.add
     signals = concatenate_signals(
         resampled_chunks(screened, clock, no_progress, "read", *listeners)
@@ -132,7 +131,7 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     return Run(
         name=log.name,
         segments=segments,
-        positions=fixes.at_samples(segments),
+        positions=fixes.at_samples(segment.signals for segment in segments),
         vessel=vessel,
         warnings=tuple(text if log.name in text else f"{log.name}: {text}" for text in warnings),
         data_lost=log.data_lost,

@@ -4,10 +4,11 @@ Source: IMO Resolution MSC.137(76), "Standards for ship manoeuvrability", 2002, 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
-from math import pi
+from dataclasses import dataclass
+from math import pi, radians
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shiplog.types import FloatArray
 
@@ -24,6 +25,8 @@ from .manoeuvre import ManoeuvreIndex, ManoeuvreMotion
 MIN_CIRCLE_TURN = pi / 2  # change of heading with the rudder held
 MAX_TURN_BEFORE_HOLD = MIN_CIRCLE_TURN / 2  # until the rudder has reached its angle
 HARD_OVER_SHARE = 0.8  # of the largest rudder angle: beyond it the rudder is held over
+MIN_FITTED_ARC = radians(150.0)  # of a circle laid through the positions of a steady turn
+COURSE_SECS = 5.0  # to either side, over which the course made good is taken
 NAMES_AND_UNITS = {
     "advance": ("advance", "m"),
     "transfer": ("transfer", "m"),
@@ -45,12 +48,19 @@ class TurningCircle:
         Distance along and across the approach heading at 90° change of heading, m.
     tactical_diameter
         Distance across it at 180° change of heading, m.
-    time_90_secs, time_180_secs
+    time_90_secs, time_180_secs, time_270_secs, time_360_secs
         Time from the rudder order to these changes of heading, s.
+    speed_90, speed_180, speed_270, speed_360
+        Speed at these changes of heading, m/s.
     steady_yaw_rate
         Magnitude over the second half of the time that the rudder is held over, rad/s.
     steady_speed
         Speed through the water over the same time, m/s.
+    steady_diameter
+        Of a circle through the positions after 180°, m; from speed and yaw rate where the turn is
+        too short for it.
+    drift_angle
+        Of the midship point in the steady turn, rad; positive where the bow points inwards.
     """
 
     advance: float
@@ -58,14 +68,27 @@ class TurningCircle:
     tactical_diameter: float
     time_90_secs: float
     time_180_secs: float
+    time_270_secs: float
+    time_360_secs: float
+    speed_90: float
+    speed_180: float
+    speed_270: float
+    speed_360: float
     steady_yaw_rate: float
     steady_speed: float
+    steady_diameter: float
+    drift_angle: float
 
 
 def turning_circle(
-    motion: ManoeuvreMotion, rudder: FloatArray, dt: float, *, approach: float | None = None
+    motion: ManoeuvreMotion,
+    rudder: FloatArray,
+    dt: float,
+    *,
+    approach: float | None = None,
+    execute: float = 0.0,
 ) -> TurningCircle:
-    """Compute the indices of a turning circle whose rudder order is at the first sample.
+    """Compute the indices of a turning circle.
 
     Parameters
     ----------
@@ -78,6 +101,8 @@ def turning_circle(
     approach
         The approach heading, rad; by default the heading of the first sample, which may be too
         noisy.
+    execute
+        The sample of the rudder order, with its fraction.
 
     Returns
     -------
@@ -87,26 +112,64 @@ def turning_circle(
     hard_over = np.flatnonzero(np.abs(rudder) > HARD_OVER_SHARE * np.max(np.abs(rudder)))
     side = float(np.sign(np.median(rudder[hard_over])))
     steady = hard_over[len(hard_over) // 2 :]
-    heading = motion.heading
-    initial = float(heading[0]) if approach is None else approach
-    turned = side * (heading - initial)
+    initial = float(motion.heading[0]) if approach is None else approach
+    turned = side * (motion.heading - initial)
+    at = {angle: first_crossing(turned, radians(angle)) for angle in (90, 180, 270, 360)}
+    samples = np.arange(len(turned))
     ahead = np.array([np.cos(initial), np.sin(initial)])
     abeam = side * np.array([-ahead[1], ahead[0]])
-    displacement = motion.positions - motion.positions[0]
-    at_90, at_180 = first_crossing(turned, pi / 2), first_crossing(turned, pi)
-    samples = np.arange(len(turned))
+    start = np.array([np.interp(execute, samples, column) for column in motion.positions.T])
+    displacement = motion.positions - start
+
+    def value(values: FloatArray, angle: int) -> float:
+        return float(np.interp(at[angle], samples, values)) if np.isfinite(at[angle]) else np.nan
+
     along, across = displacement @ ahead, displacement @ abeam
+    yaw_rate = float(np.abs(np.median(motion.yaw_rate[steady])))
+    speed = float(np.median(motion.speed[steady]))
     return TurningCircle(
-        advance=float(np.interp(at_90, samples, along)) if np.isfinite(at_90) else np.nan,
-        transfer=float(np.interp(at_90, samples, across)) if np.isfinite(at_90) else np.nan,
-        tactical_diameter=(
-            float(np.interp(at_180, samples, across)) if np.isfinite(at_180) else np.nan
-        ),
-        time_90_secs=at_90 * dt,
-        time_180_secs=at_180 * dt,
-        steady_yaw_rate=float(np.abs(np.median(motion.yaw_rate[steady]))),
-        steady_speed=float(np.median(motion.speed[steady])),
+        advance=value(along, 90),
+        transfer=value(across, 90),
+        tactical_diameter=value(across, 180),
+        time_90_secs=(at[90] - execute) * dt,
+        time_180_secs=(at[180] - execute) * dt,
+        time_270_secs=(at[270] - execute) * dt,
+        time_360_secs=(at[360] - execute) * dt,
+        speed_90=value(motion.speed, 90),
+        speed_180=value(motion.speed, 180),
+        speed_270=value(motion.speed, 270),
+        speed_360=value(motion.speed, 360),
+        steady_yaw_rate=yaw_rate,
+        steady_speed=speed,
+        steady_diameter=_steady_diameter(motion.positions, turned, 2 * speed / yaw_rate)
+        if yaw_rate > 0
+        else np.nan,
+        drift_angle=side * _drift(motion, steady, dt),
     )
+
+
+def _steady_diameter(positions: FloatArray, turned: FloatArray, otherwise: float) -> float:
+    """Return the diameter of the circle through the positions after half a turn, m.
+
+    The least-squares circle in its algebraic form (Kåsa, "A circle fitting procedure and its error
+    analysis", 1976), which is linear.
+    """
+    late = np.flatnonzero((turned >= pi) & np.isfinite(positions).all(axis=1))
+    if not len(late) or turned[late[-1]] - pi < MIN_FITTED_ARC:
+        return otherwise
+    points = positions[late] - positions[late].mean(axis=0)
+    matrix = np.column_stack((2 * points, np.ones(len(points))))
+    solution = np.linalg.lstsq(matrix, np.sum(points**2, axis=1))[0]
+    return float(2 * np.sqrt(solution[2] + solution[0] ** 2 + solution[1] ** 2))
+
+
+def _drift(motion: ManoeuvreMotion, steady: NDArray[np.int64], dt: float) -> float:
+    """Return the mean heading minus course made good through the water, rad."""
+    k = max(1, round(COURSE_SECS / dt))
+    inner = steady[(steady >= k) & (steady < len(motion.heading) - k)]
+    steps = (motion.positions[inner + k] - motion.positions[inner - k]) @ [1, 1j]
+    made_good = (steps * np.exp(-1j * motion.heading[inner]))[np.isfinite(steps)]
+    return float(-np.angle(np.mean(made_good))) if len(made_good) else np.nan
 
 
 def held_turn(rudder: FloatArray, execute: int, heading: FloatArray) -> tuple[int, int]:
@@ -180,9 +243,8 @@ def turning_circle_indices(
         _smoothed_circle(motion, rudder[:end], execute, half_width, dt)
         for motion in (measured, simulated)
     ]
-    for each in fields(TurningCircle):
-        name, unit = NAMES_AND_UNITS[each.name]
-        index = ManoeuvreIndex(name, unit, *(getattr(circle, each.name) for circle in circles))
+    for key, (name, unit) in NAMES_AND_UNITS.items():
+        index = ManoeuvreIndex(name, unit, *(getattr(circle, key) for circle in circles))
         if np.isfinite(index.measured):
             yield index
 

@@ -162,18 +162,67 @@ def zigzag_indices(
     switch = switch_heading(changes[0][executes], noise)
     if switch is None:
         return
-    sides = np.sign(changes[0][executes])
-    times = [first_crossing(sides[0] * change[execute:], switch) * dt for change in changes]
-    yield ManoeuvreIndex("initial turning time", "s", *times)
     ends = [*executes[1:], holds[-1][1] + 1]
-    spans = list(zip(sides, executes, ends, strict=True))[:MAX_OVERSHOOTS]
-    for number, (side, start, end) in enumerate(spans):
-        beyond = [_overshoot(side * change[start:end], switch) for change in changes]
+    side = float(np.sign(changes[0][executes[0]]))
+    values = [
+        zigzag_values(change, execute, executes, ends[-1], side * switch) for change in changes
+    ]
+    yield ManoeuvreIndex(
+        "initial turning time", "s", *(v["initial turning time"] * dt for v in values)
+    )
+    for number in range(1, min(len(executes), MAX_OVERSHOOTS) + 1):
+        beyond = [v[f"overshoot {number}"] for v in values]
         if all(np.isfinite(beyond)):
-            yield ManoeuvreIndex(f"overshoot {number + 1}", "rad", *beyond)
-    periods = [_period(change[execute : ends[-1]], switch) * dt for change in changes]
-    if np.isfinite(periods[0]):
-        yield ManoeuvreIndex("period", "s", *periods)
+            yield ManoeuvreIndex(f"overshoot {number}", "rad", *beyond)
+    if np.isfinite(values[0]["period"]):
+        yield ManoeuvreIndex("period", "s", *(v["period"] * dt for v in values))
+
+
+def zigzag_values(
+    change: FloatArray, execute: float, executes: Sequence[int], end: int, switch: float
+) -> dict[str, float]:
+    """Compute the indices of a zig-zag from its heading.
+
+    Parameters
+    ----------
+    change
+        (n,) change from the approach heading, rad, free of noise.
+    execute
+        The sample of the first order, with its fraction.
+    executes
+        The samples at which the rudder was reversed.
+    end
+        The sample after the last one.
+    switch
+        The switch heading, rad, with the sign of the first turn.
+
+    Returns
+    -------
+    dict
+        In samples ``initial turning time``, ``reach`` (until the heading is the approach heading
+        again) and ``period``; in rad ``overshoot 1`` and so on. NaN for what was not reached.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> change = 0.3 * np.sin(np.arange(100) / 10)
+    >>> values = zigzag_values(change, 0.0, [10, 40, 70], 100, switch=0.2)
+    >>> round(values["overshoot 1"], 3), round(values["reach"], 1)
+    (0.1, 31.4)
+    """
+    first = int(execute)
+    side, switch = float(np.sign(switch)), abs(switch)
+    crossing = first + first_crossing(side * change[first:], switch)
+    back = executes[0] + first_crossing(-side * change[executes[0] : end], 0.0)
+    values = {
+        "initial turning time": crossing - execute,
+        "reach": back - execute,
+        "period": _period(change[first:end], switch),
+    }
+    for number, (start, stop) in enumerate(pairwise([*executes, end]), 1):
+        beyond = side if number % 2 else -side
+        values[f"overshoot {number}"] = _overshoot(beyond * change[start:stop], switch)
+    return values
 
 
 def switch_heading(changes: FloatArray, noise: float) -> float | None:

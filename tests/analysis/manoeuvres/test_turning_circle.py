@@ -1,5 +1,7 @@
 """Indices of turning circles that can be computed by hand."""
 
+from dataclasses import astuple
+
 import numpy as np
 import pytest
 
@@ -44,7 +46,9 @@ def test_given_approach_heading_replaces_a_noisy_first_sample() -> None:
     noisy = outputs.copy()
     noisy[0, 3] += 0.05
     exact = circle(outputs, positions, rudder, 1.0)
-    assert circle(noisy, positions, rudder, 1.0, approach=0.0) == exact
+    assert astuple(circle(noisy, positions, rudder, 1.0, approach=0.0)) == pytest.approx(
+        astuple(exact), nan_ok=True, rel=0.01
+    )
     assert circle(noisy, positions, rudder, 1.0).advance > exact.advance + 20
 
 

@@ -1,16 +1,15 @@
-"""Position fixes of a run at the samples of its segments, for comparison with simulated tracks."""
+"""Position fixes of a log, interpolated at the instants of signals."""
 
 from collections.abc import Iterable
 
 import numpy as np
 
-from analysis.identification.fit.segment import Segment
 from shiplog.checks.channel_stats import ChannelStats, gap_threshold_secs
 from shiplog.geodesy import LocalFrame, positions_of
-from shiplog.types import Channel, FloatArray, TimeArray, concatenate_channels
+from shiplog.types import Channel, FloatArray, Signals, TimeArray, concatenate_channels
 
 
-class RunFixes:
+class PositionFixes:
     """The usable fixes of a log, gathered chunk by chunk.
 
     Parameters
@@ -29,24 +28,24 @@ class RunFixes:
         if part is not None:
             self._parts.append(part)
 
-    def at_samples(self, segments: Iterable[Segment]) -> tuple[FloatArray | None, ...]:
-        """Interpolate the fixes at the samples of segments.
+    def at_samples(self, parts: Iterable[Signals]) -> tuple[FloatArray | None, ...]:
+        """Interpolate the fixes at the instants of signals.
 
         Parameters
         ----------
-        segments
-            The stretches of the log, each with n samples.
+        parts
+            Stretches of the log, each with n samples.
 
         Returns
         -------
         tuple
-            For each segment north and east of the first fix, (n, 2) m; NaN inside a gap and beyond
+            For each stretch north and east of the first fix, (n, 2) m; NaN inside a gap and beyond
             the ends. None for a log with fewer than two fixes.
         """
-        measured_ns, north_east = self._north_east()
-        return tuple(_interpolated(measured_ns, north_east, each) for each in segments)
+        measured_ns, north_east = self.north_east()
+        return tuple(_interpolated(measured_ns, north_east, each) for each in parts)
 
-    def _north_east(self) -> tuple[TimeArray, FloatArray]:
+    def north_east(self) -> tuple[TimeArray, FloatArray]:
         """Return the times of the fixes, (n,) ns, and their north and east, (n, 2) m."""
         none = np.zeros(0, np.int64), np.zeros((0, 2))
         if not self._parts:
@@ -60,16 +59,16 @@ class RunFixes:
 
 
 def _interpolated(
-    measured_ns: TimeArray, north_east: FloatArray, segment: Segment
+    measured_ns: TimeArray, north_east: FloatArray, signals: Signals
 ) -> FloatArray | None:
-    """Interpolate fixes at a segment's samples, (n, 2) m; None with fewer than two fixes.
+    """Interpolate fixes at the instants of signals, (n, 2) m; None with fewer than two fixes.
 
     Inside a gap they are NaN, as beyond the ends.
     """
-    secs = (measured_ns - segment.signals.start_ns) * 1e-9
+    secs = (measured_ns - signals.start_ns) * 1e-9
     if len(secs) < 2:
         return None
-    time = segment.signals.time_secs
+    time = signals.time_secs
     intervals = np.diff(secs)
     longest = gap_threshold_secs(float(np.median(intervals)))
     after = np.clip(np.searchsorted(secs, time), 1, len(intervals))

@@ -1,0 +1,226 @@
+"""Detection of the manoeuvres in a trial of any length, from rudder, heading, speed and rpm."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import degrees, pi, radians
+
+import numpy as np
+
+from .found_manoeuvre import FoundManoeuvre
+from .rudder_levels import HeldLevel, merged_levels, neutral_rudder, rudder_levels
+from .sailed_manoeuvre import ManoeuvreKind, NotComputed
+from .speed_manoeuvres import find_speed_manoeuvres
+from .spirals import find_direct_spirals, find_reverse_spirals
+from .straight_runs import find_straight_runs
+from .trial_signals import TrialSignals, filled_signals, slope
+
+MIN_DEFLECTION = radians(4.0)  # of a manoeuvre's rudder from neutral
+REPORTED_DEFLECTION = radians(5.0)  # beyond it, rudder that is no manoeuvre is reported
+LIKE_ANGLES, LIKE_ANGLES_SHARE = radians(3.0), 0.25  # of both sides of a zig-zag
+SLOWEST_GEAR = radians(0.7)  # rad/s, of a reversal without a stop
+REVERSAL_SECS = 6.0  # of a reversal, beside the time the gear needs
+PASSING_SECS = 3.0  # shorter stops of a rudder on its way to the other side
+MIN_TURN = pi / 2  # of a turning circle
+MIN_STEADY_TURN = radians(60.0)  # before a pull-out
+MIN_PULL_OUT_SECS = 40.0
+INITIAL_TURN = radians(10.0)
+INITIAL_TURN_RUDDER = (radians(8.0), radians(12.5))
+MIN_MOVING_SPEED = 0.5  # m/s: a slower ship is stopped
+OVERSHOOT_TAIL = 0.5  # of the last hold of a zig-zag, in which its last overshoot is looked for
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """What is found in the signals of a trial.
+
+    Attributes
+    ----------
+    manoeuvres
+        In the order of their executes.
+    neutral
+        The rudder angle that keeps a straight course, rad.
+    rejected
+        Rudder orders that belong to no manoeuvre, each with the reason.
+    """
+
+    manoeuvres: tuple[FoundManoeuvre, ...]
+    neutral: float
+    rejected: tuple[NotComputed, ...]
+
+
+def detect_manoeuvres(signals: TrialSignals) -> Detection:
+    """Find and classify the manoeuvres in the signals of a trial.
+
+    Parameters
+    ----------
+    signals
+        As measured.
+
+    Returns
+    -------
+    Detection
+        The manoeuvres, and what is none of them.
+    """
+    filled = filled_signals(signals)
+    if not np.isfinite(filled.rudder).any():
+        runs = (*find_speed_manoeuvres(filled), *find_straight_runs(filled, ()))
+        return Detection(tuple(sorted(runs, key=lambda each: each.execute)), 0.0, ())
+    levels = rudder_levels(filled.rudder, filled.dt_secs)
+    neutral = neutral_rudder(levels)
+    found: list[FoundManoeuvre] = list(find_direct_spirals(levels, neutral, filled.dt_secs))
+    found += [each for each in find_speed_manoeuvres(filled) if not _overlaps(each, found)]
+    rejected: list[NotComputed] = []
+    scan = _RudderScan(filled, merged_levels(levels, neutral, filled.dt_secs), neutral)
+    for each in scan.results(found):
+        (rejected if isinstance(each, NotComputed) else found).append(each)  # type: ignore[arg-type]
+    reverse = find_reverse_spirals(filled, neutral)
+    found += [each for each in reverse if not _overlaps(each, found)]
+    found += find_straight_runs(filled, found)
+    return Detection(tuple(sorted(found, key=lambda each: each.execute)), neutral, tuple(rejected))
+
+
+def _overlaps(one: FoundManoeuvre, others: list[FoundManoeuvre]) -> bool:
+    return any(one.execute < each.end and each.execute < one.end for each in others)
+
+
+class _RudderScan:
+    """Classifies the stretches of held rudder, from the first to the last."""
+
+    def __init__(self, signals: TrialSignals, levels: list[HeldLevel], neutral: float) -> None:
+        self._signals, self._dt = signals, signals.dt_secs
+        self._neutral = neutral
+        passing = PASSING_SECS / self._dt
+        self._levels = [
+            held
+            for held in levels
+            if abs(held.level - neutral) >= MIN_DEFLECTION or held.last - held.first > passing
+        ]
+
+    def results(self, found: list[FoundManoeuvre]) -> Iterator[FoundManoeuvre | NotComputed]:
+        """Yield manoeuvres, and the reasons for rudder orders that are none."""
+        spans = [(each.execute, each.end) for each in found]
+        k = 0
+        while k < len(self._levels):
+            held = self._levels[k]
+            taken = any(held.first < end and first <= held.last for first, end in spans)
+            if taken or not self._is_over(held):
+                k += 1
+                continue
+            chain = self._zigzag_chain(k) if self._has_approach(k) else []
+            zigzag = self._zigzag(chain) if len(chain) > 1 else None
+            if zigzag is not None:
+                yield zigzag
+                k += len(chain)
+            else:
+                yield from self._single(k)
+                k += 1
+
+    def _is_over(self, held: HeldLevel) -> bool:
+        return abs(held.level - self._neutral) >= MIN_DEFLECTION
+
+    def _has_approach(self, k: int) -> bool:
+        """Whether the rudder is near neutral before the k-th level, or the log begins with it."""
+        return abs(self._approach_level(k) - self._neutral) < MIN_DEFLECTION
+
+    def _begins(self, k: int) -> int:
+        """Return the sample at which the rudder leaves the level before the k-th."""
+        return self._levels[k - 1].last if k else 0
+
+    def _approach_level(self, k: int) -> float:
+        return self._levels[k - 1].level if k else float(self._signals.rudder[0])
+
+    def _zigzag_chain(self, k: int) -> list[HeldLevel]:
+        """Return the k-th level and those after it that alternate in side at like angles."""
+        chain = [self._levels[k]]
+        for held in self._levels[k + 1 :]:
+            before, first = chain[-1].level - self._neutral, chain[0].level - self._neutral
+            now = held.level - self._neutral
+            like = abs(abs(now) - abs(first)) <= max(LIKE_ANGLES, LIKE_ANGLES_SHARE * abs(first))
+            secs = (held.first - chain[-1].last) * self._dt
+            longest = REVERSAL_SECS + abs(now - before) / SLOWEST_GEAR
+            if before * now >= 0 or not like or secs > longest or not self._is_over(held):
+                break
+            chain.append(held)
+        return chain
+
+    def _zigzag(self, chain: list[HeldLevel]) -> FoundManoeuvre | None:
+        """Return the zig-zag of a chain; None where the headings at its reversals are none."""
+        heading = self._signals.heading
+        k = self._levels.index(chain[0])
+        execute = self._begins(k)
+        reversals = tuple(held.last for held in chain[:-1])
+        changes = heading[list(reversals)] - np.mean(
+            heading[max(0, execute - round(30 / self._dt)) : execute + 1]
+        )
+        sides = np.sign([held.level - self._neutral for held in chain[:-1]])
+        if not np.isfinite(changes).all() or np.any(changes * sides < radians(1.0)):
+            return None
+        if np.max(np.abs(changes)) > MIN_TURN:
+            return None
+        last = chain[-1]
+        return FoundManoeuvre(
+            ManoeuvreKind.ZIGZAG,
+            execute,
+            last.last + 1,
+            chain[0].level - self._neutral,
+            self._approach_level(k),
+            reversals,
+        )
+
+    def _single(self, k: int) -> Iterator[FoundManoeuvre | NotComputed]:
+        """Yield the turn of a rudder that is held over once, and the pull-out after it."""
+        held, signals, dt = self._levels[k], self._signals, self._dt
+        level = held.level - self._neutral
+        if k == 0 and held.first * dt < 1.0:
+            yield self._rejected(held, "the log begins with the rudder held over")
+            return
+        if not self._has_approach(k):
+            before = degrees(self._approach_level(k) - self._neutral)
+            yield self._rejected(held, f"the rudder is at {before:.0f}° before it: no approach")
+            return
+        execute = self._begins(k)
+        turned = np.sign(level) * (signals.heading[execute : held.last + 1])
+        turned = turned - turned[0]
+        most = float(turned[-1]) if len(turned) else np.nan
+        pull_out = self._pull_out(k, most)
+        made = (execute, held.last + 1, level, self._approach_level(k))
+        if most >= 2 * MIN_TURN or (most >= MIN_TURN and pull_out is None):
+            yield FoundManoeuvre(ManoeuvreKind.TURNING_CIRCLE, *made)
+        elif pull_out is None:
+            low, high = INITIAL_TURN_RUDDER
+            if low <= abs(level) <= high and most >= INITIAL_TURN:
+                yield FoundManoeuvre(ManoeuvreKind.INITIAL_TURNING, *made)
+            elif abs(level) >= REPORTED_DEFLECTION:
+                yield self._rejected(held, self._reason(held, most))
+        if pull_out is not None:
+            yield pull_out
+
+    def _reason(self, held: HeldLevel, turned: float) -> str:
+        secs = (held.last - held.first) * self._dt
+        if not np.isfinite(turned):
+            return "no heading and no yaw rate in the log"
+        return (
+            f"held for {secs:.0f} s, in which the heading changes by {degrees(turned):.0f}°: a "
+            f"turning circle needs {degrees(MIN_TURN):.0f}°, a zig-zag an equal angle to the "
+            "other side"
+        )
+
+    def _rejected(self, held: HeldLevel, reason: str) -> NotComputed:
+        at, level = held.first * self._dt, degrees(held.level - self._neutral)
+        side = "starboard" if level > 0 else "port"
+        return NotComputed(f"rudder {abs(level):.0f}° to {side} at {at:.0f} s", reason)
+
+    def _pull_out(self, k: int, turned: float) -> FoundManoeuvre | None:
+        """Return the pull-out after the k-th level; None where there is none."""
+        if k + 1 >= len(self._levels) or not turned >= MIN_STEADY_TURN:
+            return None
+        held, after = self._levels[k], self._levels[k + 1]
+        midships = abs(after.level - self._neutral) < radians(2.0)
+        if not midships or (after.last - after.first) * self._dt < MIN_PULL_OUT_SECS:
+            return None
+        rate = slope(self._signals.heading, self._dt, 5.0)
+        late = rate[held.last - (held.last - held.first) // 4 : held.last + 1]
+        if np.ptp(late) > 0.2 * abs(float(np.mean(late))) + radians(0.05):
+            return None  # not yet steady
+        level = held.level - self._neutral
+        return FoundManoeuvre(ManoeuvreKind.PULL_OUT, held.last, after.last + 1, level, after.level)

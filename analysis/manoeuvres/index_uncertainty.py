@@ -1,0 +1,220 @@
+"""Uncertainty of the indices of a manoeuvre, by source, and their 95 % intervals.
+
+The indices are computed again from signals with other noise and other sampling instants (a
+parametric bootstrap), and with each systematic error changed by its standard deviation (the
+propagation of JCGM 100:2008, "Guide to the expression of uncertainty in measurement", 5.1.2).
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from shiplog.types import FloatArray
+
+from .found_manoeuvre import FoundManoeuvre
+from .manoeuvre_values import VALUES, IndexCase, index_case, smoothed
+from .start_rules import Execute
+from .trial_signals import TrialSignals
+from .water_velocity import VelocityErrors, corrected_signals
+
+DRAWS = 40  # of the noise and the sampling instants
+SEED = 1
+COVERAGE_FACTOR = 1.959963984540054  # of 95 %, normal distribution
+NOISE, VELOCITY, START, APPROACH, GYRO = (
+    "sensor noise and sampling", "current, log and compass", "start rule", "approach heading",
+    "gyro bias",
+)  # fmt: skip
+GYRO_BIAS_STD = np.radians(0.005)  # rad/s, of a heading that is the integral of the yaw rate
+HELM_CORRELATION_SECS = 10.0  # of the heading under helm
+WANDER_SECS = 30.0
+SAMPLED = ("heading", "yaw_rate", "speed", "sway", "positions")
+
+
+@dataclass(frozen=True, eq=False)
+class IndexInputs:
+    """What the indices of a manoeuvre are computed from.
+
+    Attributes
+    ----------
+    signals
+        As measured, of the manoeuvre and its approach, without NaN where measured.
+    found
+        The manoeuvre; its samples are those of the signals.
+    execute
+        The execute.
+    switch
+        Of a zig-zag the switch heading, rad; else NaN.
+    half_secs
+        Half width of the heading's smoothing, s.
+    errors
+        Current and systematic errors.
+    antenna
+        Place of the antenna ahead and to starboard of the midship point, m.
+    has_compass
+        Whether the heading was measured; else it is the integral of the yaw rate.
+    """
+
+    signals: TrialSignals
+    found: FoundManoeuvre
+    execute: Execute
+    switch: float
+    half_secs: float
+    errors: VelocityErrors
+    antenna: tuple[float, float]
+    has_compass: bool
+
+    def case(
+        self,
+        *,
+        signals: TrialSignals | None = None,
+        errors: FloatArray | None = None,
+        execute: float | None = None,
+    ) -> IndexCase:
+        """Return the case of these inputs, or of others."""
+        corrected = corrected_signals(
+            self.signals if signals is None else signals,
+            self.errors.mean if errors is None else errors,
+            self.antenna,
+        )
+        at = self.execute.sample if execute is None else execute
+        return index_case(corrected, self.found, at, self.half_secs, self.switch)
+
+
+def index_values(case: IndexCase) -> dict[str, float]:
+    """Compute the indices of a case, whatever manoeuvre it is."""
+    return VALUES[case.found.kind](case)
+
+
+def index_stds(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """Estimate the standard uncertainty of each index by source.
+
+    Parameters
+    ----------
+    inputs
+        Signals, execute and systematic errors.
+    values
+        The indices of `inputs.case()`.
+
+    Returns
+    -------
+    dict
+        By the name of the index: standard deviations, in its unit, by the name of the source.
+    """
+    changes: dict[str, list[dict[str, float]]] = {
+        NOISE: [_deviation(values, _draws(inputs))],
+        START: [_start_change(inputs, values)],
+        APPROACH: [_approach_change(inputs, values)],
+        VELOCITY: _velocity_changes(inputs, values),
+    }
+    if not inputs.has_compass:
+        changes[GYRO] = [_gyro_change(inputs, values)]
+    return {
+        name: {
+            source: float(np.sqrt(sum(change.get(name, 0.0) ** 2 for change in each)))
+            for source, each in changes.items()
+        }
+        for name in values
+    }
+
+
+def _difference(
+    values: Mapping[str, float], changed: Callable[[float], IndexCase]
+) -> dict[str, float]:
+    """Return half the difference of the indices for a change up and down; one-sided if need be."""
+    up, down = (index_values(changed(sign)) for sign in (1.0, -1.0))
+    found = {}
+    for name, value in values.items():
+        sides = [abs(each[name] - value) for each in (up, down) if np.isfinite(each[name])]
+        both = np.isfinite(up[name]) and np.isfinite(down[name])
+        found[name] = abs(up[name] - down[name]) / 2 if both else max(sides, default=0.0)
+    return found
+
+
+def _start_change(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, float]:
+    shift = inputs.execute.std_secs / inputs.signals.dt_secs
+    if shift == 0:
+        return {}
+    return _difference(
+        values, lambda sign: inputs.case(execute=inputs.execute.sample + sign * shift)
+    )
+
+
+def _approach_change(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, float]:
+    base, std = inputs.case(), approach_std(inputs)
+    return _difference(values, lambda sign: replace(base, approach=base.approach + sign * std))
+
+
+def approach_std(inputs: IndexInputs) -> float:
+    """Estimate the standard uncertainty of the approach heading, rad, from its wander."""
+    dt, execute = inputs.signals.dt_secs, round(inputs.execute.sample)
+    window = inputs.signals.heading[max(0, execute - round(WANDER_SECS / dt)) : execute + 1]
+    if len(window) < 3:
+        return float(inputs.signals.noise.get("heading", 0.0))
+    secs = len(window) * dt
+    return float(np.std(window)) * float(np.sqrt(min(1.0, HELM_CORRELATION_SECS / secs)))
+
+
+def _velocity_changes(inputs: IndexInputs, values: Mapping[str, float]) -> list[dict[str, float]]:
+    sizes, directions = np.linalg.eigh(inputs.errors.covariance)
+    mean = inputs.errors.mean
+
+    def changed(step: FloatArray) -> Callable[[float], IndexCase]:
+        return lambda sign: inputs.case(errors=mean + sign * step)
+
+    steps = (np.sqrt(np.maximum(sizes, 0.0)) * directions).T
+    return [_difference(values, changed(step)) for step in steps]
+
+
+def _gyro_change(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, float]:
+    signals = inputs.signals
+    time = np.arange(len(signals)) * signals.dt_secs
+
+    def drifted(sign: float) -> IndexCase:
+        heading = signals.heading + sign * GYRO_BIAS_STD * time
+        return inputs.case(signals=replace(signals, heading=heading))
+
+    return _difference(values, drifted)
+
+
+def _draws(inputs: IndexInputs) -> list[dict[str, float]]:
+    """Return the indices of signals with other noise and other sampling instants."""
+    rng = np.random.default_rng(SEED)
+    base = smoothed(inputs.signals, inputs.half_secs)
+    return [index_values(inputs.case(signals=_sampled_anew(base, rng))) for _ in range(DRAWS)]
+
+
+def _sampled_anew(signals: TrialSignals, rng: np.random.Generator) -> TrialSignals:
+    """Return signals sampled at other instants, with other noise, on the same clock."""
+    dt, count = signals.dt_secs, len(signals)
+    grid = np.arange(count) * dt
+    changed: dict[str, Any] = {}
+    for name in SAMPLED:
+        key = "position" if name == "positions" else name
+        values = getattr(signals, name)
+        columns = values.reshape(count, -1)
+        if not np.isfinite(columns).all():
+            continue
+        interval, std = signals.interval(key), signals.noise.get(key, 0.0)
+        times = grid
+        if interval > 1.01 * dt:
+            times = np.arange(-rng.uniform(0.0, interval), grid[-1] + 2 * interval, interval)
+        sampled = [
+            np.interp(times, grid, column) + rng.normal(0.0, std, len(times))
+            for column in columns.T
+        ]
+        changed[name] = np.column_stack(
+            [np.interp(grid, times, column) for column in sampled]
+        ).reshape(values.shape)
+    return replace(signals, **changed)
+
+
+def _deviation(values: Mapping[str, float], draws: list[dict[str, float]]) -> dict[str, float]:
+    """Return the root mean square deviation of the draws from their own mean, and its excess."""
+    found = {}
+    for name in values:
+        drawn = np.array([each[name] for each in draws])
+        drawn = drawn[np.isfinite(drawn)]
+        found[name] = float(np.std(drawn, ddof=1)) if len(drawn) > 2 else 0.0
+    return found

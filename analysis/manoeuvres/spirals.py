@@ -1,0 +1,198 @@
+"""Direct and reverse spirals: steady yaw rate against rudder, and the loop of an unstable ship.
+
+Source: ITTC Recommended Procedure 7.5-04-02-01, full scale manoeuvring trials; IMO
+MSC/Circ.1053, explanatory notes, section 3.4.
+"""
+
+from collections.abc import Iterator
+from math import radians
+
+import numpy as np
+
+from shiplog.types import FloatArray
+
+from .found_manoeuvre import FoundManoeuvre
+from .rudder_levels import MIN_HELD_SECS, HeldLevel, held_levels
+from .sailed_manoeuvre import ManoeuvreKind
+from .trial_signals import TrialSignals, noise_std, slope
+
+MIN_SPIRAL_LEVELS = 5
+MIN_SPIRAL_SECS = 30.0  # of each level
+MAX_PAUSE_SECS = 40.0  # between two levels
+MIN_SPIRAL_STEP = radians(0.5)
+MIN_SIDE = radians(2.0)  # that the largest levels of both sides reach
+MIN_RATE_STEP, MIN_RATE_SIDE = radians(0.03), radians(0.1)  # of a reverse spiral, rad/s
+RATE_SMOOTHING_SECS = 5.0
+STEADY_SHARE = 0.4  # of a level's end, over which yaw rate and rudder are averaged
+
+
+def find_direct_spirals(
+    levels: list[HeldLevel], neutral: float, dt: float
+) -> Iterator[FoundManoeuvre]:
+    """Find direct spirals: the rudder is held at one angle after another, on both sides.
+
+    Parameters
+    ----------
+    levels
+        The stretches of held rudder, not merged.
+    neutral
+        The rudder angle that keeps a straight course, rad.
+    dt
+        Sample interval, s.
+    """
+    for chain in _chains(_joined(levels, dt), dt, MIN_SPIRAL_STEP, MIN_SIDE, neutral):
+        yield _spiral(ManoeuvreKind.DIRECT_SPIRAL, chain, neutral)
+
+
+def find_reverse_spirals(signals: TrialSignals, neutral: float) -> Iterator[FoundManoeuvre]:
+    """Find reverse spirals: the rudder is moved to hold one yaw rate after another.
+
+    Parameters
+    ----------
+    signals
+        Without NaN.
+    neutral
+        The rudder angle that keeps a straight course, rad.
+    """
+    dt = signals.dt_secs
+    rate = slope(signals.heading, dt, RATE_SMOOTHING_SECS)
+    if not np.isfinite(rate).all() or np.ptp(rate) < 2 * MIN_RATE_SIDE:
+        return
+    steady = held_levels(rate, dt, MIN_RATE_STEP / 2 + 3 * noise_std(rate))
+    for chain in _chains(_joined(steady, dt), dt, MIN_RATE_STEP, MIN_RATE_SIDE, 0.0):
+        if _is_steered(signals.rudder, chain):
+            yield _spiral(ManoeuvreKind.REVERSE_SPIRAL, chain, neutral)
+
+
+def _joined(levels: list[HeldLevel], dt: float) -> list[HeldLevel]:
+    """Join stretches of one level that a short movement separates."""
+    joined: list[HeldLevel] = []
+    for held in levels:
+        if (
+            joined
+            and abs(held.level - joined[-1].level) < MIN_SPIRAL_STEP / 2
+            and (held.first - joined[-1].last) * dt < 2 * MIN_HELD_SECS
+        ):
+            joined[-1] = HeldLevel(joined[-1].first, held.last, joined[-1].level)
+        else:
+            joined.append(held)
+    return joined
+
+
+def _chains(
+    levels: list[HeldLevel], dt: float, step: float, side: float, neutral: float
+) -> Iterator[list[HeldLevel]]:
+    """Yield the chains of long levels that go down and up, or up and down, on both sides."""
+    chain: list[HeldLevel] = []
+    for held in [*levels, None]:
+        if held is not None and (held.last - held.first) * dt < MIN_SPIRAL_SECS:
+            continue
+        near = held is not None and (
+            not chain
+            or (
+                (held.first - chain[-1].last) * dt <= MAX_PAUSE_SECS
+                and abs(held.level - chain[-1].level) >= step
+            )
+        )
+        if near and held is not None:
+            chain.append(held)
+            continue
+        if _is_spiral([each.level - neutral for each in chain], side):
+            yield chain
+        chain = [] if held is None else [held]
+
+
+def _is_spiral(levels: list[float], side: float) -> bool:
+    """Whether levels run monotonously from side to side, with at most two turning points."""
+    if len(levels) < MIN_SPIRAL_LEVELS or max(levels) < side or min(levels) > -side:
+        return False
+    steps = np.sign(np.diff(levels))
+    return int(np.sum(steps[1:] != steps[:-1])) <= 2 and len({round(x, 3) for x in levels}) >= 5
+
+
+def _is_steered(rudder: FloatArray, chain: list[HeldLevel]) -> bool:
+    """Whether the rudder is moved to keep each rate, as in a reverse spiral."""
+    moved = [float(np.ptp(rudder[held.first : held.last + 1])) for held in chain]
+    return bool(np.median(moved) > radians(1.0))
+
+
+def _spiral(kind: ManoeuvreKind, chain: list[HeldLevel], neutral: float) -> FoundManoeuvre:
+    levels = np.array([(held.first, held.last, held.level) for held in chain])
+    first = chain[1] if abs(chain[0].level - neutral) < MIN_SPIRAL_STEP else chain[0]
+    return FoundManoeuvre(
+        kind, chain[0].first, chain[-1].last + 1, first.level - neutral, neutral, levels=levels
+    )
+
+
+def spiral_curve(signals: TrialSignals, levels: FloatArray) -> FloatArray:
+    """Compute the points of a spiral: mean rudder and yaw rate at the end of each level.
+
+    Parameters
+    ----------
+    signals
+        Without NaN.
+    levels
+        (k, 3) first and last sample, and level, of each stretch.
+
+    Returns
+    -------
+    (k, 2)
+        Rudder, rad, and yaw rate, rad/s.
+    """
+    points = np.empty((len(levels), 2))
+    for row, (first, last) in enumerate(levels[:, :2].astype(int)):
+        late = slice(int(last - STEADY_SHARE * (last - first)), int(last) + 1)
+        duration = (late.stop - 1 - late.start) * signals.dt_secs
+        turned = signals.heading[late.stop - 1] - signals.heading[late.start]
+        points[row] = np.mean(signals.rudder[late]), turned / max(duration, signals.dt_secs)
+    return points
+
+
+def spiral_loop(points: FloatArray) -> tuple[float, float]:
+    """Compute the height and the width of the loop of a spiral.
+
+    The height is the difference of the yaw rates at neutral rudder on the way down and on the way
+    up; the width is the difference of the rudder angles at which the yaw rate changes its sign.
+
+    Parameters
+    ----------
+    points
+        (k, 2) rudder, rad, and yaw rate, rad/s, in the order sailed.
+
+    Returns
+    -------
+    height, width
+        In rad/s and rad; NaN where the spiral was not sailed both ways.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> down = [(0.2, 2.0), (0.0, 1.0), (-0.1, -1.0), (-0.2, -2.0)]
+    >>> up = [(0.0, -1.0), (0.1, 1.0), (0.2, 2.0)]
+    >>> [round(x, 6) for x in spiral_loop(np.array(down + up))]
+    [2.0, 0.1]
+    """
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(points[:, 0])))) + 1
+    if not len(turns):
+        return np.nan, np.nan
+    branches = [
+        points[: turns[0] + 1],
+        points[turns[0] : (turns[1] + 1 if len(turns) > 1 else None)],
+    ]
+    if len(turns) > 1 and len(branches[0]) < 4:  # the first steps only lead to the largest angle
+        after = points[turns[1] : (turns[2] + 1 if len(turns) > 2 else None)]
+        branches = [branches[1], after]
+    if min(len(branch) for branch in branches) < 3:
+        return np.nan, np.nan
+    rates = [_at_zero(branch[:, 0], branch[:, 1]) for branch in branches]
+    angles = [_at_zero(branch[:, 1], branch[:, 0]) for branch in branches]
+    return abs(rates[0] - rates[1]), abs(angles[0] - angles[1])
+
+
+def _at_zero(x: FloatArray, y: FloatArray) -> float:
+    """Return y where x changes its sign, by linear interpolation; NaN where it does not."""
+    k = np.flatnonzero(np.diff(np.sign(x)))
+    if not len(k):
+        return np.nan
+    at = int(k[0])
+    return float(y[at] - x[at] * (y[at + 1] - y[at]) / (x[at + 1] - x[at]))

@@ -1,0 +1,194 @@
+"""The signals of a log as the analysis of manoeuvres takes them, and what the log states."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.manoeuvres.trial_signals import TrialSignals, noise_std
+from analysis.replay.position_fixes import PositionFixes
+from analysis.replay.reading_options import ReadingOptions
+from shiplog.checks.channel_stats import LogStats
+from shiplog.errors import LogError
+from shiplog.progress import ProgressCallback
+from shiplog.resampling import Clock, resample_chunks, with_steering_gear
+from shiplog.screening import ScreenedLog, screen_values, screen_without_delays
+from shiplog.types import Channel, FloatArray, Log, Signals, concatenate_signals
+from shiplog.vessel.vessel import Vessel, with_length
+from shiplog.vessel.vessel_parser import parse_vessel
+
+STEERING = ("rudder", "rudder_order", "heading", "yaw_rate")
+MOTION = ("speed", "sway", "rpm")
+WIND = ("wind_speed", "wind_direction")
+MIN_STEP_SECS, MAX_STEP_SECS = 0.1, 1.0
+MAX_SAMPLES = 250_000  # of the clock: a longer log has a coarser one
+MAX_NOISE_SAMPLES = 100_000  # of a channel, from which its noise is estimated
+
+
+@dataclass(frozen=True, eq=False)
+class TrialRecord:
+    """What a log holds of a trial.
+
+    Attributes
+    ----------
+    name
+        Name of the log.
+    start_ns
+        The first instant, ns since 1970-01-01 UTC.
+    signals
+        On a uniform clock.
+    wind_speed, wind_direction
+        Means of the true wind, m/s and rad; NaN where not measured.
+    vessel
+        The vessel given or attached, with the length given; None where there is neither.
+    metadata
+        What the log states.
+    warnings
+        Problems of the data.
+    """
+
+    name: str
+    start_ns: int
+    signals: TrialSignals
+    wind_speed: float
+    wind_direction: float
+    vessel: Vessel | None
+    metadata: Mapping[str, str]
+    warnings: tuple[str, ...]
+
+
+def read_trial(log: Log, options: ReadingOptions, on_progress: ProgressCallback) -> TrialRecord:
+    """Read what the analysis of manoeuvres needs from a log, whatever the log lacks.
+
+    Parameters
+    ----------
+    log
+        The log, in memory or in its file.
+    options
+        Vessel, length, sources and delays of sensors.
+    on_progress
+        Called with the step and its share done.
+
+    Raises
+    ------
+    LogError
+        The log has neither rudder, heading, yaw rate nor speed over time.
+    """
+    on_progress("check the log", 0.0)
+    names = (*STEERING, *MOTION, *WIND, "position")
+
+    def screen(recorded: Log) -> ScreenedLog:
+        return screen_values(recorded, names, sources=options.sources)
+
+    screened = screen_without_delays(log, options.sensor_delays, screen)
+    stats = screened.screening.stats
+    vessel = options.vessel
+    if vessel is None and log.vessel_toml is not None:
+        vessel = parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}")
+    vessel = with_length(vessel, options.length)
+    clock = with_steering_gear(
+        _clock(stats, log.name), vessel.rudder_rate if vessel else Vessel("", None).rudder_rate
+    )
+    values, fixes, noise = _read(screened, clock, stats, on_progress)
+    count = len(values)
+    absent = np.full(count, np.nan)
+    north_east = fixes.at_samples([values])[0]
+    used = {name: values.values.get(name, absent) for name in (*STEERING, *MOTION)}
+    events = tuple(
+        ((event.time_ns - clock.start_ns) * 1e-9, event.text)
+        for event in log.events
+        if event.source == "operator"
+    )
+    intervals = {
+        name: stats[name].interval_secs
+        for name in (*used, "position")
+        if name in stats and not stats[name].hold
+    }
+    return TrialRecord(
+        name=log.name,
+        start_ns=clock.start_ns,
+        signals=TrialSignals(
+            clock.dt_secs,
+            positions=np.full((count, 2), np.nan) if north_east is None else north_east,
+            intervals=intervals,
+            noise=noise,
+            events=events,
+            **used,
+        ),
+        wind_speed=_mean(values, "wind_speed"),
+        wind_direction=_mean_direction(values),
+        vessel=vessel,
+        metadata=dict(log.metadata),
+        warnings=screened.warnings,
+    )
+
+
+def _clock(stats: LogStats, name: str) -> Clock:
+    """Return a clock over all that the log has of steering and motion."""
+    used = {
+        channel: stats[channel]
+        for channel in (*STEERING, *MOTION, *WIND)
+        if channel in stats
+        and not stats[channel].fields
+        and (stats[channel].valid > 1 or stats[channel].hold)
+    }
+    sampled = [each for key, each in used.items() if key not in WIND and not each.hold]
+    spans = [each.valid_span_ns for key, each in used.items() if key not in WIND]
+    if not spans:
+        raise LogError(
+            f"neither rudder, heading, yaw rate nor speed over time: no manoeuvre can be found; "
+            f"choose another log: {name}"
+        )
+    start, end = min(first for first, _ in spans), max(last for _, last in spans)
+    duration = (end - start) * 1e-9
+    step = min((each.interval_secs for each in sampled), default=MAX_STEP_SECS)
+    dt = max(float(np.clip(step, MIN_STEP_SECS, MAX_STEP_SECS)), duration / MAX_SAMPLES)
+    return Clock(start, dt, int(duration / dt + 1e-6) + 1, used)
+
+
+def _read(
+    log: ScreenedLog, clock: Clock, stats: LogStats, on_progress: ProgressCallback
+) -> tuple[Signals, PositionFixes, dict[str, float]]:
+    """Resample the scalar channels, and gather the fixes and samples to estimate noise from."""
+    fixes = PositionFixes(stats.get("position"))
+    raw: dict[str, list[FloatArray]] = {name: [] for name in clock.channels}
+
+    def chunks() -> "list[tuple[Channel, ...]]":
+        parts = []
+        for chunk in log.chunks():
+            fixes.add(chunk)
+            for name, kept in raw.items():
+                part = clock.channels[name].select(chunk)
+                if part is not None and sum(map(len, kept)) < MAX_NOISE_SAMPLES:
+                    kept.append(part.values[np.isfinite(part.values)])
+            parts.append(chunk)
+        return parts
+
+    on_progress("read the log", 0.0)
+    parts = []
+    for signals in resample_chunks(chunks(), clock):
+        parts.append(signals)
+        on_progress("read the log", (signals.first + len(signals)) / clock.count)
+    noise = {
+        name: noise_std(
+            np.unwrap(np.concatenate(kept)) if name == "heading" else np.concatenate(kept)
+        )
+        for name, kept in raw.items()
+        if kept
+    }
+    _, north_east = fixes.north_east()
+    if len(north_east):
+        noise["position"] = max(noise_std(column) for column in north_east.T)
+    return concatenate_signals(parts), fixes, noise
+
+
+def _mean(values: Signals, name: str) -> float:
+    known = values[name][np.isfinite(values[name])] if name in values else np.empty(0)
+    return float(np.mean(known)) if len(known) else np.nan
+
+
+def _mean_direction(values: Signals) -> float:
+    if "wind_direction" not in values:
+        return np.nan
+    known = values["wind_direction"][np.isfinite(values["wind_direction"])]
+    return float(np.angle(np.mean(np.exp(1j * known)))) % (2 * np.pi) if len(known) else np.nan
