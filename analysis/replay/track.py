@@ -34,6 +34,40 @@ class Track:
 EMPTY_TRACK = Track(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
+class RecordedTrack:
+    """Computes the track from recorded positions, chunk by chunk.
+
+    Parameters
+    ----------
+    start_ns
+        The instant from which times count, ns since 1970-01-01 UTC.
+    position
+        The statistics of the position channel.
+
+    Attributes
+    ----------
+    frame
+        The local frame, whose datum is the first position; None before there is one.
+    """
+
+    def __init__(self, start_ns: int, position: ChannelStats) -> None:
+        self._start_ns, self._position = start_ns, position
+        self.frame: LocalFrame | None = None
+
+    def step(self, chunk: tuple[Channel, ...]) -> Track:
+        """Return the positions in a chunk of raw channels."""
+        channel = self._position.select(chunk)
+        if channel is None:
+            return EMPTY_TRACK
+        positions = positions_of(channel.fields, channel.values)
+        self.frame = self.frame or LocalFrame.at_first(positions)
+        if self.frame is None:
+            return EMPTY_TRACK
+        local, measured = self.frame.to_local(positions), positions.measured
+        at = (channel.measured_ns[measured] - self._start_ns) * 1e-9
+        return Track(at, local.north[measured], local.east[measured])
+
+
 class Tracker:
     """Computes the track chunk by chunk, from recorded positions or else by dead reckoning.
 
@@ -49,10 +83,10 @@ class Tracker:
     """
 
     def __init__(self, clock: Clock, position: ChannelStats | None) -> None:
-        self._recorded = position if position is not None and position.valid > 1 else None
-        self._start_ns, self._reckoning = clock.start_ns, _DeadReckoner(clock)
+        usable = position is not None and position.valid > 1
+        self._recorded = RecordedTrack(clock.start_ns, position) if usable and position else None
+        self._reckoning = _DeadReckoner(clock)
         self._fixes: list[Track] = []  # since the last step
-        self._frame: LocalFrame | None = None  # its datum is the first position
 
     @property
     def origin(self) -> str:
@@ -64,15 +98,8 @@ class Tracker:
 
     def add_raw(self, chunk: tuple[Channel, ...]) -> None:
         """Read the recorded positions from a chunk of raw channels."""
-        channel = self._recorded.select(chunk) if self._recorded else None
-        if channel is None:
-            return
-        positions = positions_of(channel.fields, channel.values)
-        self._frame = self._frame or LocalFrame.at_first(positions)
-        if self._frame is not None:
-            local, measured = self._frame.to_local(positions), positions.measured
-            at = (channel.measured_ns[measured] - self._start_ns) * 1e-9
-            self._fixes.append(Track(at, local.north[measured], local.east[measured]))
+        if self._recorded:
+            self._fixes.append(self._recorded.step(chunk))
 
     def step(self, chunk: Signals, yaw_rate: FloatArray, speed: FloatArray) -> Track:
         """Return the part of the track that has become known.

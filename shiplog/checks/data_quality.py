@@ -1,6 +1,6 @@
 """Warnings about the data of a log, in words for the person who can still repeat the trial."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from shiplog.errors import LogError
 from shiplog.units import display_conversion
@@ -41,13 +41,28 @@ def data_warnings(stats: LogStats, names: tuple[str, ...]) -> list[str]:
     >>> data_warnings(compute_log_stats(log), ("yaw_rate", "rudder"))
     []
     """
+    channels = [stats[name] for name in names]
+    for channel in channels:
+        for text in unusable_causes(channel):
+            raise LogError(f"{channel.topic} {text}: {stats.name}")
+    return defect_warnings(channels, stats.span_ns[1])
+
+
+def defect_warnings(channels: Iterable[ChannelStats], end_ns: int) -> list[str]:
+    """Report the defects with which channels can still be used, as `data_warnings` does.
+
+    Parameters
+    ----------
+    channels
+        The statistics of the channels.
+    end_ns
+        End of the log, ns since 1970.
+    """
     topics: dict[str, list[str]] = {}  # by the text, which channels from one clock share
-    for name in names:
-        channel = stats[name]
-        _require_usable(stats, channel)
-        for text in (*_channel_warnings(channel), *hold_warnings(channel, stats.span_ns[1])):
+    for channel in channels:
+        for text in (*_channel_warnings(channel), *hold_warnings(channel, end_ns)):
             topics.setdefault(text, []).append(channel.topic)
-    return [f"{', '.join(channels)}: {text}" for text, channels in topics.items()]
+    return [f"{', '.join(names)}: {text}" for text, names in topics.items()]
 
 
 def hold_warnings(channel: ChannelStats, end_ns: int) -> Iterator[str]:
@@ -117,20 +132,27 @@ def times_in_words(count: int) -> str:
     return "once" if count == 1 else f"{count} times"
 
 
-def _require_usable(stats: LogStats, channel: ChannelStats) -> None:
+def unusable_causes(channel: ChannelStats) -> Iterator[str]:
+    """Report why nothing can be computed from a channel: infinite values, times that run back.
+
+    Yields
+    ------
+    str
+        The causes with their remedies, without the topic.
+    """
     infinite, backward = channel.infinite, channel.backward_steps
     if infinite.count:
-        raise LogError(
-            f"{channel.topic} has {_count(infinite.count, 'infinite value')}, the first "
+        yield (
+            f"has {_count(infinite.count, 'infinite value')}, the first "
             f"{infinite.first_secs:.3f} s after its start; convert the log to CSV, replace "
-            f"{'it' if infinite.count == 1 else 'them'} by nan and convert it back: {stats.name}"
+            f"{'it' if infinite.count == 1 else 'them'} by nan and convert it back"
         )
     if backward.count:
-        raise LogError(
-            f"the measured times of {channel.topic} run backwards "
+        yield (
+            "has measured times that run backwards "
             f"{times_in_words(backward.count)}, first by {backward.extent:.3f} s, "
             f"{backward.first_secs:.3f} s after its start; "
-            f"`shiplog convert IN.mcap OUT.mcap` sorts them: {stats.name}"
+            "`shiplog convert IN.mcap OUT.mcap` sorts them"
         )
 
 

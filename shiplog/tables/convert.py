@@ -11,25 +11,18 @@ from shiplog.checks.consistency.consistency_check import COMPARED_CHANNELS, cons
 from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.checks.data_quality import times_in_words
 from shiplog.errors import LogError, UsageError
-from shiplog.foreign_mcap.foreign_log import read_foreign_mcap
-from shiplog.layouts.layout import load_layout
-from shiplog.layouts.mcap_layout import load_mcap_layout
-from shiplog.mcap.clock_repair import MixedTimes, refuse_mixed_times
+from shiplog.mcap.clock_repair import refuse_mixed_times
 from shiplog.mcap.kept_records import KeptGroup, kept_groups
-from shiplog.mcap.part_names import log_suffix, part_files
 from shiplog.mcap.raw_reader import raw_groups
-from shiplog.mcap.reader import read_unchecked
 from shiplog.mcap.trial_log import concerns_kept
 from shiplog.mcap.writer import write
 from shiplog.screening import DerivedLog, plan_derivations, screen_values
 from shiplog.types import TrialLog, concatenate_channels
 from shiplog.types.time_cut import resolve_cut
 
-from .csv_form import CSV_MARK, read_csv, write_csv
-from .foreign import read_table
-from .parquet_form import read_parquet, write_parquet
-
-SUFFIXES = (".mcap", ".csv", ".parquet")
+from .any_log import SUFFIXES, is_mcap_log, read_any_log
+from .csv_form import write_csv
+from .parquet_form import write_parquet
 
 
 def convert(
@@ -82,8 +75,8 @@ def convert(
         )
     if source.resolve() == target.resolve():
         raise UsageError(f"source and target are the same file; name another target: {target}")
-    is_mcap = log_suffix(source) == ".mcap" or part_files(source) != (source,)
-    log, mixed = _read_mcap(source, layout) if is_mcap else (_read_table(source, layout), [])
+    is_mcap = is_mcap_log(source)
+    log, mixed = read_any_log(source, layout)
     is_copy = is_mcap and layout is None and target.suffix.lower() == ".mcap"
     if not (is_copy and any(raw_groups(source))):  # a recording of raw packets alone is kept
         _require_samples(log, source)
@@ -110,13 +103,6 @@ def convert(
     writers = {".csv": write_csv, ".parquet": write_parquet}
     writers[target.suffix.lower()](log, target)
     return log, warnings
-
-
-def _read_mcap(source: Path, layout: Path | None) -> tuple[TrialLog, list[MixedTimes]]:
-    """Read a log, or by a layout the topics of another program's file."""
-    if layout is None:
-        return read_unchecked(source)
-    return read_foreign_mcap(source, load_mcap_layout(layout))
 
 
 def _kept_within(
@@ -162,39 +148,6 @@ def _require_samples(log: TrialLog, source: Path) -> None:
     if not any(len(channel) for channel in log):
         causes = "; ".join(log.warnings) or "record it again"
         raise LogError(f"nothing to convert, no samples of shiplog: {causes}: {source}")
-
-
-def _read_table(source: Path, layout: Path | None) -> TrialLog:
-    """Read a table of shiplog, or a foreign one by its layout."""
-    suffix = log_suffix(source)
-    if layout is not None:
-        if suffix == ".parquet" or (suffix == ".csv" and _is_shiplog_csv(source)):
-            raise UsageError(
-                f"a layout is for foreign tables, but this is a log; omit --layout: {source}"
-            )
-        return read_table(source, load_layout(layout))
-    if suffix == ".parquet":
-        return read_parquet(source)
-    if suffix == ".csv" and (not source.is_file() or _is_shiplog_csv(source)):
-        return read_csv(source)
-    if not source.exists():
-        raise LogError(f"no such file: {source}")
-    if source.is_dir():
-        raise LogError(f"a folder, not a log; name one file in it: {source}")
-    raise UsageError(
-        f"a foreign table; describe its columns with --layout LAYOUT.toml "
-        f"(without a layout, {', '.join(SUFFIXES)} of shiplog can be read): {source}"
-    )
-
-
-def _is_shiplog_csv(path: Path) -> bool:
-    """Whether a file begins like a CSV of shiplog, of any version."""
-    mark = CSV_MARK.rpartition(" ")[0].encode()
-    try:
-        with path.open("rb") as stream:
-            return stream.read(len(mark) + 3).removeprefix(b"\xef\xbb\xbf").startswith(mark)
-    except OSError:
-        return False
 
 
 def sorted_by_time(log: TrialLog) -> tuple[TrialLog, list[str]]:

@@ -207,7 +207,10 @@ def test_times_that_run_backwards_are_an_error_with_the_remedy() -> None:
     times = 0.1 * np.arange(600)
     times[[100, 200]] -= 0.35
     message = error_of(channel(noise(), times))
-    assert "/yaw_rate/a run backwards 2 times, first by 0.250 s, 9.900 s after" in message
+    assert (
+        "/yaw_rate/a has measured times that run backwards 2 times, first by 0.250 s, 9.900 s after"
+        in message
+    )
     assert "`shiplog convert IN.mcap OUT.mcap` sorts them" in message
 
 
