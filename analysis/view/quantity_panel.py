@@ -1,6 +1,7 @@
 """Panels of quantities: the channels of one quantity share a panel, with a line for each source."""
 
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import cycle
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from .channel_series import Quantity
 from .panels import Panel, limits, title_of
-from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Series
+from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Colour, Series
 
 SOURCE_COLOURS = BLUE, ORANGE, GREEN, RED, CYAN, GREY
 LEGEND_SHARE = 0.15  # of an axis, above the values, for each name in the legend
@@ -26,21 +27,48 @@ def quantity_panel(name: str, quantity: Quantity, drawn: list[Series]) -> Panel:
     drawn
         The series; at least one.
     """
-    if quantity.turn:
-        drawn = [_turned_to(drawn[0], each, quantity.turn) for each in drawn]
-    lines = [line for each in drawn for line in each.lines]
-    low, high = limits(*(line.values for line in lines))
-    if len(lines) > 1:
-        drawn = _coloured(drawn)
-        high += LEGEND_SHARE * len(lines) * (high - low)
-    named = (replace(each, name=f"{i}_{entity_part(each.name)}") for i, each in enumerate(drawn))
-    return Panel(
+    return joined_panel(
         f"{name}_{entity_part(quantity.name)}",
         title_of(quantity.name, quantity.display[0]),
-        tuple(named),
-        (low, high),
-        legend=len(lines) > 1,
+        turned_together(drawn, quantity.turn),
+        SOURCE_COLOURS if sum(len(each.lines) for each in drawn) > 1 else (),
     )
+
+
+def joined_panel(
+    name: str, title: str, drawn: Sequence[Series], colours: Iterable[Colour] = ()
+) -> Panel:
+    """Return a panel of series that share an axis, with a legend where it has several lines.
+
+    Parameters
+    ----------
+    name, title
+        Those of the panel.
+    drawn
+        The series; at least one.
+    colours
+        A colour for each line, repeated where they are fewer; without any the lines keep theirs.
+    """
+    lines = [line for each in drawn for line in each.lines]
+    low, high = limits(*(line.values for line in lines))
+    drawn = _coloured(drawn, list(colours))
+    if len(lines) > 1:
+        high += LEGEND_SHARE * len(lines) * (high - low)
+    named = (replace(each, name=f"{i}_{entity_part(each.name)}") for i, each in enumerate(drawn))
+    return Panel(name, title, tuple(named), (low, high), legend=len(lines) > 1)
+
+
+def turned_together(drawn: Sequence[Series], turn: float) -> list[Series]:
+    """Return angles shifted by whole turns, so that each is nearest to the first.
+
+    Parameters
+    ----------
+    drawn
+        The series, of one line each.
+    turn
+        A full turn in their unit; 0 for what is no compass angle, which is not shifted.
+    """
+    return [_turned_to(drawn[0], each, turn) for each in drawn] if turn else list(drawn)
 
 
 def _turned_to(reference: Series, series: Series, turn: float) -> Series:
@@ -53,11 +81,13 @@ def _turned_to(reference: Series, series: Series, turn: float) -> Series:
     return replace(series, lines=(replace(line, values=line.values - turn * turns),))
 
 
-def _coloured(drawn: list[Series]) -> list[Series]:
-    """Return the series with a colour of its own for each line, as far as there are colours."""
-    colours = cycle(SOURCE_COLOURS)
+def _coloured(drawn: Sequence[Series], colours: Sequence[Colour]) -> list[Series]:
+    """Return the series with the next of the colours for each line."""
+    if not colours:
+        return list(drawn)
+    following = cycle(colours)
     return [
-        replace(each, lines=tuple(replace(line, colour=next(colours)) for line in each.lines))
+        replace(each, lines=tuple(replace(line, colour=next(following)) for line in each.lines))
         for each in drawn
     ]
 

@@ -20,6 +20,7 @@ from .panels import Panel
 from .replay_panels import equation_panels, history_panels
 from .rerun_io import (
     chart_view,
+    events_view,
     make_blueprint,
     plot_view,
     save_recording,
@@ -249,7 +250,7 @@ def _replay_page(
         side.append(rrb.Grid(*map(plot_view, coefficients), grid_columns=3, name="coefficients"))
     row_shares = [2, 3][: len(side)]
     if has_events:
-        side.append(rrb.TextLogView(origin="events", name="events"))
+        side.append(events_view())
         row_shares.append(1)
     right = rrb.Vertical(*side, row_shares=row_shares)
     return rrb.Horizontal(plots, right, column_shares=[1, 1], name="replay")

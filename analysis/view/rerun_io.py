@@ -14,11 +14,12 @@ import rerun.blueprint as rrb
 
 from shiplog.errors import ShiplogError
 from shiplog.files import atomic_write, is_device
+from shiplog.geodesy import GeographicPositions
 from shiplog.printable import printable
 from shiplog.types import Event, EventLevel, FloatArray
 
 from .panels import Panel
-from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Series
+from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Colour, Series
 from .track_chart import TrackChart
 
 RRD_MAGIC, FOOTER_MAGIC, FOOTER_BYTES = b"RRF2", b"RRF2FOOT", 32
@@ -80,8 +81,10 @@ def send_style(recording: rr.RecordingStream, entity: str, series: Series) -> No
     recording.log(entity, style, static=True)
 
 
-def send_points(recording: rr.RecordingStream, entity: str, series: Series, start_ns: int) -> None:
-    """Send the points of a series, in batches of `MAX_ROWS`."""
+def send_points(
+    recording: rr.RecordingStream, entity: str, series: Series, start_ns: int | None
+) -> None:
+    """Send the points of a series, in batches of `MAX_ROWS`; without dates where none is known."""
     values = np.column_stack([line.values for line in series.lines])
     for start in range(0, len(values), MAX_ROWS):
         part = slice(start, start + MAX_ROWS)
@@ -89,13 +92,13 @@ def send_points(recording: rr.RecordingStream, entity: str, series: Series, star
         recording.send_columns(entity, times, rr.Scalars.columns(scalars=values[part]))
 
 
-def _times(time_secs: FloatArray, start_ns: int) -> list[rr.TimeColumn]:
-    """Return the two timelines: time since the start, and date and time."""
+def _times(time_secs: FloatArray, start_ns: int | None) -> list[rr.TimeColumn]:
+    """Return the two timelines: time since the start, and date and time if the start has one."""
     since = np.round(time_secs * 1e9).astype(np.int64)
-    return [
-        rr.TimeColumn("time", duration=since.astype("m8[ns]")),
-        rr.TimeColumn("stamp", timestamp=(start_ns + since).astype("M8[ns]")),
-    ]
+    times = [rr.TimeColumn("time", duration=since.astype("m8[ns]"))]
+    if start_ns is not None:
+        times.append(rr.TimeColumn("stamp", timestamp=(start_ns + since).astype("M8[ns]")))
+    return times
 
 
 def send_events(
@@ -119,13 +122,20 @@ def send_text(recording: rr.RecordingStream, entity: str, text: str) -> None:
 
 
 def send_chart(
-    recording: rr.RecordingStream, origin: str, chart: TrackChart, start_ns: int
+    recording: rr.RecordingStream,
+    origin: str,
+    chart: TrackChart,
+    start_ns: int | None,
+    colours: tuple[Colour, Colour] = (GREY, CYAN),
 ) -> None:
-    """Send a track with its ships, ends and scale, and the position at each time."""
+    """Send a track with its ships, ends and scale, and the position at each time.
+
+    The colours are those of the track and of the ships.
+    """
     thin, dot = rr.Radius.ui_points(0.8), rr.Radius.ui_points(5.0)
-    track = rr.LineStrips2D([chart.track], colors=[GREY], radii=thin)
+    track = rr.LineStrips2D([chart.track], colors=[colours[0]], radii=thin)
     recording.log(f"{origin}/line", track, static=True)
-    ships = rr.LineStrips2D(chart.ships, colors=[CYAN], radii=thin)
+    ships = rr.LineStrips2D(chart.ships, colors=[colours[1]], radii=thin)
     recording.log(f"{origin}/ships", ships, static=True)
     if chart.simulated is not None:
         simulated = rr.LineStrips2D([chart.simulated], colors=[BLUE], radii=thin)
@@ -143,6 +153,15 @@ def send_chart(
         _times(chart.time_secs, start_ns),
         rr.Points2D.columns(positions=chart.track),
     )
+
+
+def send_map_track(
+    recording: rr.RecordingStream, entity: str, positions: GeographicPositions, colour: Colour
+) -> None:
+    """Send a track for a map view."""
+    points = np.column_stack((positions.latitude, positions.longitude))
+    line = rr.GeoLineStrings(lat_lon=[points], colors=[colour], radii=rr.Radius.ui_points(1.5))
+    recording.log(entity, line, static=True)
 
 
 def plot_view(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesView:
@@ -167,6 +186,18 @@ def chart_view(origin: str, chart: TrackChart) -> rrb.Spatial2DView:
     low, high = chart.bounds
     bounds = rrb.VisualBounds2D(x_range=(low[0], high[0]), y_range=(low[1], high[1]))
     return rrb.Spatial2DView(origin=origin, name=printable(chart.title), visual_bounds=bounds)
+
+
+def events_view() -> rrb.TextLogView:
+    """Return a view of the events that `send_events` sent as ``events``: time, level and text."""
+    columns = rrb.archetypes.TextLogColumns(
+        timeline_columns=[rrb.encodings.TimelineColumn("time")],
+        text_log_columns=[
+            rrb.encodings.TextLogColumn("loglevel"),
+            rrb.encodings.TextLogColumn("body"),
+        ],
+    )
+    return rrb.TextLogView(origin="events", name="events", columns=columns)
 
 
 def make_blueprint(content: rrb.View | rrb.Container) -> rrb.Blueprint:

@@ -21,7 +21,7 @@ from shiplog.mcap.trial_log import build_trial_log
 from shiplog.types import Channel, Event, Log, TrialLog
 from shiplog.units import CATALOGUE, GEOGRAPHIC, display_conversion
 
-from .channel_stats import ChannelStats
+from .channel_stats import ChannelStats, LogStats
 from .data_quality import MAX_IRREGULAR_SHARE
 from .log_content import ChannelInfo, ForeignTopic, LogInfo, RawTopic, ValueRange
 from .log_stats import compute_log_stats
@@ -184,7 +184,30 @@ def _rate(count: MessageCount) -> tuple[float | None, int | None, int | None]:
 def _info_of_log(
     log: Log, foreign: tuple[ForeignTopic, ...], raw: tuple[RawTopic, ...], *, finished: bool
 ) -> LogInfo:
-    stats = compute_log_stats(log)
+    return describe_log(log, compute_log_stats(log), foreign, raw, finished=finished)
+
+
+def describe_log(
+    log: Log,
+    stats: LogStats,
+    foreign: tuple[ForeignTopic, ...] = (),
+    raw: tuple[RawTopic, ...] = (),
+    *,
+    finished: bool = True,
+) -> LogInfo:
+    """Return the content of a log whose statistics are known.
+
+    Parameters
+    ----------
+    log
+        The log; of one in its file, the ranges of components are unknown.
+    stats
+        Its statistics, from `compute_log_stats`.
+    foreign, raw
+        What else its file has.
+    finished
+        Whether the file was written to its end.
+    """
     starts = [channel.span_ns[0] for channel in stats if channel.samples]
     ends = [channel.span_ns[1] for channel in stats if channel.samples]
     if not starts:

@@ -4,13 +4,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from channels import START, channel
 from places import SAMPLE_DATA
-from rerun.chunk import RrdReader
+from rrd_content import static_components, view_titles
 from trial_logs import InChunks
 
 import shiplog
@@ -282,35 +281,19 @@ def analysis(log: TrialLog) -> Analysis:
     return analyse(log)
 
 
-def static(path: Path, component: str) -> dict[str, list[Any]]:
-    """Return a component of each entity that has it, by the entity's path."""
-    found = {}
-    for chunk in RrdReader(path).stream():
-        batch = chunk.to_record_batch()
-        if chunk.is_static and component in batch.schema.names:
-            found[chunk.entity_path] = list(batch[component].to_pylist()[0] or ())
-    return found
-
-
-def titles(path: Path) -> list[str]:
-    reader, name = RrdReader(path), "ViewBlueprint:display_name"
-    batches = (c.to_record_batch() for c in reader.stream(store=reader.blueprints()[0]))
-    return [row[0] for b in batches if name in b.schema.names for row in b[name].to_pylist()]
-
-
 def test_the_review_has_a_view_of_each_further_quantity(
     log: TrialLog, analysis: Analysis, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "trial.rrd"
     write_replay_review(analysis, path, text="", log=log)
-    counts = Counter(titles(path))
+    counts = Counter(view_titles(path))
     for title in ("rudder [deg]", "rpm"):  # as an input of the replay, and with all its sources
         assert counts[title] == 2
     for title in ("heading [deg]", "power [kW]", "bow azimuth [deg]"):
         assert counts[title] == 1
     names = {
         entity: each
-        for entity, each in static(path, "SeriesLines:names").items()
+        for entity, each in static_components(path, "SeriesLines:names").items()
         if entity.startswith("/further/")
     }
     assert names == {
@@ -322,10 +305,10 @@ def test_the_review_has_a_view_of_each_further_quantity(
         "/further/3_power/0_shaft_meter_1": ["shaft meter #1"],
         "/further/4_bow_azimuth/0_unit": ["unit"],
     }
-    modes = static(path, "SeriesLines:interpolation_mode")
+    modes = static_components(path, "SeriesLines:interpolation_mode")
     stepped = {entity for entity, mode in modes.items() if mode == [2]}
     assert stepped == {"/further/0_rudder/1_rudder_order_bridge"}
-    (page,) = static(path, "TextDocument:text")["/summary"]
+    (page,) = static_components(path, "TextDocument:text")["/summary"]
     assert "further channels" in page
     assert capfd.readouterr().err == ""
 
@@ -335,9 +318,9 @@ def test_without_further_channels_the_review_is_one_page(log: TrialLog, tmp_path
     bare = replace(log, channels=few)
     path = tmp_path / "trial.rrd"
     write_replay_review(analyse(bare), path, text="", log=bare)
-    assert not [e for e in static(path, "SeriesLines:names") if e.startswith("/further")]
-    assert len(titles(path)) == 10 + 9
-    (page,) = static(path, "TextDocument:text")["/summary"]
+    assert not [e for e in static_components(path, "SeriesLines:names") if e.startswith("/further")]
+    assert len(view_titles(path)) == 10 + 9
+    (page,) = static_components(path, "TextDocument:text")["/summary"]
     assert "further channels" not in page
 
 

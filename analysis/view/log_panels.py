@@ -1,0 +1,171 @@
+"""The panels of logs that are viewed without a replay, one over the other by elapsed time."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shiplog.checks.event_table import OPERATOR
+from shiplog.types import FloatArray
+
+from .channel_series import Quantity
+from .log_drawing import LogDrawing
+from .panels import Panel, title_of, words
+from .quantity_panel import SOURCE_COLOURS, entity_part, joined_panel, turned_together
+from .series import BLUE, GREEN, GREY, ORANGE, RED, Colour, Line, Series
+
+MAIN_PANELS = ("heading",), ("rudder",), ("yaw_rate",), ("speed", "speed_over_ground"), ("rpm",)
+COLOURS = {"heading": BLUE, "yaw_rate": BLUE, "speed": ORANGE, "speed_over_ground": ORANGE,
+           "rudder": GREEN, "rpm": GREEN}  # fmt: skip
+MAX_OVERLAID_TURN = 180.0  # deg: up to here the rudder can be read over the heading
+REFERENCE_SECS = 10.0  # at the start of a heading, whose median is its reference
+MAX_MARKS = 50  # of people, drawn as vertical lines
+
+
+def log_panels(drawings: Sequence[LogDrawing]) -> tuple[list[Panel], list[Panel]]:
+    """Return the panels of the main quantities, and of all others.
+
+    Where the ship turns by less than `MAX_OVERLAID_TURN`, as in a zig-zag, the rudder is drawn over
+    the heading, which counts from the one at the start. Several logs have a colour each. Gaps are
+    red bars at the foot of a panel, marks of people vertical lines.
+
+    Parameters
+    ----------
+    drawings
+        The logs; the times of each count from its own start.
+    """
+    quantities = list(dict.fromkeys(each for drawing in drawings for each in drawing.series))
+    main = [[q for q in quantities if q.name in names and not q.fields] for names in MAIN_PANELS]
+    others = [[each] for each in quantities if not any(each in group for group in main)]
+    panels = []
+    headings, rudders = main[:2]
+    if headings and rudders and _turn(drawings, headings) < MAX_OVERLAID_TURN:
+        panels.append(_rudder_over_heading(drawings, headings, rudders))
+        main = main[2:]
+    panels += [_panel(drawings, group) for group in main if group]
+    if len(drawings) > 1:  # the first legend serves all
+        panels = [replace(panel, legend=panel is panels[0]) for panel in panels]
+    return panels, [_panel(drawings, group) for group in others]
+
+
+def _turn(drawings: Sequence[LogDrawing], headings: Sequence[Quantity]) -> float:
+    """Return the largest range of a heading, deg."""
+    turns = [
+        float(np.nanmax(series.lines[0].values) - np.nanmin(series.lines[0].values))
+        for drawing in drawings
+        for quantity in headings
+        for series in drawing.series.get(quantity, ())
+    ]
+    return max(turns, default=0.0)
+
+
+def _rudder_over_heading(
+    drawings: Sequence[LogDrawing], headings: Sequence[Quantity], rudders: Sequence[Quantity]
+) -> Panel:
+    """Return the panel of the rudder over the heading, which counts from the one at the start."""
+    relative, starts = [], []
+    for drawing in drawings:
+        changed = dict(drawing.series)
+        for quantity in headings:
+            group = turned_together(changed.get(quantity, []), quantity.turn)
+            if group:
+                starts.append(_heading_at_start(group[0]))
+                changed[quantity] = [_lowered(each, starts[-1]) for each in group]
+        relative.append(replace(drawing, series=changed))
+    start = f"{starts[0] % 360:.1f}°" if len(starts) == 1 else "that at the start"
+    panel = _panel(relative, [*headings, *rudders])
+    turned, steered = (
+        _range_text(
+            [each for drawing in relative for q in part for each in drawing.series.get(q, [])]
+        )
+        for part in (headings, rudders)
+    )
+    return replace(panel, title=f"heading from {start}: {turned}; rudder: {steered} [deg]")
+
+
+def _heading_at_start(series: Series) -> float:
+    """Return the median of a heading at its start, deg."""
+    values = series.lines[0].values
+    times = series.time_secs[np.isfinite(values)]
+    return float(np.median(values[np.isfinite(values)][times <= times[0] + REFERENCE_SECS]))
+
+
+def _lowered(series: Series, by: float) -> Series:
+    (line,) = series.lines
+    return replace(series, lines=(replace(line, values=line.values - by),))
+
+
+def _panel(drawings: Sequence[LogDrawing], quantities: Sequence[Quantity]) -> Panel:
+    """Return the panel of quantities that share a unit, of all logs."""
+    drawn: list[Series] = []
+    colours: list[Colour] = []
+    first = quantities[0]
+    for number, drawing in enumerate(drawings):
+        for quantity in quantities:
+            group = turned_together(drawing.series.get(quantity, []), quantity.turn)
+            parts = [drawing.name] if len(drawings) > 1 else []
+            parts += [words(quantity.name)] if len(quantities) > 1 else []
+            for each in group:
+                label = ", ".join(parts if parts and len(group) == 1 else [*parts, each.name])
+                drawn.append(
+                    _labelled(each, label, is_thin=len(drawings) > 1 and quantity is not first)
+                )
+                colours += [SOURCE_COLOURS[number % len(SOURCE_COLOURS)]] * len(each.lines)
+    if len(drawings) == 1:
+        alone: tuple[Colour, ...] = (COLOURS.get(first.name, GREY),)
+        colours = list(alone if len(colours) == 1 else SOURCE_COLOURS)
+    title = title_of(" and ".join(words(each.name) for each in quantities), first.display[0])
+    title = f"{title}: {_range_text(drawn)}"
+    name = f"channels_{entity_part(first.name)}_{'_'.join(map(entity_part, first.fields))}"
+    panel = joined_panel(name.rstrip("_"), title, drawn, colours)
+    return _marked(panel, drawings, quantities)
+
+
+def _labelled(series: Series, label: str, *, is_thin: bool) -> Series:
+    """Return a series with another name and another width of its lines."""
+    width = 0.8 if is_thin else 1.5
+    lines = (
+        replace(line, name=label + line.name.removeprefix(series.name), width=width)
+        for line in series.lines
+    )
+    return replace(series, lines=tuple(lines))
+
+
+def _range_text(drawn: Sequence[Series]) -> str:
+    """Return the lowest and the highest value in words.
+
+    An axis has grid lines at powers of ten only, without a number where they are close.
+    """
+    values = np.concatenate([line.values for series in drawn for line in series.lines])
+    lowest, highest = (f"{end(values):.4g}" for end in (np.nanmin, np.nanmax))
+    return lowest if lowest == highest else f"{lowest} to {highest}"
+
+
+def _marked(panel: Panel, drawings: Sequence[LogDrawing], quantities: Sequence[Quantity]) -> Panel:
+    """Return the panel with its gaps as bars at its foot, and the marks of people."""
+    gaps = np.concatenate([
+        drawing.gaps.get(each, np.zeros((0, 2))) for drawing in drawings for each in quantities
+    ])  # fmt: skip
+    marks = [
+        (event.time_ns - drawing.start_ns) * 1e-9
+        for drawing in drawings
+        for event in drawing.events
+        if event.source == OPERATOR
+    ][:MAX_MARKS]
+    low, high = panel.limits
+    series = list(panel.series)
+    if marks:
+        spans = np.column_stack((marks, marks))
+        lines = _strokes("00_marks", spans, (low, high), Line("mark", np.zeros(0), GREY, 0.8))
+        series.insert(0, lines)
+    if len(gaps):
+        series.append(_strokes("gaps", gaps, (low, low), Line("gap", np.zeros(0), RED, 5.0)))
+    return replace(panel, series=tuple(series))
+
+
+def _strokes(name: str, spans: FloatArray, levels: tuple[float, float], line: Line) -> Series:
+    """Return strokes from the first to the second of each of `spans`, (g, 2) s, at two levels."""
+    spans = spans[np.argsort(spans[:, 0])]
+    times = np.column_stack((spans, spans[:, 1])).ravel()
+    values = np.tile([*levels, np.nan], len(spans))
+    return Series(name, times, (replace(line, values=values),))
