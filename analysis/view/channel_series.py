@@ -19,7 +19,7 @@ NOT_DRAWN = "position", "gnss_time"  # the track, and a clock
 
 
 @dataclass(frozen=True)
-class Quantity:
+class DrawnQuantity:
     """What the channels of a panel have in common.
 
     Attributes
@@ -78,7 +78,7 @@ class ChannelSeries:
         self,
         channel: ChannelStats,
         span: tuple[int, float],
-        quantity: Quantity,
+        quantity: DrawnQuantity,
         label: str,
         *,
         full: bool,
@@ -162,7 +162,7 @@ class _Unwrap:
 
 def channels_by_quantity(
     stats: LogStats, display_units: Mapping[str, str] | None = None
-) -> dict[Quantity, list[ChannelStats]]:
+) -> dict[DrawnQuantity, list[ChannelStats]]:
     """Return the channels of a log that have a value, by quantity, in the order of the catalogue.
 
     An order is among the channels of what it commands, if that is in the log. Positions are not
@@ -175,7 +175,7 @@ def channels_by_quantity(
     display_units
         The unit in which a quantity is drawn, by its name, where it is not the usual one.
     """
-    groups: dict[Quantity, list[ChannelStats]] = {}
+    groups: dict[DrawnQuantity, list[ChannelStats]] = {}
     for channel in stats:
         if channel.valid and channel.name not in NOT_DRAWN:
             quantity = _quantity(channel, stats, display_units or {})
@@ -187,15 +187,17 @@ def channels_by_quantity(
     }
 
 
-def _quantity(channel: ChannelStats, stats: LogStats, display_units: Mapping[str, str]) -> Quantity:
+def _quantity(
+    channel: ChannelStats, stats: LogStats, display_units: Mapping[str, str]
+) -> DrawnQuantity:
     """Return the quantity of a channel; of an order, what it commands if that is in the log."""
     commanded = channel.name.removesuffix(ORDER_SUFFIX)
     other = stats.get(commanded)
     name = commanded if other is not None and other.unit == channel.unit else channel.name
-    return Quantity(name, channel.unit, channel.fields, display_units.get(name, ""))
+    return DrawnQuantity(name, channel.unit, channel.fields, display_units.get(name, ""))
 
 
-def channel_label(channel: ChannelStats, quantity: Quantity) -> str:
+def channel_label(channel: ChannelStats, quantity: DrawnQuantity) -> str:
     """Return the source of a channel, with its name where that is not the one of its panel."""
     if channel.name == quantity.name:
         return channel.source

@@ -10,7 +10,7 @@ from shiplog.resampling import Clock
 from shiplog.screening import Screening
 from shiplog.types import Channel
 
-from .channel_series import ChannelSeries, Quantity, channel_label, channels_by_quantity
+from .channel_series import ChannelSeries, DrawnQuantity, channel_label, channels_by_quantity
 from .panels import Panel
 from .quantity_panel import has_values, quantity_panel
 
@@ -65,7 +65,7 @@ class FurtherChannels:
         return panels
 
 
-def _label(channel: ChannelStats, quantity: Quantity, screening: Screening) -> str:
+def _label(channel: ChannelStats, quantity: DrawnQuantity, screening: Screening) -> str:
     """Return the label of a channel, which marks the source that the replay uses."""
     label = channel_label(channel, quantity)
     return f"{label} (used)" if screening.sources.get(channel.name) == channel.source else label

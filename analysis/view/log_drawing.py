@@ -12,7 +12,7 @@ from shiplog.errors import LogError
 from shiplog.geodesy import LocalFrame
 from shiplog.types import Channel, Event, EventLevel, FloatArray, Log
 
-from .channel_series import ChannelSeries, Quantity, channel_label, channels_by_quantity
+from .channel_series import ChannelSeries, DrawnQuantity, channel_label, channels_by_quantity
 from .decimation import Decimator, bucket_size
 from .quantity_panel import has_values
 from .series import GREY, Line, Series
@@ -47,8 +47,8 @@ class LogDrawing:
 
     name: str
     stats: LogStats
-    series: dict[Quantity, list[Series]]
-    gaps: dict[Quantity, FloatArray]
+    series: dict[DrawnQuantity, list[Series]]
+    gaps: dict[DrawnQuantity, FloatArray]
     track: Series | None
     frame: LocalFrame | None
     events: tuple[Event, ...]

@@ -8,7 +8,7 @@ import numpy as np
 from shiplog.checks.event_table import OPERATOR
 from shiplog.types import FloatArray
 
-from .channel_series import Quantity
+from .channel_series import DrawnQuantity
 from .log_drawing import LogDrawing
 from .panels import Panel, title_of, words
 from .quantity_panel import SOURCE_COLOURS, entity_part, joined_panel, turned_together
@@ -48,7 +48,7 @@ def log_panels(drawings: Sequence[LogDrawing]) -> tuple[list[Panel], list[Panel]
     return panels, [_panel(drawings, group) for group in others]
 
 
-def _turn(drawings: Sequence[LogDrawing], headings: Sequence[Quantity]) -> float:
+def _turn(drawings: Sequence[LogDrawing], headings: Sequence[DrawnQuantity]) -> float:
     """Return the largest range of a heading, deg."""
     turns = [
         float(np.nanmax(series.lines[0].values) - np.nanmin(series.lines[0].values))
@@ -60,7 +60,9 @@ def _turn(drawings: Sequence[LogDrawing], headings: Sequence[Quantity]) -> float
 
 
 def _rudder_over_heading(
-    drawings: Sequence[LogDrawing], headings: Sequence[Quantity], rudders: Sequence[Quantity]
+    drawings: Sequence[LogDrawing],
+    headings: Sequence[DrawnQuantity],
+    rudders: Sequence[DrawnQuantity],
 ) -> Panel:
     """Return the panel of the rudder over the heading, which counts from the one at the start."""
     relative, starts = [], []
@@ -95,7 +97,7 @@ def _lowered(series: Series, by: float) -> Series:
     return replace(series, lines=(replace(line, values=line.values - by),))
 
 
-def _panel(drawings: Sequence[LogDrawing], quantities: Sequence[Quantity]) -> Panel:
+def _panel(drawings: Sequence[LogDrawing], quantities: Sequence[DrawnQuantity]) -> Panel:
     """Return the panel of quantities that share a unit, of all logs."""
     drawn: list[Series] = []
     colours: list[Colour] = []
@@ -141,7 +143,9 @@ def _range_text(drawn: Sequence[Series]) -> str:
     return lowest if lowest == highest else f"{lowest} to {highest}"
 
 
-def _marked(panel: Panel, drawings: Sequence[LogDrawing], quantities: Sequence[Quantity]) -> Panel:
+def _marked(
+    panel: Panel, drawings: Sequence[LogDrawing], quantities: Sequence[DrawnQuantity]
+) -> Panel:
     """Return the panel with its gaps as bars at its foot, and the marks of people."""
     gaps = np.concatenate([
         drawing.gaps.get(each, np.zeros((0, 2))) for drawing in drawings for each in quantities

@@ -7,7 +7,7 @@ from itertools import cycle
 
 import numpy as np
 
-from .channel_series import Quantity
+from .channel_series import DrawnQuantity
 from .panels import Panel, limits, title_of
 from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Colour, Series
 
@@ -15,7 +15,7 @@ SOURCE_COLOURS = BLUE, ORANGE, GREEN, RED, CYAN, GREY
 LEGEND_SHARE = 0.15  # of an axis, above the values, for each name in the legend
 
 
-def quantity_panel(name: str, quantity: Quantity, drawn: list[Series]) -> Panel:
+def quantity_panel(name: str, quantity: DrawnQuantity, drawn: list[Series]) -> Panel:
     """Return the panel of a quantity, with a colour for each of several lines, and a legend.
 
     Parameters
