@@ -100,7 +100,6 @@ class Printed:
 def printed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Printed:
-    pytest.importorskip("matplotlib", reason="the examples' pictures need matplotlib")
     return Printed(tmp_path / "figures", monkeypatch, capsys)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.replay.replay_results import Findings
 from analysis.replay.residuals import MIN_CORRELATION, SIGNIFICANCE, ResidualSummary
+from shiplog.checks.channel_stats import LogStats
 from shiplog.checks.event_table import event_table
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.text_table import TextTable
@@ -30,13 +31,20 @@ def replay_tables(findings: Findings) -> tuple[TextTable, ...]:
         the trial and the events, where there are any.
     """
     return (
-        _log_table(findings),
+        log_table(findings.plan.log_stats),
+        *finding_tables(findings),
+        *_event_tables(findings),
+    )
+
+
+def finding_tables(findings: Findings) -> tuple[TextTable, ...]:
+    """Return what a replay estimates as tables, without those of the log itself."""
+    return (
         _residual_table(findings),
         *further_tables(findings),
         _disturbance_table(findings),
         _coefficient_table(findings),
         *_change_tables(findings),
-        *_event_tables(findings),
     )
 
 
@@ -52,8 +60,9 @@ def _event_tables(findings: Findings) -> tuple[TextTable, ...]:
     return (event_table(findings.events, findings.plan.log_stats.span_ns[0]),)
 
 
-def _log_table(findings: Findings) -> TextTable:
-    log_stats, rows = findings.plan.log_stats, []
+def log_table(log_stats: LogStats) -> TextTable:
+    """Return the channels of a log with their rates and gaps."""
+    rows = []
     for channel in log_stats:
         rate = f"{1 / channel.interval_secs:.3g} Hz" if channel.interval_secs else ""
         gaps = "held" if channel.hold else "none"

@@ -1,0 +1,148 @@
+"""The section of each manoeuvre: facts, figures, indices against limits, and what they rest on."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from math import degrees, isfinite, pi
+
+from analysis.manoeuvres.sailed_manoeuvre import NotComputed, SailedManoeuvre
+from analysis.trial.trial_analysis import TrialAnalysis
+from shiplog.text_table import TextTable
+from shiplog.units import UNITS
+
+from .manoeuvre_histories import history_figure, spiral_figure
+from .manoeuvre_track import track_figure
+from .numbering import ManoeuvrePlace
+from .svg_figure import PageFigure
+from .value_text import number_text, value_text, with_unit
+from .verdict_rows import VerdictRow, index_row
+
+KNOT = UNITS["kn"][1]  # m/s
+
+
+@dataclass(frozen=True, eq=False)
+class ManoeuvreSection:
+    """A section of the page.
+
+    Attributes
+    ----------
+    place
+        The manoeuvre with its number and anchor.
+    facts
+        Labels and texts.
+    figures
+        Time histories, track, spiral curve: those for which there are data.
+    rows
+        The indices.
+    sensitivity, uncertainty
+        The indices by other start rules, and the standard uncertainty by source; None without any.
+    not_computed, notes
+        What could not be computed, and what was assumed.
+    """
+
+    place: ManoeuvrePlace
+    facts: tuple[tuple[str, str], ...]
+    figures: tuple[PageFigure, ...]
+    rows: tuple[VerdictRow, ...]
+    sensitivity: TextTable | None
+    uncertainty: TextTable | None
+    not_computed: tuple[NotComputed, ...]
+    notes: tuple[str, ...]
+
+
+def manoeuvre_section(place: ManoeuvrePlace, trial: TrialAnalysis) -> ManoeuvreSection:
+    """Return the section of one manoeuvre of a log."""
+    manoeuvre, length = place.manoeuvre, trial.conditions.length
+    figures = (
+        history_figure(manoeuvre, f"{place.anchor}-histories"),
+        track_figure(manoeuvre, length, f"{place.anchor}-track"),
+        spiral_figure(manoeuvre, f"{place.anchor}-spiral"),
+    )
+    return ManoeuvreSection(
+        place,
+        _facts(manoeuvre, trial),
+        tuple(figure for figure in figures if figure is not None),
+        tuple(index_row(index) for index in manoeuvre.indices),
+        _sensitivity_table(manoeuvre),
+        _uncertainty_table(manoeuvre),
+        manoeuvre.not_computed,
+        manoeuvre.notes,
+    )
+
+
+def time_text(start_ns: int, secs: float) -> str:
+    """Write the time of day, UTC, of an instant of a log; the seconds alone before 1980.
+
+    Examples
+    --------
+    >>> time_text(1_700_000_000_000_000_000, 61.0)
+    '2023-11-14 22:14:21 UTC'
+    """
+    if start_ns < YEAR_1980_NS or not isfinite(secs):
+        return f"{secs:.1f} s from the log's start" if isfinite(secs) else ""
+    return f"{datetime.fromtimestamp(start_ns * 1e-9 + secs, UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+YEAR_1980_NS = 315_532_800_000_000_000  # a log that begins before has no time of day
+
+
+def _facts(manoeuvre: SailedManoeuvre, trial: TrialAnalysis) -> tuple[tuple[str, str], ...]:
+    """Return the approach and the execute in words, those that are known."""
+    facts = (
+        ("Log", trial.name),
+        ("Execute", time_text(trial.start_ns, manoeuvre.execute_secs)),
+        ("Start rule", manoeuvre.start_rule),
+        (
+            "Duration",
+            _text(manoeuvre.end_secs - manoeuvre.execute_secs, "{:.0f} s from the execute"),
+        ),
+        ("Rudder ordered", _angle_text(manoeuvre.rudder)),
+        ("Neutral rudder", _angle_text(manoeuvre.neutral_rudder, 2)),
+        ("Approach heading", _angle_text(manoeuvre.approach_heading % (2 * pi))),
+        ("Approach speed", _text(manoeuvre.approach_speed / KNOT, "{:.2f} kn")),
+        ("Approach yaw rate", _text(degrees(manoeuvre.approach_yaw_rate), "{:.3f} °/s")),
+        ("Approach revolutions", _text(manoeuvre.approach_rpm, "{:.1f} rpm")),
+    )
+    return tuple((label, text) for label, text in facts if text)
+
+
+def _angle_text(angle: float, digits: int = 1) -> str:
+    return _text(degrees(angle), f"{{:.{digits}f}}°")
+
+
+def _text(value: float, template: str) -> str:
+    return template.format(value) if isfinite(value) else ""
+
+
+def _sensitivity_table(manoeuvre: SailedManoeuvre) -> TextTable | None:
+    """Return the indices by each start rule; None where no other rule applies."""
+    rules = list(dict.fromkeys(rule for each in manoeuvre.indices for rule in each.start_rules))
+    if not rules:
+        return None
+    rows = []
+    for index in manoeuvre.indices:
+        if not index.start_rules:
+            continue
+        factor, unit = index.display_factor, index.display_unit
+        values = [
+            with_unit(number_text(value * factor, index.std * factor), unit)
+            for value in (index.start_rules.get(rule, float("nan")) for rule in rules)
+        ]
+        rows.append((index.name, value_text(index), *values))
+    columns = ("index", f"as reported:\n{manoeuvre.start_rule}", *rules)
+    return TextTable("Sensitivity to the start rule", columns, tuple(rows))
+
+
+def _uncertainty_table(manoeuvre: SailedManoeuvre) -> TextTable | None:
+    """Return the standard uncertainty of each index by its source; None without any."""
+    sources = list(dict.fromkeys(name for each in manoeuvre.indices for name in each.sources))
+    if not sources:
+        return None
+    rows = []
+    for index in manoeuvre.indices:
+        factor, unit = index.display_factor, index.display_unit
+        stds = [index.std, *(index.sources.get(name, float("nan")) for name in sources)]
+        cells = [with_unit(number_text(std * factor, std * factor), unit) for std in stds]
+        rows.append((index.name, *cells))
+    return TextTable(
+        "Standard uncertainty by source", ("index", "all sources", *sources), tuple(rows)
+    )

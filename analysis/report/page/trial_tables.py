@@ -1,0 +1,51 @@
+"""The verdict of a report as tables for the terminal."""
+
+from shiplog.text_table import TextTable
+
+from .numbering import manoeuvre_places
+from .trial_report import TrialReport
+from .verdict_rows import verdict_rows
+
+
+def trial_tables(report: TrialReport) -> tuple[TextTable, ...]:
+    """Return the verdict on each criterion, and the manoeuvres with what was not computed.
+
+    Parameters
+    ----------
+    report
+        The result of `report_trials`.
+    """
+    places = manoeuvre_places(report)
+    rows = tuple(
+        (
+            row.name,
+            f"{row.value} ({row.lengths})" if row.lengths else row.value,
+            row.interval,
+            row.limit,
+            row.probability,
+            row.verdict,
+            row.place.title if row.place else row.note,
+        )
+        for row in verdict_rows(report, places)
+    )
+    columns = ("criterion", "measured", "95 % interval", "limit", "p(met)", "verdict", "manoeuvre")
+    verdicts = TextTable("Verdict, IMO MSC.137(76)", columns, rows, has_prose=True)
+    return verdicts, *_not_computed_table(report)
+
+
+def _not_computed_table(report: TrialReport) -> tuple[TextTable, ...]:
+    """Return what could not be computed, with the reasons; no table where there is nothing."""
+    rows = [
+        (f"{log.trial.name}: {each.subject}", each.reason)
+        for log in report.logs
+        for each in log.trial.not_computed
+    ]
+    rows += [
+        (f"{place.title}: {each.subject}", each.reason)
+        for of_log in manoeuvre_places(report)
+        for place in of_log
+        for each in place.manoeuvre.not_computed
+    ]
+    if not rows:
+        return ()
+    return (TextTable("Not computed", ("subject", "reason"), tuple(rows), has_prose=True),)
