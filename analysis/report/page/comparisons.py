@@ -32,7 +32,7 @@ PANEL_INCHES = 1.05
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class ManoeuvreComparison:
     """Manoeuvres that can be compared, as a section of the page.
 
     Attributes
@@ -61,7 +61,9 @@ PANELS: tuple[Panel, ...] = (
 )
 
 
-def comparisons_of(places: Sequence[ManoeuvrePlace], length: float) -> tuple[Comparison, ...]:
+def comparisons_of(
+    places: Sequence[ManoeuvrePlace], length: float
+) -> tuple[ManoeuvreComparison, ...]:
     """Compare all manoeuvres of the same kind, rudder angle and switch heading.
 
     Those to port are mirrored, so that a symmetric ship would give one curve.
@@ -93,7 +95,7 @@ def _likeness(place: ManoeuvrePlace) -> tuple[str, float, float]:
     return str(manoeuvre.kind), rudder, switch
 
 
-def _comparison(group: Sequence[ManoeuvrePlace], length: float, anchor: str) -> Comparison:
+def _comparison(group: Sequence[ManoeuvrePlace], length: float, anchor: str) -> ManoeuvreComparison:
     kind, rudder, switch = _likeness(group[0])
     angles = f" {rudder}°" if rudder >= 0 else ""
     angles += f"/{switch}°" if switch >= 0 else ""
@@ -103,7 +105,7 @@ def _comparison(group: Sequence[ManoeuvrePlace], length: float, anchor: str) -> 
         _track_figure(group, length, f"{anchor}-tracks", title),
     )
     shown = tuple(figure for figure in figures if figure is not None)
-    return Comparison(anchor, title, shown, _index_table(group, title))
+    return ManoeuvreComparison(anchor, title, shown, _index_table(group, title))
 
 
 def _label(place: ManoeuvrePlace) -> str:

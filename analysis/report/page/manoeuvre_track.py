@@ -46,7 +46,7 @@ class TrackAxes:
         self.axes.plot(*((ahead, starboard) if self.lies else (starboard, ahead)), **style)  # type: ignore[arg-type]
 
 
-def is_long(extent: FloatArray) -> bool:
+def is_drawn_lying(extent: FloatArray) -> bool:
     """Whether a track, (2,) ahead and to starboard, m, is drawn with ahead to the right."""
     return bool(extent[0] > extent[1] * 1.5)
 
@@ -106,13 +106,13 @@ def track_limits(track: FloatArray) -> tuple[FloatArray, FloatArray]:
 def chart_inches(low: FloatArray, high: FloatArray) -> float:
     """Return the height of the axes in which a track fills the width of the page."""
     extent = high - low
-    share = extent[1] / extent[0] if is_long(extent) else extent[0] / extent[1]
+    share = extent[1] / extent[0] if is_drawn_lying(extent) else extent[0] / extent[1]
     return float(np.clip(CHART_INCHES * share, *HEIGHTS_INCHES))
 
 
 def prepare_chart(axes: Axes, low: FloatArray, high: FloatArray) -> TrackAxes:
     """Set scales, limits and labels of the axes of a track."""
-    chart = TrackAxes(axes, is_long(high - low))
+    chart = TrackAxes(axes, is_drawn_lying(high - low))
     axes.set_aspect("equal", adjustable="box")
     (left, bottom), (right, top) = chart.place(*low), chart.place(*high)
     axes.set_xlim(left, right)
