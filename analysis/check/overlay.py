@@ -6,9 +6,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from analysis.view.rerun_io import WHOLE_RUN
-from shiplog import ShiplogError
-from shiplog.files import atomic_write
+from analysis.view.rerun_io import WHOLE_RUN, save_recording
 from shiplog.printable import printable
 from shiplog.types import FloatArray, TimeArray
 
@@ -25,12 +23,9 @@ def write_overlay(comparison: Comparison, path: str | os.PathLike[str]) -> None:
     ShiplogError
         Where `path` cannot be written to.
     """
-    with atomic_write(path) as part:
-        recording = rr.RecordingStream("shiplog check", recording_id=comparison.name)
-        try:
-            recording.save(part, default_blueprint=_blueprint(comparison))
-        except RuntimeError as error:  # raised by Rerun where the disk is full
-            raise ShiplogError(f"cannot write the overlay; is the disk full? {path}") from error
+    recording = rr.RecordingStream("shiplog check", recording_id=comparison.name)
+    with save_recording(recording, path):
+        rr.send_blueprint(_blueprint(comparison), recording=recording)
         for difference in comparison.changed:
             for label, log, colour, width in (
                 ("reference", comparison.reference, (150, 150, 150), 3.0),
@@ -42,8 +37,6 @@ def write_overlay(comparison: Comparison, path: str | os.PathLike[str]) -> None:
                     style = rr.SeriesLines(names=label, colors=colour, widths=width)
                     recording.log(entity, style, static=True)
                     _send(recording, entity, channel.measured_ns, channel.values)
-        recording.flush()
-        recording.disconnect()
 
 
 def _send(

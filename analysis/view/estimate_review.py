@@ -114,7 +114,6 @@ class EstimateReview:
                 entity = f"{panel.name}/{each.name}"
                 send_style(self._recording, entity, each)
                 send_points(self._recording, entity, each, self._plan.clock.start_ns)
-        self._recording.flush()
 
     def _add(self, entity: str, series: Series) -> None:
         if entity not in self._series:

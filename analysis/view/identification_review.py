@@ -66,7 +66,6 @@ def write_identification_review(ship: IdentifiedShip, path: str | os.PathLike[st
             _send(recording, panels, sheet.start_ns)
             if sheet.track is not None:
                 send_chart(recording, _track_origin(i), sheet.track, sheet.start_ns)
-        recording.flush()
 
 
 def _recording(ship: IdentifiedShip) -> rr.RecordingStream:

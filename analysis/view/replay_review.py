@@ -119,7 +119,6 @@ class ReplayReview:
             send_chart(recording, "track", chart, start_ns)
         if events:
             send_events(recording, "events", events, start_ns)
-        recording.flush()
 
 
 @contextmanager

@@ -13,11 +13,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from shiplog.errors import ShiplogError
-from shiplog.files import atomic_write, is_device
+from shiplog.files import atomic_write, is_device, write_error
 from shiplog.geodesy import GeographicPositions
 from shiplog.printable import printable
 from shiplog.types import Event, EventLevel, FloatArray
 
+from .file_pipe import pipe_to_file
 from .panels import Panel
 from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Colour, Series
 from .track_chart import TrackChart
@@ -45,12 +46,16 @@ def save_recording(recording: rr.RecordingStream, path: str | os.PathLike[str]) 
     """
     with atomic_write(path) as part:
         try:
-            recording.save(part)
-            yield
-        except RuntimeError as error:  # raised by Rerun where the disk is full
+            with pipe_to_file(part) as pipe:
+                try:
+                    recording.save(pipe)
+                    yield
+                finally:
+                    recording.disconnect()
+        except OSError as error:
+            raise write_error(Path(path), error) from error
+        except RuntimeError as error:  # raised by Rerun
             raise _unfinished(path) from error
-        finally:
-            recording.disconnect()
         if not _is_complete(part):  # Rerun raises nothing where its last write has failed
             raise _unfinished(path)
 
