@@ -78,12 +78,28 @@ def _configure_convert(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "source", metavar="FROM", type=Path, help="a log, a table, or MCAP of another program"
     )
-    parser.add_argument("target", metavar="TO", type=Path, help=".mcap, .csv or .parquet")
+    parser.add_argument(
+        "target",
+        metavar="TO",
+        type=Path,
+        help=".mcap, .csv, .parquet, or of the track .kml or .gpx",
+    )
     parser.add_argument(
         "--layout",
         type=Path,
         help="the columns of a foreign table, or the topics and fields of a foreign MCAP file: "
         "TOML (docs/tables.md, docs/foreign_mcap.md)",
+    )
+    parser.add_argument(
+        "--wide",
+        action="store_true",
+        help="a .csv with one row per instant of a uniform clock and one column per quantity",
+    )
+    parser.add_argument(
+        "--units",
+        choices=("si", "people"),
+        help="a .csv for other programs, in SI units and radians, or in the units that people use, "
+        "such as deg and kn; without this and --wide a .csv keeps the whole log",
     )
     add_cut_options(parser)
     add_derive_option(parser)
@@ -97,7 +113,11 @@ def _configure_convert(parser: argparse.ArgumentParser) -> None:
 def _convert(arguments: argparse.Namespace) -> ExitCode:
     require_outputs(arguments.target)
     from shiplog.tables.convert import convert
+    from shiplog.tables.plain_csv import CsvShape
 
+    shape = None
+    if arguments.wide or arguments.units:
+        shape = CsvShape(arguments.wide, display_units=arguments.units == "people")
     with progress() as on_progress:
         on_progress(f"{arguments.source.name} to {arguments.target.name}")
         log, warnings = convert(
@@ -108,6 +128,7 @@ def _convert(arguments: argparse.Namespace) -> ExitCode:
             end=arguments.end,
             strict=arguments.strict,
             derive=arguments.derive,
+            shape=shape,
         )
     print_warnings(warnings)
     samples = sum(len(channel) for channel in log.channels)
@@ -133,6 +154,8 @@ CONVERT = Verb(
         "shiplog convert run.dat run.mcap --layout my_tank.toml",
         "shiplog convert bag.mcap trial.mcap --layout ros.toml   (messages of ROS 2, ...)",
         "shiplog convert trial.mcap trial.csv",
+        "shiplog convert trial.mcap table.csv --wide --units people   (for a spreadsheet)",
+        "shiplog convert trial.mcap track.kml   (or .gpx)",
         "shiplog convert day.mcap zigzag.mcap --from 12:04:30 --to 12:21   (a part of it)",
         "shiplog convert trial.mcap.part trial.mcap   (a recording that was cut short)",
     ),

@@ -1,5 +1,6 @@
 """Reading of any log: of shiplog as MCAP, CSV or Parquet, or of another program by a layout."""
 
+from codecs import BOM_UTF8
 from pathlib import Path
 
 from shiplog.errors import LogError, UsageError
@@ -15,6 +16,7 @@ from shiplog.types import TrialLog
 from .csv_form import CSV_MARK, read_csv
 from .foreign import read_table
 from .parquet_form import read_parquet
+from .plain_csv import LONG_COLUMNS
 
 SUFFIXES = (".mcap", ".csv", ".parquet")
 
@@ -100,17 +102,33 @@ def _read_table(source: Path, layout: Path | None) -> TrialLog:
         raise LogError(f"no such file: {source}")
     if source.is_dir():
         raise LogError(f"a folder, not a log; name one file in it: {source}")
+    if _is_plain_long_csv(source):
+        raise UsageError(
+            "a long CSV for other programs, from which no log can be read; read the log that it "
+            f"was converted from, or convert that without --units: {source}"
+        )
     raise UsageError(
-        f"a foreign table; describe its columns with --layout LAYOUT.toml "
+        f"a foreign table; describe its columns with --layout LAYOUT.toml, which `shiplog layout` "
+        f"drafts "
         f"(without a layout, {', '.join(SUFFIXES)} of shiplog can be read): {source}"
     )
 
 
 def _is_shiplog_csv(path: Path) -> bool:
     """Whether a file begins like a CSV of shiplog, of any version."""
-    mark = CSV_MARK.rpartition(" ")[0].encode()
+    return _begins_with(path, CSV_MARK.rpartition(" ")[0])
+
+
+def _is_plain_long_csv(path: Path) -> bool:
+    """Whether a file begins like a long CSV for other programs, which no layout describes."""
+    return _begins_with(path, ",".join(LONG_COLUMNS))
+
+
+def _begins_with(path: Path, text: str) -> bool:
+    mark = text.encode()
     try:
         with path.open("rb") as stream:
-            return stream.read(len(mark) + 3).removeprefix(b"\xef\xbb\xbf").startswith(mark)
+            begin = stream.read(len(mark) + len(BOM_UTF8))
     except OSError:
         return False
+    return begin.removeprefix(BOM_UTF8).startswith(mark)

@@ -23,6 +23,10 @@ from shiplog.types.time_cut import resolve_cut
 from .any_log import SUFFIXES, is_mcap_log, read_any_log
 from .csv_form import write_csv
 from .parquet_form import write_parquet
+from .plain_csv import CsvShape, write_plain_csv
+from .track_files import write_track
+
+TRACK_SUFFIXES = (".kml", ".gpx")
 
 
 def convert(
@@ -34,6 +38,7 @@ def convert(
     end: float | str | None = None,
     strict: bool = False,
     derive: Sequence[str] = (),
+    shape: CsvShape | None = None,
 ) -> tuple[TrialLog, list[str]]:
     """Convert a file to another format.
 
@@ -42,7 +47,8 @@ def convert(
     source
         A log (`.mcap`), a table that shiplog wrote (`.csv`, `.parquet`), or a foreign table.
     target
-        File to write, in the format of its suffix: one of `SUFFIXES`. From MCAP to MCAP each
+        File to write, in the format of its suffix: one of `SUFFIXES`, or of `TRACK_SUFFIXES` for
+        the track alone. From MCAP to MCAP each
         channel is sorted by measured time; attachments and metadata records of other programs are
         kept, and their topics too unless a layout states what is converted.
     layout
@@ -53,6 +59,8 @@ def convert(
         Refuse a foreign file whose channels contradict each other in unit or sign.
     derive
         The channels to add that the log lacks, some of ``yaw_rate`` and ``speed``.
+    shape
+        The shape of a CSV for other programs; by default a CSV keeps the whole log.
 
     Returns
     -------
@@ -68,16 +76,11 @@ def convert(
     LogError, LayoutError
         The source cannot be read, or has no samples; then no file is written.
     """
-    if target.suffix.lower() not in SUFFIXES:
-        raise UsageError(
-            f"cannot write {target.suffix or 'a file without suffix'!r}; "
-            f"possible are {', '.join(SUFFIXES)}: {target}"
-        )
-    if source.resolve() == target.resolve():
-        raise UsageError(f"source and target are the same file; name another target: {target}")
+    _check_target(source, target, shape)
+    suffix = target.suffix.lower()
     is_mcap = is_mcap_log(source)
     log, mixed = read_any_log(source, layout)
-    is_copy = is_mcap and layout is None and target.suffix.lower() == ".mcap"
+    is_copy = is_mcap and layout is None and suffix == ".mcap"
     if not (is_copy and any(raw_groups(source))):  # a recording of raw packets alone is kept
         _require_samples(log, source)
     whole = log
@@ -96,13 +99,32 @@ def convert(
         if strict:
             refuse_contradictions(findings)
         warnings += [finding.text for finding in findings]
-    if target.suffix.lower() == ".mcap":
+    if suffix == ".mcap":
         write(log, target, _kept_within(source, whole, start, end, layout) if is_mcap else ())
         return log, [each for each in warnings if not concerns_kept(each, with_topics=not layout)]
+    if suffix in TRACK_SUFFIXES:
+        warnings += write_track(log, target)
+        return replace(log, channels=tuple(c for c in log if c.name == "position")), warnings
     warnings += _dropped_raw(source) if is_mcap else []
-    writers = {".csv": write_csv, ".parquet": write_parquet}
-    writers[target.suffix.lower()](log, target)
+    if shape is not None:
+        write_plain_csv(log, target, shape)
+    else:
+        (write_parquet if suffix == ".parquet" else write_csv)(log, target)
     return log, warnings
+
+
+def _check_target(source: Path, target: Path, shape: CsvShape | None) -> None:
+    """Refuse a target that cannot be written."""
+    suffix, possible = target.suffix.lower(), (*SUFFIXES, *TRACK_SUFFIXES)
+    if suffix not in possible:
+        raise UsageError(
+            f"cannot write {target.suffix or 'a file without suffix'!r}; "
+            f"possible are {', '.join(possible)}: {target}"
+        )
+    if shape is not None and suffix != ".csv":
+        raise UsageError(f"only a .csv file has a shape and units to choose; omit them: {target}")
+    if source.resolve() == target.resolve():
+        raise UsageError(f"source and target are the same file; name another target: {target}")
 
 
 def _kept_within(

@@ -56,7 +56,7 @@ def _blocks(log: TrialLog) -> Iterator[str]:
         yield f"# {_without_formulas(line)}\n"
     yield ",".join(COLUMNS) + "\n"
     for channel in log:
-        heads = [f"{_cell(channel.topic)},{field}" for field in field_names(channel)]
+        heads = [f"{cell_text(channel.topic)},{field}" for field in field_names(channel)]
         texts = map(repr, channel.values.ravel().tolist())
         stamps = zip(channel.measured_ns.tolist(), channel.received_ns.tolist(), strict=True)
         for measured, received in stamps:
@@ -172,8 +172,8 @@ def _end_line(checksum: int) -> str:
     return f"# end crc32 {checksum:08x}"
 
 
-def _cell(text: str) -> str:
-    """Return the cell of a text, from which the text can be restored.
+def cell_text(text: str) -> str:
+    """Return the cell of a text, from which the text can be restored, for a writer without quotes.
 
     A text with characters that do not print, and one that a spreadsheet would take for a formula,
     is a string of JSON. Others are quoted if they need it: a quoted `#` begins no comment.
