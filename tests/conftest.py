@@ -1,3 +1,4 @@
+import gc
 import os
 import subprocess
 import sys
@@ -16,7 +17,11 @@ from analysis.replay.replay_results import Analysis
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
 from shiplog import TrialLog, Vessel, load_vessel, read
+from shiplog.cli.main import RARE_COLLECTION
 from shiplog.compiled import is_compiled
+
+# as in the processes of the verbs: collecting tests and compiling loops make little garbage
+gc.set_threshold(RARE_COLLECTION)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -39,6 +44,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     root = Path(__file__).parent
     items.sort(key=lambda item: (item.path.parent != root, "identification" not in item.path.parts))
+
+
+def pytest_collection_finish() -> None:
+    """Except the collected tests and the imported modules from all searches for garbage."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -1,55 +1,26 @@
 """A filter of another package, as docs/how_to_add_a_filter.md makes it."""
 
 import json
+import os
+import sys
 from collections.abc import Mapping
+from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace as Values
 
-import pytest
-from extensions import EXTENSIONS, code_blocks, declare, installed, run_python, run_shiplog
-from places import PROJECT
-
-LOG = PROJECT / "sample_data" / "zigzag_20_20.mcap"
-IN_PYTHON = f"""
 import numpy as np
-from alpha_beta import ALPHA_BETA
+import pytest
+from extensions import EXTENSIONS, code_blocks, declare, import_from, installed, run_shiplog
+from places import PROJECT
+from scipy.linalg import solve_discrete_are
+
 from analysis.filters.factory import filter_kind
 from analysis.replay.replay import analyse
+from shiplog.cli.main import main
+from shiplog.vessel.presets import PRESETS
 
-assert filter_kind("alpha-beta") is ALPHA_BETA
-fast = {{"filter.yaw_bandwidth": 1.0, "filter.surge_bandwidth": 0.1}}
-given = analyse({str(LOG)!r}, filter=ALPHA_BETA, settings=fast)
-named = analyse({str(LOG)!r}, filter="alpha-beta", settings=fast)
-assert np.array_equal(given.estimates.states, named.estimates.states)
-assert given.findings.plan.vessel.filter.kind == "alpha-beta"
-extended = analyse({str(LOG)!r}, filter="extended").estimates.states
-print(np.corrcoef(given.estimates.states[:, 0], extended[:, 0])[0, 1])
-"""
-NOT_INSTALLED = f"""
-from dataclasses import replace
-from alpha_beta import ALPHA_BETA
-from analysis.replay.replay import analyse
-
-found = analyse({str(LOG)!r}, filter=replace(ALPHA_BETA, name="mine"))
-print(found.findings.plan.vessel.filter.chosen)
-"""
-GAINS = """
-from types import SimpleNamespace as Values
-import numpy as np
-from scipy.linalg import solve_discrete_are
-from alpha_beta import AlphaBetaFilter
-
-T, ratio, r = 0.5, np.array([1e-3, 0.2]), np.array([1e-8, 1e-2])
-noise = Values(process_ratio=ratio, measurement_std=np.sqrt(r))
-found = AlphaBetaFilter(None, noise, Values(interval_secs=np.full(2, T), first=(0, 0)), None)
-F, G, C = np.array([[1, T], [0, 1]]), np.array([[T**2 / 2], [T]]), np.array([[1.0, 0]])
-for i, bandwidth in enumerate((ratio[0]**0.25, ratio[1]**0.5)):
-    P = solve_discrete_are(F.T, C.T, G @ G.T * (bandwidth**2)**2, np.eye(1))
-    S = P[0, 0] + 1
-    np.testing.assert_allclose([gain[i] for gain in found._gains], P[:, 0] / S, rtol=1e-8)
-    stds = np.sqrt(r[i] * np.diag(P - P[:, :1] @ P[:1] / S))
-    np.testing.assert_allclose(found._stds[[0, 1] if i == 0 else [3, 4]], stds, rtol=1e-7)
-    np.testing.assert_allclose(found._innovation_stds[i], np.sqrt(r[i] * S), rtol=1e-8)
-"""
+LOG = PROJECT / "sample_data" / "zigzag_20_20.mcap"
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +33,14 @@ def environment(
     return installed("filter", pytestconfig, folder)
 
 
+@pytest.fixture
+def package(environment: Mapping[str, str], monkeypatch: pytest.MonkeyPatch) -> Values:
+    """The module of the filter, whose package this process finds for the time of a test."""
+    import_from(environment, monkeypatch)
+    monkeypatch.delitem(sys.modules, "alpha_beta", raising=False)
+    return import_module("alpha_beta")
+
+
 def test_the_page_shows_the_files_of_the_package() -> None:
     blocks = code_blocks(PROJECT / "docs" / "how_to_add_a_filter.md")
     assert blocks == {
@@ -70,11 +49,19 @@ def test_the_page_shows_the_files_of_the_package() -> None:
     }
 
 
-def test_gains_and_covariance_are_those_of_the_steady_state_kalman_filter(
-    environment: Mapping[str, str], tmp_path: Path
-) -> None:
-    done = run_python(environment, tmp_path, "-c", GAINS)
-    assert done.returncode == 0, done.stderr
+def test_gains_and_covariance_are_those_of_the_steady_state_kalman_filter(package: Values) -> None:
+    T, ratio, r = 0.5, np.array([1e-3, 0.2]), np.array([1e-8, 1e-2])
+    noise = Values(process_ratio=ratio, measurement_std=np.sqrt(r))
+    stats = Values(interval_secs=np.full(2, T), first=(0, 0))
+    found = package.AlphaBetaFilter(None, noise, stats, None)
+    F, G, C = np.array([[1, T], [0, 1]]), np.array([[T**2 / 2], [T]]), np.array([[1.0, 0]])
+    for i, bandwidth in enumerate((ratio[0] ** 0.25, ratio[1] ** 0.5)):
+        P = solve_discrete_are(F.T, C.T, G @ G.T * (bandwidth**2) ** 2, np.eye(1))
+        S = P[0, 0] + 1
+        np.testing.assert_allclose([gain[i] for gain in found._gains], P[:, 0] / S, rtol=1e-8)
+        stds = np.sqrt(r[i] * np.diag(P - P[:, :1] @ P[:1] / S))
+        np.testing.assert_allclose(found._stds[[0, 1] if i == 0 else [3, 4]], stds, rtol=1e-7)
+        np.testing.assert_allclose(found._innovation_stds[i], np.sqrt(r[i] * S), rtol=1e-8)
 
 
 def test_the_command_line_replays_with_the_filter_by_its_name(
@@ -87,31 +74,31 @@ def test_the_command_line_replays_with_the_filter_by_its_name(
     assert '"alpha-beta"' in json.dumps(json.loads((tmp_path / "out.json").read_text("utf-8")))
 
 
+@pytest.mark.usefixtures("package")
 def test_a_vessel_file_selects_the_filter_by_its_name(
-    environment: Mapping[str, str], tmp_path: Path
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = "from shiplog.vessel.presets import PRESETS; print(PRESETS['table1'])"
-    text = run_python(environment, tmp_path, "-c", code).stdout.rstrip()
-    (tmp_path / "ship.toml").write_text(f'{text}\nkind = "alpha-beta"\n', encoding="utf-8")
-    done = run_shiplog(environment, tmp_path, "replay", LOG, "--vessel", "ship.toml")
-    assert done.returncode == 0, done.stderr
-    assert "alpha-beta" in done.stdout
+    monkeypatch.chdir(tmp_path)
+    text = f'{PRESETS["table1"].rstrip()}\nkind = "alpha-beta"\n'
+    Path("ship.toml").write_text(text, encoding="utf-8")
+    assert main(["replay", str(LOG), "--vessel", "ship.toml"]) == 0
+    assert "alpha-beta" in capsys.readouterr().out
 
 
-def test_python_takes_the_filter_itself_or_its_name(
-    environment: Mapping[str, str], tmp_path: Path
-) -> None:
-    done = run_python(environment, tmp_path, "-c", IN_PYTHON)
-    assert done.returncode == 0, done.stderr
-    assert float(done.stdout) > 0.99
+def test_python_takes_the_filter_itself_or_its_name(package: Values) -> None:
+    assert filter_kind("alpha-beta") is package.ALPHA_BETA
+    fast = {"filter.yaw_bandwidth": 1.0, "filter.surge_bandwidth": 0.1}
+    given = analyse(LOG, filter=package.ALPHA_BETA, settings=fast)
+    named = analyse(LOG, filter="alpha-beta", settings=fast)
+    assert np.array_equal(given.estimates.states, named.estimates.states)
+    assert given.findings.plan.vessel.filter.kind == "alpha-beta"
+    extended = analyse(LOG, filter="extended").estimates.states
+    assert np.corrcoef(given.estimates.states[:, 0], extended[:, 0])[0, 1] > 0.99
 
 
-def test_python_takes_a_filter_that_is_not_installed(
-    environment: Mapping[str, str], tmp_path: Path
-) -> None:
-    done = run_python(environment, tmp_path, "-c", NOT_INSTALLED)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == "mine"
+def test_python_takes_a_filter_that_is_not_installed(package: Values) -> None:
+    found = analyse(LOG, filter=replace(package.ALPHA_BETA, name="mine"))
+    assert found.findings.plan.vessel.filter.chosen == "mine"
 
 
 @pytest.mark.parametrize(
@@ -123,11 +110,12 @@ def test_python_takes_a_filter_that_is_not_installed(
         ("--filter broken", 1, "the filter 'broken' cannot be loaded from broken:BROKEN"),
     ],
 )
+@pytest.mark.usefixtures("package")
 def test_a_filter_that_cannot_be_used_is_reported_in_one_line(
-    environment: Mapping[str, str], tmp_path: Path, options: str, code: int, message: str
+    capsys: pytest.CaptureFixture[str], options: str, code: int, message: str
 ) -> None:
-    done = run_shiplog(environment, tmp_path, "replay", LOG, *options.split())
-    assert done.returncode == code, done.stderr
-    errors = [line for line in done.stderr.splitlines() if not line.startswith("warning:")]
+    assert main(["replay", str(LOG), *options.split(), "-o", os.devnull]) == code
+    lines = capsys.readouterr().err.splitlines()
+    errors = [line for line in lines if not line.startswith("warning:")]
     assert len(errors) == 1
     assert message in errors[0]

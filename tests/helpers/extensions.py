@@ -83,6 +83,12 @@ def run_python(
     )
 
 
+def import_from(environment: Mapping[str, str], patch: pytest.MonkeyPatch) -> None:
+    """Let this process, for a test, find the packages that are installed in an environment."""
+    for place in reversed(environment["PYTHONPATH"].split(os.pathsep)):
+        patch.syspath_prepend(place)
+
+
 def code_blocks(page: Path) -> dict[str, str]:
     """Return the code blocks of a page by the file they are headed with, as `FILE`: before ```."""
     result, lines = {}, page.read_text(encoding="utf-8").splitlines()
