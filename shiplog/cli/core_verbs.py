@@ -1,7 +1,10 @@
 """The verbs of the core: info, convert, layout."""
 
 import argparse
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from shiplog.errors import ShiplogError
 
@@ -9,6 +12,12 @@ from .console import print_line, print_tables, print_toml, print_warnings, progr
 from .options import add_cut_options, add_derive_option
 from .paths import require_distinct, require_inputs, require_outputs
 from .verb import ExitCode, Verb
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from shiplog.checks.log_content import LogInfo
+    from shiplog.foreign_mcap.ulog import UlogCopy
 
 
 def _configure_info(parser: argparse.ArgumentParser) -> None:
@@ -24,12 +33,11 @@ def _info(arguments: argparse.Namespace) -> ExitCode:
     require_distinct([arguments.json], arguments.log)
     if len(arguments.log) > 1:
         return _info_of_several(arguments)
-    from shiplog.checks.info import read_log_info
 
     from .info_tables import info_tables
 
     require_inputs(*arguments.log)
-    info = read_log_info(arguments.log[0], arguments.start, arguments.end)
+    info = _read_info(arguments.log[0], arguments)
     if arguments.json:
         write_json(info.to_dict(), arguments.json)
     else:
@@ -45,8 +53,6 @@ def _info(arguments: argparse.Namespace) -> ExitCode:
 
 def _info_of_several(arguments: argparse.Namespace) -> ExitCode:
     """Show one row for each log; a log that cannot be read is reported and the others shown."""
-    from shiplog.checks.info import read_log_info
-
     from .info_tables import info_overview
 
     infos, entries, failed = [], [], False
@@ -55,7 +61,7 @@ def _info_of_several(arguments: argparse.Namespace) -> ExitCode:
             on_progress(f"log {number + 1} of {len(arguments.log)}", number / len(arguments.log))
             try:
                 require_inputs(path)
-                infos.append(read_log_info(path, arguments.start, arguments.end))
+                infos.append(_read_info(path, arguments))
                 entries.append(infos[-1].to_dict())
             except ShiplogError as error:
                 entries.append({"name": Path(path).name, "error": str(error)})
@@ -74,9 +80,33 @@ def _info_of_several(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.DATA_LOST if any(info.data_lost for info in infos) else ExitCode.OK
 
 
+def _read_info(path: str, arguments: argparse.Namespace) -> "LogInfo":
+    from shiplog.checks.info import read_log_info
+
+    with _as_mcap(Path(path)) as copy:
+        info = read_log_info(copy.path, arguments.start, arguments.end)
+    warnings, lost = (*copy.warnings, *info.warnings), info.data_lost or copy.data_lost
+    return replace(info, warnings=warnings, data_lost=lost)
+
+
+@contextmanager
+def _as_mcap(path: Path) -> "Iterator[UlogCopy]":
+    """Give a log as an MCAP file: a copy of a ULog file, any other as it is."""
+    from shiplog.foreign_mcap.ulog import UlogCopy, is_ulog, ulog_as_mcap
+
+    if is_ulog(path):
+        with ulog_as_mcap(path) as copy:
+            yield copy
+    else:
+        yield UlogCopy(path)
+
+
 def _configure_convert(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "source", metavar="FROM", type=Path, help="a log, a table, or MCAP of another program"
+        "source",
+        metavar="FROM",
+        type=Path,
+        help="a log, a table, or MCAP or ULog of another program",
     )
     parser.add_argument(
         "target",
@@ -177,8 +207,9 @@ def _layout(arguments: argparse.Namespace) -> ExitCode:
 
     require_outputs(arguments.output)
     require_distinct([arguments.output], [arguments.table])
-    is_mcap = log_suffix(arguments.table) == SUFFIX
-    draft = (draft_mcap_layout if is_mcap else draft_layout)(arguments.table)
+    with _as_mcap(arguments.table) as copy:
+        is_mcap = log_suffix(arguments.table) == SUFFIX or copy.path != arguments.table
+        draft = (draft_mcap_layout if is_mcap else draft_layout)(copy.path)
     if arguments.output is None:
         print_toml(draft.text)
     else:

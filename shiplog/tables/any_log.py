@@ -1,10 +1,12 @@
 """Reading of any log: of shiplog as MCAP, CSV or Parquet, or of another program by a layout."""
 
 from codecs import BOM_UTF8
+from dataclasses import replace
 from pathlib import Path
 
 from shiplog.errors import LogError, UsageError
 from shiplog.foreign_mcap.foreign_log import read_foreign_mcap
+from shiplog.foreign_mcap.ulog import is_ulog, ulog_as_mcap
 from shiplog.layouts.layout import load_layout
 from shiplog.layouts.mcap_layout import load_mcap_layout
 from shiplog.mcap.clock_repair import MixedTimes, refuse_mixed_times
@@ -62,9 +64,10 @@ def read_any_log(source: Path, layout: Path | None = None) -> tuple[TrialLog, li
     Parameters
     ----------
     source
-        An MCAP file, a table that shiplog wrote (`.csv`, `.parquet`), or a foreign table.
+        An MCAP file, a table that shiplog wrote (`.csv`, `.parquet`), a foreign table, or a ULog
+        file of PX4 (`.ulg`).
     layout
-        Layout file of a foreign table, or of an MCAP file of another program.
+        Layout file of a foreign table, or of an MCAP or ULog file of another program.
 
     Returns
     -------
@@ -78,11 +81,27 @@ def read_any_log(source: Path, layout: Path | None = None) -> tuple[TrialLog, li
     LogError, LayoutError
         The file cannot be read.
     """
+    if is_ulog(source):
+        return _read_ulog(source, layout)
     if not is_mcap_log(source):
         return _read_table(source, layout), []
     if layout is None:
         return read_unchecked(source)
     return read_foreign_mcap(source, load_mcap_layout(layout))
+
+
+def _read_ulog(source: Path, layout: Path | None) -> tuple[TrialLog, list[MixedTimes]]:
+    """Read the topics of a ULog file that a layout describes."""
+    if layout is None:
+        raise UsageError(
+            "a ULog file; describe its topics with --layout LAYOUT.toml, which `shiplog layout` "
+            f"drafts: {source}"
+        )
+    described = load_mcap_layout(layout)
+    with ulog_as_mcap(source) as copy:
+        log, mixed = read_foreign_mcap(copy.path, described)
+    warnings = (*copy.warnings, *log.warnings)
+    return replace(log, warnings=warnings, data_lost=log.data_lost or copy.data_lost), mixed
 
 
 def _read_table(source: Path, layout: Path | None) -> TrialLog:

@@ -10,6 +10,10 @@ _FILES = {
     "sensor_msgs/NavSatFix": "NavSatFix",
     "std_msgs/Float64": "Float64",
     "foxglove.LocationFix": "LocationFix",
+    "vehicle_angular_velocity": "vehicle_angular_velocity",
+    "vehicle_attitude": "vehicle_attitude",
+    "vehicle_global_position": "vehicle_global_position",
+    "vehicle_local_position": "vehicle_local_position",
 }
 
 
