@@ -74,7 +74,7 @@ def _rudder_over_heading(
                 starts.append(_heading_at_start(group[0]))
                 changed[quantity] = [_lowered(each, starts[-1]) for each in group]
         relative.append(replace(drawing, series=changed))
-    start = f"{starts[0] % 360:.1f}°" if len(starts) == 1 else "that at the start"
+    start = f"{round(starts[0], 1) % 360:.1f}°" if len(starts) == 1 else "that at the start"
     panel = _panel(relative, [*headings, *rudders])
     turned, steered = (
         _range_text(

@@ -47,6 +47,12 @@ def test_the_rudder_of_a_zigzag_is_drawn_over_the_heading_from_that_at_the_start
     assert panel.legend
 
 
+def test_a_heading_just_west_of_north_is_0_and_not_360_degrees() -> None:
+    heading = channel(np.full(101, -1e-4), TIMES, "heading")
+    (panel,) = panels_of(replace(ZIGZAG, channels=(heading, ZIGZAG["rudder"])))
+    assert panel.title.startswith("heading from 0.0°: ")
+
+
 def test_in_a_turning_circle_heading_and_rudder_have_a_panel_each() -> None:
     heading = channel(np.radians(5 * TIMES) % (2 * np.pi), TIMES, "heading")
     log = replace(ZIGZAG, channels=(heading, ZIGZAG["rudder"]))
