@@ -12,7 +12,7 @@ from shiplog.types import Channel
 
 from .channel_series import ChannelSeries, DrawnQuantity, channel_label, channels_by_quantity
 from .panels import Panel
-from .quantity_panel import has_values, quantity_panel
+from .quantity_panel import has_any_value, quantity_panel
 
 
 class FurtherChannels:
@@ -59,7 +59,7 @@ class FurtherChannels:
         """Return a panel of each quantity that has a value on the clock, after all chunks."""
         panels: list[Panel] = []
         for quantity, group in self._groups.items():
-            drawn = [series for each in group if has_values(series := each.result())]
+            drawn = [series for each in group if has_any_value(series := each.result())]
             if drawn:
                 panels.append(quantity_panel(f"further/{len(panels)}", quantity, drawn))
         return panels

@@ -14,7 +14,7 @@ from shiplog.types import Channel, Event, EventLevel, FloatArray, Log
 
 from .channel_series import ChannelSeries, DrawnQuantity, channel_label, channels_by_quantity
 from .decimation import Decimator, bucket_size
-from .quantity_panel import has_values
+from .quantity_panel import has_any_value
 from .series import GREY, Line, Series
 
 MAX_GAPS = 200  # of a channel that are marked: the longest ones
@@ -147,7 +147,7 @@ class _TrackSeries:
 
 
 def _with_values(group: list[Series]) -> list[Series]:
-    return [series for series in group if has_values(series)]
+    return [series for series in group if has_any_value(series)]
 
 
 def _gaps(channels: list[ChannelStats], start_ns: int) -> FloatArray:

@@ -97,6 +97,6 @@ def entity_part(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", text)
 
 
-def has_values(series: Series) -> bool:
+def has_any_value(series: Series) -> bool:
     """Return whether a series has any value."""
     return any(np.isfinite(line.values).any() for line in series.lines)

@@ -99,7 +99,7 @@ def test_longitudes_are_within_half_a_turn_across_the_antimeridian() -> None:
     np.testing.assert_allclose(found % 360, 180 - 1e-4 + 2e-5 * secs, atol=1e-9)
 
 
-def test_positions_that_are_none_are_left_out_and_reported(ship: TrialLog) -> None:
+def test_impossible_positions_are_omitted_and_reported(ship: TrialLog) -> None:
     bad = with_fixes(ship, slice(100, 110), [0.0, 0.0])
     bad = with_fixes(bad, slice(200, 205), [91.0, 181.0])
     ((track,), warnings) = geographic_tracks(bad)
