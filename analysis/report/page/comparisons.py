@@ -24,7 +24,7 @@ from .manoeuvre_track import (
 )
 from .numbering import ManoeuvrePlace
 from .svg_figure import SERIES, PageFigure, new_figure, page_figure
-from .value_text import NOT_KNOWN, number_text, with_unit
+from .value_text import NOT_KNOWN, half_width_text
 
 KNOT = UNITS["kn"][1]  # m/s
 DASHES: tuple[tuple[float, ...], ...] = ((), (6, 1.5), (2, 1.5), (6, 1.5, 1, 1.5))
@@ -204,11 +204,4 @@ def _index_table(group: Sequence[ManoeuvrePlace], title: str) -> TextTable:
 
 def _cell(place: ManoeuvrePlace, name: str) -> str:
     index = place.manoeuvre.index(name)
-    if index is None:
-        return NOT_KNOWN
-    factor, std = index.display_factor, index.std * index.display_factor
-    text = number_text(index.value * factor, std)
-    half = (index.high - index.low) / 2 * factor
-    if isfinite(half):
-        text += f" ± {number_text(half, std)}"
-    return with_unit(text, index.display_unit)
+    return NOT_KNOWN if index is None else half_width_text(index)

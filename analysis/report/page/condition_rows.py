@@ -94,8 +94,7 @@ def _test_speed(conditions: TrialConditions) -> str:
     if not isfinite(conditions.test_speed):
         return ""
     speed = conditions.test_speed
-    origin = f" ({conditions.test_speed_origin})" if conditions.test_speed_origin else ""
-    return f"{speed / KNOT:.2f} kn = {speed:.2f} m/s{origin}"
+    return f"{speed / KNOT:.2f} kn = {speed:.2f} m/s"
 
 
 def _length_over_speed(conditions: TrialConditions) -> str:
@@ -198,6 +197,7 @@ FORM: tuple[tuple[str, tuple[Line, ...]], ...] = (
             ("Draught aft", _stated("draught_aft")),
             ("Trim", _trim),
             ("Test speed V", _test_speed),
+            ("V is", lambda each: each.test_speed_origin),
             ("L/V", _length_over_speed),
             ("Water depth h", _stated("water_depth")),
             ("h/T", _depth_over_draught),

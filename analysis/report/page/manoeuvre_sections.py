@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from math import degrees, isfinite, pi
+from math import degrees, isfinite, nan, pi
 
 from analysis.manoeuvres.sailed_manoeuvre import NotComputed, SailedManoeuvre
 from analysis.trial.trial_analysis import TrialAnalysis
@@ -13,7 +13,7 @@ from .manoeuvre_histories import history_figure, spiral_figure
 from .manoeuvre_track import track_figure
 from .numbering import ManoeuvrePlace
 from .svg_figure import PageFigure
-from .value_text import number_text, value_text, with_unit
+from .value_text import index_text, std_text, value_text
 from .verdict_rows import VerdictRow, index_row
 
 KNOT = UNITS["kn"][1]  # m/s
@@ -122,11 +122,7 @@ def _sensitivity_table(manoeuvre: SailedManoeuvre) -> TextTable | None:
     for index in manoeuvre.indices:
         if not index.start_rules:
             continue
-        factor, unit = index.display_factor, index.display_unit
-        values = [
-            with_unit(number_text(value * factor, index.std * factor), unit)
-            for value in (index.start_rules.get(rule, float("nan")) for rule in rules)
-        ]
+        values = [index_text(index, index.start_rules.get(rule, nan)) for rule in rules]
         rows.append((index.name, value_text(index), *values))
     columns = ("index", f"as reported:\n{manoeuvre.start_rule}", *rules)
     return TextTable("Sensitivity to the start rule", columns, tuple(rows))
@@ -139,9 +135,8 @@ def _uncertainty_table(manoeuvre: SailedManoeuvre) -> TextTable | None:
         return None
     rows = []
     for index in manoeuvre.indices:
-        factor, unit = index.display_factor, index.display_unit
-        stds = [index.std, *(index.sources.get(name, float("nan")) for name in sources)]
-        cells = [with_unit(number_text(std * factor, std * factor), unit) for std in stds]
+        stds = [index.std, *(index.sources.get(name, nan) for name in sources)]
+        cells = [std_text(index, std) for std in stds]
         rows.append((index.name, *cells))
     return TextTable(
         "Standard uncertainty by source", ("index", "all sources", *sources), tuple(rows)

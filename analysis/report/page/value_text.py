@@ -1,15 +1,17 @@
 """Numbers of a report as texts: units people use, and the digits that their uncertainty allows."""
 
-from math import floor, isfinite, log10
+from math import floor, isfinite, log10, nan
 
 from analysis.manoeuvres.trial_index import TrialIndex
 from analysis.report.display import decimals
 
 NOT_KNOWN = "–"
 DIGITS = 3  # significant ones, of a number without uncertainty
+# the most decimals that an index is written with: finer ones are below any sensor of a ship
+MAX_DECIMALS = {"m": 1, "s": 2, "°": 2, "°/s": 4, "kn": 3, "m/s": 3, "1": 4, "L": 3}
 
 
-def number_text(value: float, std: float) -> str:
+def number_text(value: float, std: float, most: int = 6) -> str:
     """Write a number with the digits that its standard uncertainty allows.
 
     Parameters
@@ -18,6 +20,8 @@ def number_text(value: float, std: float) -> str:
         NaN gives a dash.
     std
         In the same unit; where NaN or 0, three significant digits are written.
+    most
+        The greatest number of decimals.
 
     Examples
     --------
@@ -27,32 +31,63 @@ def number_text(value: float, std: float) -> str:
     if not isfinite(value):
         return NOT_KNOWN
     if isfinite(std) and std > 0:
-        return f"{value:.{decimals(std)}f}"
+        return f"{value:.{min(decimals(std), most)}f}"
     if value == 0:
         return "0"
-    return f"{value:.{max(DIGITS - 1 - floor(log10(abs(value))), 0)}f}"
+    return f"{value:.{min(max(DIGITS - 1 - floor(log10(abs(value))), 0), most)}f}"
+
+
+def index_text(index: TrialIndex, value: float) -> str:
+    """Write a value of an index's unit, such as its own by another start rule, in display units."""
+    factor, unit = index.display_factor, index.display_unit
+    return with_unit(number_text(value * factor, index.std * factor, MAX_DECIMALS[unit]), unit)
 
 
 def value_text(index: TrialIndex) -> str:
     """Write the value of an index with its unit."""
-    text = number_text(index.value * index.display_factor, index.std * index.display_factor)
-    return with_unit(text, index.display_unit)
+    return index_text(index, index.value)
 
 
 def interval_text(index: TrialIndex) -> str:
     """Write the 95 % interval of an index; a dash where it is not known."""
     if not (isfinite(index.low) and isfinite(index.high)):
         return NOT_KNOWN
-    factor = index.display_factor
-    low, high = (number_text(each * factor, index.std * factor) for each in (index.low, index.high))
+    factor, most = index.display_factor, MAX_DECIMALS[index.display_unit]
+    low, high = (
+        number_text(each * factor, index.std * factor, most) for each in (index.low, index.high)
+    )
     return with_unit(f"{low} to {high}", index.display_unit)
+
+
+def half_width_text(index: TrialIndex) -> str:
+    """Write an index with half the width of its 95 % interval."""
+    factor, most = index.display_factor, MAX_DECIMALS[index.display_unit]
+    std = index.std * factor
+    half = (index.high - index.low) / 2 * factor
+    text = number_text(index.value * factor, std, most)
+    if isfinite(half):
+        text += f" ± {number_text(half, std, most)}"
+    return with_unit(text, index.display_unit)
+
+
+def std_text(index: TrialIndex, std: float) -> str:
+    """Write a standard uncertainty of an index with two digits.
+
+    One that is smaller than what the value is written with is given as below that.
+    """
+    factor, unit = index.display_factor, index.display_unit
+    shown, least = std * factor, 10.0 ** -MAX_DECIMALS[unit]
+    if 0 < shown < least:
+        return f"< {with_unit(f'{least:g}', unit)}"
+    return with_unit(number_text(shown, shown, MAX_DECIMALS[unit]), unit)
 
 
 def length_text(index: TrialIndex) -> str:
     """Write a distance in ship lengths; empty where it is none or the length is unknown."""
     if not isfinite(index.in_lengths):
         return ""
-    return f"{number_text(index.in_lengths, index.std * index.in_lengths / index.value)} L"
+    std = index.std * index.in_lengths / index.value if index.value else nan
+    return f"{number_text(index.in_lengths, std, MAX_DECIMALS['L'])} L"
 
 
 def with_unit(text: str, unit: str) -> str:

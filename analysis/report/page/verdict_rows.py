@@ -1,7 +1,7 @@
 """The verdict at a glance: each criterion of the norm with what each log shows of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from analysis.manoeuvres.trial_index import TrialIndex, Verdict
 from analysis.trial.trial_analysis import CriterionFinding
@@ -10,6 +10,7 @@ from .numbering import ManoeuvrePlace
 from .trial_report import TrialReport
 from .value_text import interval_text, length_text, percent_text, value_text
 
+NORM = "IMO MSC.137(76)"
 VERDICT_CLASSES = {
     Verdict.MEETS: "meets",
     Verdict.FAILS: "fails",
@@ -24,14 +25,14 @@ class VerdictRow:
 
     Attributes
     ----------
-    name
-        Of the criterion or of the index, with its symbol.
+    name, symbol
+        Of the criterion or of the index.
     place
         The manoeuvre that the value is from; None where not tested.
     value, lengths, interval
         The value in its unit and in ship lengths, and its 95 % interval.
     limit, paragraph
-        The limit, and the norm with its paragraph; empty without one.
+        The limit, and the paragraph of the norm; empty without one.
     verdict, css_class
         In words, and the class of its mark in the page; empty without a limit.
     probability
@@ -41,6 +42,7 @@ class VerdictRow:
     """
 
     name: str
+    symbol: str = ""
     place: ManoeuvrePlace | None = None
     value: str = ""
     lengths: str = ""
@@ -83,12 +85,13 @@ def index_row(index: TrialIndex) -> VerdictRow:
     """Return the row of an index in its manoeuvre's table."""
     criterion, verdict = index.criterion, index.verdict
     return VerdictRow(
-        f"{index.name} {index.symbol}".strip(),
+        index.name,
+        index.symbol,
         value=value_text(index),
         lengths=length_text(index),
         interval=interval_text(index),
         limit=criterion.text if criterion else "",
-        paragraph=criterion.paragraph if criterion else "",
+        paragraph=_paragraph(criterion.paragraph) if criterion else "",
         verdict=str(verdict) if verdict else "",
         css_class=VERDICT_CLASSES[verdict] if verdict else "",
         probability=percent_text(index.probability) if criterion else "",
@@ -99,19 +102,15 @@ def index_row(index: TrialIndex) -> VerdictRow:
 def _tested_row(finding: CriterionFinding, places: Sequence[ManoeuvrePlace]) -> VerdictRow:
     assert finding.index is not None  # noqa: S101 - the caller selects
     row = index_row(finding.index)
-    place = next((each for each in places if each.number == finding.manoeuvre), None)
-    return VerdictRow(
-        finding.name,
-        place,
-        row.value,
-        row.lengths,
-        row.interval,
-        finding.text,
-        finding.paragraph,
-        row.verdict or finding.reason or "no limit can be computed",
-        row.css_class or VERDICT_CLASSES[None],
-        row.probability,
-        row.note,
+    return replace(
+        row,
+        name=finding.name,
+        symbol="",
+        place=next((each for each in places if each.number == finding.manoeuvre), None),
+        limit=finding.text,
+        paragraph=_paragraph(finding.paragraph),
+        verdict=row.verdict or finding.reason or "no limit can be computed",
+        css_class=row.css_class or VERDICT_CLASSES[None],
     )
 
 
@@ -119,8 +118,19 @@ def _untested_row(finding: CriterionFinding) -> VerdictRow:
     return VerdictRow(
         finding.name,
         limit=finding.text,
-        paragraph=finding.paragraph,
+        paragraph=_paragraph(finding.paragraph),
         verdict="not tested",
         css_class=VERDICT_CLASSES[None],
         note=finding.reason,
     )
+
+
+def _paragraph(text: str) -> str:
+    """Return the paragraph of the norm that the table's caption names; another one with its norm.
+
+    Examples
+    --------
+    >>> _paragraph("IMO MSC.137(76), 5.3.1")
+    '5.3.1'
+    """
+    return text.removeprefix(f"{NORM}, ")
