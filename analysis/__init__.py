@@ -12,6 +12,8 @@ analyse_trial
     Find the manoeuvres in a log: indices with intervals, and verdicts of the norm.
 ReadingOptions
     The vessel, the sources and the strictness with which these read a log.
+report_trials, report_page
+    Compare the manoeuvres of trials with IMO's standards, on a page to sign.
 compare
     Compare a replay with its reference.
 
@@ -37,6 +39,9 @@ if TYPE_CHECKING:
     from analysis.replay.reading_options import ReadingOptions
     from analysis.replay.replay import Replay, analyse
     from analysis.replay.replay_results import Analysis, Findings, ReplayChunk
+    from analysis.report.page.report_page import report_page
+    from analysis.report.page.report_trials import report_trials
+    from analysis.report.page.trial_report import TrialReport
     from analysis.trial.analyse_trial import analyse_trial
     from analysis.trial.trial_analysis import TrialAnalysis
     from analysis.trial.trial_options import TrialOptions
@@ -53,12 +58,15 @@ _MODULES = {
     "SystemEstimate": "linear.estimate",
     "TrialAnalysis": "trial.trial_analysis",
     "TrialOptions": "trial.trial_options",
+    "TrialReport": "report.page.trial_report",
     "analyse": "replay.replay",
     "analyse_trial": "trial.analyse_trial",
     "compare": "check.compare",
     "estimate": "linear.estimate",
     "identify": "identification.identify",
     "plan_replay": "replay.plan",
+    "report_page": "report.page.report_page",
+    "report_trials": "report.page.report_trials",
 }
 
 __all__ = [
@@ -73,12 +81,15 @@ __all__ = [
     "SystemEstimate",
     "TrialAnalysis",
     "TrialOptions",
+    "TrialReport",
     "analyse",
     "analyse_trial",
     "compare",
     "estimate",
     "identify",
     "plan_replay",
+    "report_page",
+    "report_trials",
 ]
 
 

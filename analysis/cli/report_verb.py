@@ -2,20 +2,50 @@
 
 import argparse
 import shlex
+from math import isfinite, nan
+from typing import TYPE_CHECKING
 
 from shiplog.cli.console import print_line, print_tables, print_warnings, progress, write_json
 from shiplog.cli.paths import require_distinct, require_inputs, require_outputs, require_suffix
 from shiplog.cli.verb import ExitCode, Verb
+from shiplog.errors import UsageError
 from shiplog.files import atomic_write
 
 from .shared_options import add_reading_options, reading_options
 
+if TYPE_CHECKING:
+    from analysis.trial.trial_options import TrialOptions
+
 DEFAULT_PAGE = "report.html"
+MAX_TEST_SPEED = 50.0  # m/s
+VALUES = (  # the options with one value, by their names in the parsed arguments
+    "vessel", "length", "sensor_delay", "start", "end",
+    "start_rule", "execute", "antenna", "test_speed", "model",
+)  # fmt: skip
 
 
 def _configure_report(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", nargs="+", metavar="LOG", help="logs of one ship")
     add_reading_options(parser)
+    parser.add_argument(
+        "--start-rule",
+        choices=("order", "moved", "event", "stated"),
+        help="where a manoeuvre begins: at the rudder's order or, without orders in the log, its "
+        "movement (default), when it has moved by 0.5°, at a marked event, or as --execute states",
+    )
+    parser.add_argument(
+        "--execute",
+        metavar="SECS",
+        help="the executes, s since the log's start, such as 60 or 60,900; the rule is then stated",
+    )
+    parser.add_argument(
+        "--antenna",
+        metavar="FORWARD,STARBOARD",
+        help="place of the position's antenna from the midship point, m, such as -45,2.5",
+    )
+    parser.add_argument(
+        "--test-speed", type=float, metavar="M/S", help="V of the norm (default: the log's)"
+    )
     parser.add_argument(
         "--model",
         metavar="NAME",
@@ -37,7 +67,7 @@ def _configure_report(parser: argparse.ArgumentParser) -> None:
 
 
 def _report(arguments: argparse.Namespace) -> ExitCode:
-    options = reading_options(arguments)
+    options, trial_options = reading_options(arguments), _trial_options(arguments)
     outputs = (arguments.output, arguments.pdf, arguments.json)
     require_suffix(".html", arguments.output)
     require_suffix(".pdf", arguments.pdf)
@@ -46,8 +76,8 @@ def _report(arguments: argparse.Namespace) -> ExitCode:
     require_outputs(*outputs)
     from analysis.report.page.browser_pdf import find_browser, print_pdf
     from analysis.report.page.report_page import report_page
-    from analysis.report.page.trial_json import trial_json
     from analysis.report.page.report_trials import LogPart, report_trials
+    from analysis.report.page.trial_json import trial_json
     from analysis.report.page.trial_tables import trial_tables
 
     if arguments.pdf:
@@ -56,6 +86,7 @@ def _report(arguments: argparse.Namespace) -> ExitCode:
         report = report_trials(
             [LogPart(path, arguments.start, arguments.end) for path in arguments.log],
             options,
+            trial_options,
             model=arguments.model,
             command=_command(arguments),
             on_progress=on_progress,
@@ -75,10 +106,46 @@ def _report(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.DATA_LOST if report.data_lost else ExitCode.OK
 
 
+def _trial_options(arguments: argparse.Namespace) -> "TrialOptions":
+    """Return the options of the analysis; raise `UsageError` where one cannot be used."""
+    from analysis.manoeuvres.start_rules import StartRule
+    from analysis.trial.trial_options import TrialOptions
+
+    executes = _numbers(arguments.execute, "--execute", "60,900")
+    antenna = _numbers(arguments.antenna, "--antenna", "-45,2.5") or (0.0, 0.0)
+    if len(antenna) != 2:
+        raise UsageError(f"--antenna takes two numbers, such as -45,2.5, not {arguments.antenna!r}")
+    rule = arguments.start_rule or ("stated" if executes else "order")
+    if (rule == "stated") != bool(executes):
+        raise UsageError("the start rule stated needs --execute SECS, and no other rule takes it")
+    if arguments.test_speed is not None and not 0 < arguments.test_speed < MAX_TEST_SPEED:
+        raise UsageError(
+            f"--test-speed takes m/s between 0 and {MAX_TEST_SPEED:g}, not {arguments.test_speed:g}"
+        )
+    return TrialOptions(
+        StartRule(rule),
+        execute_secs=executes,
+        antenna_forward=antenna[0],
+        antenna_starboard=antenna[1],
+        test_speed=arguments.test_speed,
+    )
+
+
+def _numbers(text: str | None, option: str, example: str) -> tuple[float, ...]:
+    """Parse the finite numbers of an option, separated by commas; none where it is not given."""
+    try:
+        numbers = tuple(float(word) for word in text.split(",")) if text else ()
+    except ValueError:
+        numbers = (nan,)
+    if not all(map(isfinite, numbers)):
+        raise UsageError(f"{option} takes numbers, such as {example}, not {text!r}")
+    return numbers
+
+
 def _command(arguments: argparse.Namespace) -> str:
     """Return the command line that makes the page again."""
     words = ["shiplog", "report", *arguments.log]
-    for name in ("vessel", "length", "sensor_delay", "start", "end", "model"):
+    for name in VALUES:
         value = getattr(arguments, name)
         if value is not None:
             flag = {"start": "from", "end": "to"}.get(name, name.replace("_", "-"))

@@ -36,6 +36,7 @@ ORDER = (
     "identify",
     "estimate",
     "check",
+    "report",
 )  # others follow by name
 
 

@@ -121,4 +121,4 @@ def reported_log(*manoeuvres: SailedManoeuvre, name: str = "trial.mcap") -> Repo
 def trial_report(*logs: ReportedLog) -> TrialReport:
     """Return a report of logs; by default of a circle to each side and a zig-zag."""
     logs = logs or (reported_log(circle(), circle("port"), zigzag()),)
-    return TrialReport(logs, "1.2.3", "shiplog report trial.mcap -o report.html")
+    return TrialReport(logs, "1.2.3", command="shiplog report trial.mcap -o report.html")

@@ -19,7 +19,7 @@ HEADING_LINE, RUDDER_LINE, RATE_LINE, SPEED_LINE, RPM_LINE, DRIFT_LINE = SERIES
 PANEL_INCHES, FIRST_PANEL_INCHES = 0.85, 2.1  # heights
 SPIRAL_INCHES = 2.6
 ONE_AXIS_TURN = pi / 3  # of heading: up to it rudder and heading share one axis
-TURN_TICK_DEG = 90.0
+TURN_TICK_DEG, MAX_TURN_TICKS = 90.0, 7
 
 
 def history_figure(manoeuvre: SailedManoeuvre, anchor: str) -> PageFigure | None:
@@ -104,7 +104,9 @@ def _steering_panel(axes: Axes, manoeuvre: SailedManoeuvre) -> None:
         heading_axes.set_ylabel("change of heading [°]")
         heading_axes.grid(visible=False)
         heading_axes.spines["right"].set_visible(True)
-        heading_axes.yaxis.set_major_locator(MultipleLocator(TURN_TICK_DEG))
+        turned = degrees(float(np.nanmax(np.abs(series.heading_change))))
+        step = TURN_TICK_DEG * (1 + turned // (TURN_TICK_DEG * MAX_TURN_TICKS))
+        heading_axes.yaxis.set_major_locator(MultipleLocator(step))
     _mark_headings(heading_axes, manoeuvre)
     axes.legend(
         handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2

@@ -113,13 +113,14 @@ def chart_inches(low: FloatArray, high: FloatArray) -> float:
 def prepare_chart(axes: Axes, low: FloatArray, high: FloatArray) -> TrackAxes:
     """Set scales, limits and labels of the axes of a track."""
     chart = TrackAxes(axes, is_drawn_lying(high - low))
-    axes.set_aspect("equal", adjustable="box")
+    axes.set_aspect("equal", adjustable="datalim")
     (left, bottom), (right, top) = chart.place(*low), chart.place(*high)
     axes.set_xlim(left, right)
     axes.set_ylim(*((top, bottom) if chart.lies else (bottom, top)))
     labels = "ahead [m]", "to starboard [m]"
     axes.set_xlabel(labels[0] if chart.lies else labels[1])
     axes.set_ylabel(labels[1] if chart.lies else labels[0])
+    axes.apply_aspect()  # widens the limits to the shape of the axes
     return chart
 
 
@@ -193,26 +194,30 @@ def _circle_dimensions(chart: TrackAxes, manoeuvre: SailedManoeuvre) -> None:
     side = -1.0 if manoeuvre.side == "port" else 1.0
     if advance is not None and isfinite(advance.value):
         text = f"advance {advance.value:.0f} m"
-        _dimension(chart, (0.0, 0.0), (advance.value, 0.0), text)
+        _dimension(chart, (0.0, 0.0), (advance.value, 0.0), text, side)
     half_turn = _turn_times(manoeuvre.series).get(pi)
     if diameter is not None and isfinite(diameter.value) and half_turn is not None:
         ahead, _ = _place_at(manoeuvre.series, half_turn)
         text = f"tactical diameter {diameter.value:.0f} m"
-        _dimension(chart, (ahead, 0.0), (ahead, side * diameter.value), text)
+        _dimension(chart, (ahead, 0.0), (ahead, side * diameter.value), text, side)
 
 
 def _dimension(
-    chart: TrackAxes, start: tuple[float, float], end: tuple[float, float], text: str
+    chart: TrackAxes,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    text: str,
+    side: float,
 ) -> None:
-    """Draw a line with arrows at both ends from one place to another, and its text beside it."""
+    """Draw a line with arrows at both ends, and its text above it or away from the circle."""
     (x0, y0), (x1, y1) = chart.place(*start), chart.place(*end)
     style = {"arrowstyle": "<->", "color": MUTED, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
     chart.axes.annotate("", (x1, y1), xytext=(x0, y0), arrowprops=style)
     upright = abs(y1 - y0) > abs(x1 - x0)
     chart.axes.annotate(
-        text, ((x0 + x1) / 2, (y0 + y1) / 2), xytext=(-5, 0) if upright else (0, 4),
+        text, ((x0 + x1) / 2, (y0 + y1) / 2), xytext=(-5 * side, 0) if upright else (0, 4),
         textcoords="offset points", rotation=90 if upright else 0,
-        ha="right" if upright else "center", va="center" if upright else "bottom", fontsize=SMALL,
+        ha=("right" if side > 0 else "left") if upright else "center", va="center" if upright else "bottom", fontsize=SMALL,
     )  # fmt: skip
 
 

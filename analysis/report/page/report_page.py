@@ -11,6 +11,7 @@ from shiplog.checks.event_table import event_table
 from shiplog.printable import printable
 from shiplog.progress import ProgressCallback, no_progress
 
+from .assumptions import assumptions
 from .comparisons import comparisons_of
 from .condition_rows import condition_groups
 from .manoeuvre_sections import ManoeuvreSection, manoeuvre_section, time_text
@@ -56,6 +57,7 @@ def report_page(report: TrialReport, on_progress: ProgressCallback = no_progress
         "comparisons": comparisons_of(numbered, lengths[0] if lengths else nan),
         "identified": identification_tables(identified) if identified else (),
         "identification_warnings": identified.warnings if identified else (),
+        "assumed": tuple(assumptions(report.options)),
         "signatures": SIGNATURES,
     }
     return _environment().get_template("report.html.jinja").render(content)

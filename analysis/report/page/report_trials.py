@@ -12,6 +12,7 @@ from analysis.replay.reading_options import DEFAULT_OPTIONS, ReadingOptions
 from analysis.replay.replay import Replay
 from analysis.replay.replay_results import Findings
 from analysis.trial.analyse_trial import analyse_trial
+from analysis.trial.trial_options import DEFAULT_TRIAL_OPTIONS, TrialOptions
 from shiplog.checks.log_stats import compute_log_stats
 from shiplog.errors import ShiplogError
 from shiplog.mcap.part_names import part_files
@@ -47,6 +48,7 @@ class LogPart:
 def report_trials(
     logs: Sequence[LogPart | str | os.PathLike[str]],
     options: ReadingOptions = DEFAULT_OPTIONS,
+    trial_options: TrialOptions = DEFAULT_TRIAL_OPTIONS,
     *,
     model: str | None = None,
     command: str = "",
@@ -60,6 +62,8 @@ def report_trials(
         Paths of logs of one ship, or parts of logs.
     options
         The vessel, the ship's length and the sources of channels, as in `analyse`.
+    trial_options
+        The start rule, the place of the antenna, and assumed errors, as in `analyse_trial`.
     model
         The ship model to identify from all logs together, or ``auto``; by default none.
     command
@@ -83,7 +87,7 @@ def report_trials(
     for number, part in enumerate(parts, start=1):
         of_all = f"log {number} of {len(parts)}"
         on_progress(f"read {of_all}", (number - 1) / len(parts))
-        reported.append(_reported_log(part, options, of_all, on_progress))
+        reported.append(_reported_log(part, (options, trial_options), of_all, on_progress))
     identified, error = None, ""
     if model is not None:
         try:
@@ -91,19 +95,23 @@ def report_trials(
             identified = identify(opened, model, options=options, on_progress=on_progress)
         except ShiplogError as cause:
             error = str(cause)
-    return TrialReport(tuple(reported), __version__, command, identified, error)
+    return TrialReport(tuple(reported), __version__, trial_options, command, identified, error)
 
 
 def _reported_log(
-    part: LogPart, options: ReadingOptions, of_all: str, on_progress: ProgressCallback
+    part: LogPart,
+    both_options: tuple[ReadingOptions, TrialOptions],
+    of_all: str,
+    on_progress: ProgressCallback,
 ) -> ReportedLog:
     """Analyse and replay one log."""
+    options, trial_options = both_options
 
     def on_step(step: str, share: float | None = None, /) -> None:
         on_progress(f"{of_all}: {step}", share)
 
     log = part.open()
-    trial = analyse_trial(log, options, on_progress=on_step)
+    trial = analyse_trial(log, options, trial_options, on_progress=on_step)
     replay, error = None, ""
     try:
         replay = _replayed(log, options, on_step)

@@ -30,7 +30,8 @@ def trial_json(report: TrialReport) -> JsonObject:
     Returns
     -------
     dict
-        ``shiplog``, the version; ``command``; ``logs``, each with ``files`` (``sha256``),
+        ``shiplog``, the version; ``command``; ``options``, the assumed errors; ``logs``, each
+        with ``files`` (``sha256``),
         ``conditions``, ``manoeuvres`` (``position`` in the report; ``indices`` with ``value``,
         ``std``, ``interval_95``, ``criterion``, ``verdict`` and ``probability``), ``criteria``,
         ``not_computed``, ``warnings`` and ``replay``, as of `replay_json`; ``identified``, as of
@@ -42,6 +43,7 @@ def trial_json(report: TrialReport) -> JsonObject:
     result = {
         "shiplog": report.version,
         "command": report.command,
+        "options": asdict(report.options),
         "logs": logs,
         "identified": identification_json(report.identified) if report.identified else None,
         "identification_error": report.identification_error or None,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.replay.replay_results import Findings
 from analysis.trial.trial_analysis import TrialAnalysis
+from analysis.trial.trial_options import DEFAULT_TRIAL_OPTIONS, TrialOptions
 from shiplog.checks.channel_stats import LogStats
 from shiplog.types import Event
 
@@ -76,6 +77,8 @@ class TrialReport:
         In the order given.
     version
         The version of shiplog that computed it.
+    options
+        The start rule, the place of the antenna, and the assumed errors.
     command
         The command line that makes the report again; empty where it was made in Python.
     identified
@@ -86,6 +89,7 @@ class TrialReport:
 
     logs: tuple[ReportedLog, ...]
     version: str
+    options: TrialOptions = DEFAULT_TRIAL_OPTIONS
     command: str = ""
     identified: IdentifiedShip | None = None
     identification_error: str = ""

@@ -4,7 +4,7 @@ from shiplog.text_table import TextTable
 
 from .numbering import manoeuvre_places
 from .trial_report import TrialReport
-from .verdict_rows import verdict_rows
+from .verdict_rows import VerdictRow, verdict_rows
 
 
 def trial_tables(report: TrialReport) -> tuple[TextTable, ...]:
@@ -21,16 +21,20 @@ def trial_tables(report: TrialReport) -> tuple[TextTable, ...]:
             row.name,
             f"{row.value} ({row.lengths})" if row.lengths else row.value,
             row.interval,
-            row.limit,
-            row.probability,
-            row.verdict,
-            row.place.title if row.place else row.note,
+            _verdict_text(row),
         )
         for row in verdict_rows(report, places)
     )
-    columns = ("criterion", "measured", "95 % interval", "limit", "p(met)", "verdict", "manoeuvre")
+    columns = ("criterion", "measured", "95 % interval", "verdict")
     verdicts = TextTable("Verdict, IMO MSC.137(76)", columns, rows, has_prose=True)
     return verdicts, *_not_computed_table(report)
+
+
+def _verdict_text(row: VerdictRow) -> str:
+    """Write the verdict with the limit and its probability, or the reason why there is none."""
+    if row.place is None:
+        return f"{row.verdict}: {row.note}"
+    return f"{row.verdict} ({row.limit}, p {row.probability}), manoeuvre {row.place.position}"
 
 
 def _not_computed_table(report: TrialReport) -> tuple[TextTable, ...]:
@@ -41,7 +45,7 @@ def _not_computed_table(report: TrialReport) -> tuple[TextTable, ...]:
         for each in log.trial.not_computed
     ]
     rows += [
-        (f"{place.title}: {each.subject}", each.reason)
+        (f"manoeuvre {place.position}: {each.subject}", each.reason)
         for of_log in manoeuvre_places(report)
         for place in of_log
         for each in place.manoeuvre.not_computed
