@@ -214,10 +214,11 @@ def _dimension(
     style = {"arrowstyle": "<->", "color": MUTED, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
     chart.axes.annotate("", (x1, y1), xytext=(x0, y0), arrowprops=style)
     upright = abs(y1 - y0) > abs(x1 - x0)
+    outside = "right" if side > 0 else "left"
     chart.axes.annotate(
         text, ((x0 + x1) / 2, (y0 + y1) / 2), xytext=(-5 * side, 0) if upright else (0, 4),
         textcoords="offset points", rotation=90 if upright else 0,
-        ha=("right" if side > 0 else "left") if upright else "center", va="center" if upright else "bottom", fontsize=SMALL,
+        ha=outside if upright else "center", va="center" if upright else "bottom", fontsize=SMALL,
     )  # fmt: skip
 
 
