@@ -86,7 +86,8 @@ def limit(rule: CriterionRule, length: float, test_speed: float) -> tuple[float,
     if ratio >= SLOW:
         return radians(high), f"{high:g}°"
     value = offset + slope * ratio
-    return radians(value), f"{offset:g}° + {slope:g}° · (L/V)/s, here {value:.1f}°"
+    here = f", here {value:.1f}°" if isfinite(value) else ""
+    return radians(value), f"{offset:g}° + {slope:g}° · (L/V)/s{here}"
 
 
 def applies(

@@ -111,16 +111,18 @@ def chart_inches(low: FloatArray, high: FloatArray) -> float:
 
 
 def prepare_chart(axes: Axes, low: FloatArray, high: FloatArray) -> TrackAxes:
-    """Set scales, limits and labels of the axes of a track."""
+    """Set labels and equal scales of the axes of a track, which fill the width of the page."""
     chart = TrackAxes(axes, is_drawn_lying(high - low))
-    axes.set_aspect("equal", adjustable="datalim")
-    (left, bottom), (right, top) = chart.place(*low), chart.place(*high)
+    size = np.array([CHART_INCHES, chart_inches(low, high)])
+    start, end = np.array(chart.place(*low)), np.array(chart.place(*high))
+    half = size * np.max((end - start) / size) / 2
+    (left, bottom), (right, top) = (start + end) / 2 - half, (start + end) / 2 + half
+    axes.set_aspect("equal", adjustable="box")
     axes.set_xlim(left, right)
     axes.set_ylim(*((top, bottom) if chart.lies else (bottom, top)))
     labels = "ahead [m]", "to starboard [m]"
     axes.set_xlabel(labels[0] if chart.lies else labels[1])
     axes.set_ylabel(labels[1] if chart.lies else labels[0])
-    axes.apply_aspect()  # widens the limits to the shape of the axes
     return chart
 
 
