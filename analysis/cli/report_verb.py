@@ -76,7 +76,7 @@ def _report(arguments: argparse.Namespace) -> ExitCode:
     require_outputs(*outputs)
     from analysis.report.page.browser_pdf import find_browser, print_pdf
     from analysis.report.page.report_page import report_page
-    from analysis.report.page.report_trials import LogPart, report_trials
+    from analysis.report.page.report_trials import ReportPart, report_trials
     from analysis.report.page.trial_json import trial_json
     from analysis.report.page.trial_tables import trial_tables
 
@@ -84,7 +84,7 @@ def _report(arguments: argparse.Namespace) -> ExitCode:
         find_browser()  # before the work
     with progress("analysis", lines=len(arguments.log) > 1) as on_progress:
         report = report_trials(
-            [LogPart(path, arguments.start, arguments.end) for path in arguments.log],
+            [ReportPart(path, arguments.start, arguments.end) for path in arguments.log],
             options,
             trial_options,
             model=arguments.model,

@@ -13,7 +13,7 @@ from shiplog.text_table import TextTable
 from shiplog.types import FloatArray
 from shiplog.units import UNITS
 
-from .manoeuvre_histories import has_values
+from .manoeuvre_histories import has_numbers
 from .manoeuvre_track import (
     chart_inches,
     length_scale,
@@ -130,7 +130,7 @@ def _history_figure(group: Sequence[ManoeuvrePlace], anchor: str, title: str) ->
     panels = [
         panel
         for panel in PANELS
-        if any(has_values(panel[1](place.manoeuvre.series)) for place in group)
+        if any(has_numbers(panel[1](place.manoeuvre.series)) for place in group)
     ]
     if not panels:
         return None
@@ -154,7 +154,7 @@ def _draw_panel(axes: Axes, group: Sequence[ManoeuvrePlace], panel: Panel) -> No
     label, values_of, factor, has_sides = panel
     for number, place in enumerate(group):
         values = values_of(place.manoeuvre.series)
-        if has_values(values):
+        if has_numbers(values):
             sign = _mirror(place) if has_sides else 1.0
             axes.plot(
                 place.manoeuvre.series.time_secs,
@@ -172,7 +172,7 @@ def _track_figure(
     tracks = [
         (number, place, shown_track(place.manoeuvre.series, length) * [1.0, _mirror(place)])
         for number, place in enumerate(group)
-        if has_values(place.manoeuvre.series.track)
+        if has_numbers(place.manoeuvre.series.track)
     ]
     if not tracks:
         return None

@@ -35,12 +35,12 @@ def history_figure(manoeuvre: SailedManoeuvre, anchor: str) -> PageFigure | None
             (series.speed, lambda axes: _speed_panel(axes, series)),
             (series.drift, lambda axes: _drift_panel(axes, series)),
         )
-        if has_values(values)
+        if has_numbers(values)
     ]
     steers = (
-        has_values(series.rudder)
-        or has_values(series.rudder_order)
-        or has_values(series.heading_change)
+        has_numbers(series.rudder)
+        or has_numbers(series.rudder_order)
+        or has_numbers(series.heading_change)
     )
     if steers:
         panels.insert(0, lambda axes: _steering_panel(axes, manoeuvre))
@@ -73,7 +73,7 @@ def spiral_figure(manoeuvre: SailedManoeuvre, anchor: str) -> PageFigure | None:
         return page_figure(figure, anchor, f"Spiral curve: {manoeuvre.title}", text)
 
 
-def has_values(values: FloatArray) -> bool:
+def has_numbers(values: FloatArray) -> bool:
     """Whether a time history has any number."""
     return bool(np.any(np.isfinite(values)))
 
@@ -81,16 +81,16 @@ def has_values(values: FloatArray) -> bool:
 def _steering_panel(axes: Axes, manoeuvre: SailedManoeuvre) -> None:
     """Draw rudder and heading in one panel, on one axis where the heading turns little."""
     series = manoeuvre.series
-    turns = has_values(series.heading_change)
+    turns = has_numbers(series.heading_change)
     one_axis = not turns or float(np.nanmax(np.abs(series.heading_change))) < ONE_AXIS_TURN
     heading_axes = axes if one_axis else axes.twinx()
     lines = []
-    if has_values(series.rudder_order):
+    if has_numbers(series.rudder_order):
         lines += axes.plot(
             series.time_secs, np.degrees(series.rudder_order),
             color=RUDDER_LINE, linewidth=0.8, linestyle=(0, (3, 2)), label="rudder order",
         )  # fmt: skip
-    if has_values(series.rudder):
+    if has_numbers(series.rudder):
         lines += axes.plot(
             series.time_secs, np.degrees(series.rudder), color=RUDDER_LINE, label="rudder"
         )
@@ -119,7 +119,7 @@ def _mark_headings(axes: Axes, manoeuvre: SailedManoeuvre) -> None:
     if isfinite(manoeuvre.switch_heading):
         for level in (-manoeuvre.switch_heading, manoeuvre.switch_heading):
             axes.axhline(degrees(level), color=MUTED, linewidth=0.7, linestyle=(0, (1, 2)))
-    if not has_values(series.heading_change):
+    if not has_numbers(series.heading_change):
         return
     for mark in manoeuvre.marks:
         if not series.time_secs[0] <= mark.time_secs <= series.time_secs[-1]:
@@ -143,7 +143,7 @@ def _speed_panel(axes: Axes, series: ManoeuvreSeries) -> None:
     axes.plot(series.time_secs, series.speed / KNOT, color=SPEED_LINE, label="speed")
     axes.set_ylabel("speed [kn]")
     axes.set_ylim(bottom=min(0.0, float(np.nanmin(series.speed)) / KNOT))
-    if not has_values(series.rpm):
+    if not has_numbers(series.rpm):
         return
     rpm_axes = axes.twinx()
     rpm_axes.plot(
@@ -175,7 +175,7 @@ def _history_text(manoeuvre: SailedManoeuvre) -> str:
         ("Drift angle", series.drift, degrees(1), "degrees"),
         ("Revolutions", series.rpm, 1.0, "per minute"),
     ):
-        if has_values(values):
+        if has_numbers(values):
             low, high = np.nanmin(values) * factor, np.nanmax(values) * factor
             parts.append(f"{name} from {low:.3g} to {high:.3g} {unit}.")
     return " ".join(parts)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreKind, ManoeuvreSeries, SailedManoeuvre
 from shiplog.types import FloatArray
 
-from .manoeuvre_histories import has_values
+from .manoeuvre_histories import has_numbers
 from .svg_figure import CHART_INCHES, INK, MUTED, SERIES, PageFigure, new_figure, page_figure
 
 HEIGHTS_INCHES = (1.2, 3.7)  # least and greatest height of the axes
@@ -152,7 +152,7 @@ def length_scale(chart: TrackAxes, length: float) -> None:
 
 def _turn_times(series: ManoeuvreSeries) -> dict[float, float]:
     """Return the instants, s, at which the heading has changed by each of `TURN_MARKS`."""
-    if not has_values(series.heading_change):
+    if not has_numbers(series.heading_change):
         return {}
     turned = np.abs(np.where(series.time_secs >= 0, series.heading_change, 0.0))
     return {
@@ -169,7 +169,7 @@ def _place_at(series: ManoeuvreSeries, at_secs: float) -> tuple[float, float]:
 
 def _outlines(chart: TrackAxes, series: ManoeuvreSeries, length: float) -> None:
     """Draw the ship to scale at the execute and at each quarter of a turn."""
-    if not isfinite(length) or not has_values(series.heading_change):
+    if not isfinite(length) or not has_numbers(series.heading_change):
         return
     hull = np.array([[0.5, 0.0], [0.3, 1.0], [-0.5, 1.0], [-0.5, -1.0], [0.3, -1.0], [0.5, 0.0]])
     hull = hull * [length, HALF_BEAM_SHARE * length]

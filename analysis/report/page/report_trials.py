@@ -25,7 +25,7 @@ from .trial_report import LogDigest, ReportedLog, TrialReport
 
 
 @dataclass(frozen=True)
-class LogPart:
+class ReportPart:
     """A log, or a part of one, that a report is about.
 
     Attributes
@@ -46,7 +46,7 @@ class LogPart:
 
 
 def report_trials(
-    logs: Sequence[LogPart | str | os.PathLike[str]],
+    logs: Sequence[ReportPart | str | os.PathLike[str]],
     options: ReadingOptions = DEFAULT_OPTIONS,
     trial_options: TrialOptions = DEFAULT_TRIAL_OPTIONS,
     *,
@@ -82,7 +82,7 @@ def report_trials(
     LogError
         A log cannot be read, or contradicts itself where `options` is strict.
     """
-    parts = [each if isinstance(each, LogPart) else LogPart(each) for each in logs]
+    parts = [each if isinstance(each, ReportPart) else ReportPart(each) for each in logs]
     reported = []
     for number, part in enumerate(parts, start=1):
         of_all = f"log {number} of {len(parts)}"
@@ -99,7 +99,7 @@ def report_trials(
 
 
 def _reported_log(
-    part: LogPart,
+    part: ReportPart,
     both_options: tuple[ReadingOptions, TrialOptions],
     of_all: str,
     on_progress: ProgressCallback,

@@ -12,7 +12,7 @@ import pytest
 from places import SAMPLE_DATA
 
 from analysis.report.page.report_page import report_page
-from analysis.report.page.report_trials import LogPart, report_trials
+from analysis.report.page.report_trials import ReportPart, report_trials
 from analysis.report.page.trial_json import trial_json
 from analysis.report.page.trial_report import ReportedLog, TrialReport
 from shiplog import TrialLog, read, write
@@ -85,7 +85,7 @@ CASES = {
 @pytest.fixture(scope="module")
 def poor(folder: Path) -> tuple[TrialReport, str]:
     """Return the report and the page of logs that each lack something; of no known length."""
-    parts = [LogPart(broken(name, change, folder)) for name, (_, change) in CASES.items()]
+    parts = [ReportPart(broken(name, change, folder)) for name, (_, change) in CASES.items()]
     report = report_trials(parts)
     return report, report_page(report)
 
