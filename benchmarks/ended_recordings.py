@@ -18,12 +18,13 @@ from recorders.streams.stream_source import StreamSource
 from recorders.transports.live_stream import LiveStream
 from recorders.trial.live_source import LiveInput, LiveSource, waiting_packets
 from shiplog import ShiplogError, read
+from shiplog.interrupts import stopped_by_signals
 from shiplog.mcap import open_chunk
 
 from .forked_trials import fork
 
 RATE_HZ = 100
-FIRST_END_SECS, LAST_END_SECS = 0.4, 3.4  # after the start of a recording
+MAX_SECS = 3.0  # from the begin of the reception to the end
 ENDED_TOGETHER = 20
 SMALL_MCAP_CHUNK_BYTES = 4096  # closed about every half second
 REFUSED = 7  # exit code of the recorder that found the name taken
@@ -57,24 +58,24 @@ def end_recordings(
     chance = np.random.default_rng(seed)
     lost, failures = [], []
     for begin in range(0, moments, ENDED_TOGETHER):
-        running = []
-        for index in range(begin, min(begin + ENDED_TOGETHER, moments)):
-            path = folder / f"{number.name}{index}.mcap"
-            child = fork(partial(_record_live, path, has_small_chunks=index % 2 == 1))
-            running.append((child, path))
+        running = [
+            _start(folder / f"{number.name}{index}.mcap", has_small_chunks=index % 2 == 1)
+            for index in range(begin, min(begin + ENDED_TOGETHER, moments))
+        ]
         started = time.monotonic()
-        ends = sorted(chance.uniform(FIRST_END_SECS, LAST_END_SECS) for _ in running)
+        ends = sorted(chance.uniform(0.0, MAX_SECS) for _ in running)
         ended = []
-        for end, (child, path) in zip(ends, running, strict=True):
+        for end, (child, path, opened_ns) in zip(ends, running, strict=True):
             time.sleep(max(0.0, started + end - time.monotonic()))
             os.kill(child, number)
-            ended.append((child, path, time.time_ns(), end))
-        for child, path, ended_ns, end in ended:
+            ended.append((child, path, opened_ns, time.time_ns()))
+        for child, path, *span_ns in ended:
             code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
             try:
-                lost.append(_lost_secs(path, ended_ns, code, number))
+                lost.append(_lost_secs(path, span_ns, code, number))
             except Exception as error:  # noqa: BLE001 - whatever it is, the file is not as it must be
-                failures.append(f"{path.name}, {number.name} after {end:.3f} s: {error!r}")
+                secs = (span_ns[1] - span_ns[0]) * 1e-9
+                failures.append(f"{path.name}, {number.name} after {secs:.3f} s: {error!r}")
     failures += [f"{secs:.3f} s were lost by {number.name}" for secs in lost if secs > 1.0]
     return lost, failures
 
@@ -112,15 +113,18 @@ def start_together(pairs: int, folder: Path) -> list[str]:
 
 
 class _Steady:
-    """A transport that sends consecutive numbers, `RATE_HZ` a second."""
+    """A transport that sends consecutive numbers, `RATE_HZ` a second, and reports its begin."""
 
     address, lost = "a steady sensor", 0
 
-    def __init__(self, clock: ReceptionClock, first: int) -> None:
-        self._clock, self._first, self._count = clock, first, 0
+    def __init__(
+        self, clock: ReceptionClock, first: int, on_open: Callable[[], None] = lambda: None
+    ) -> None:
+        self._clock, self._first, self._count, self._on_open = clock, first, 0, on_open
 
     def open(self) -> None:
         self._start = time.monotonic()
+        self._on_open()
 
     def receive(self, timeout_secs: float) -> list[Packet]:
         time.sleep(max(0.0, min(timeout_secs, self._due() - time.monotonic())))
@@ -157,19 +161,35 @@ def _end_pair(samples: int) -> None:
         os.kill(os.getpid(), signal.SIGINT)
 
 
+def _start(path: Path, *, has_small_chunks: bool) -> tuple[int, Path, int]:
+    """Start a recording, and return its process id, its log, and when its reception began, ns."""
+    reader, writer = os.pipe()
+
+    def work() -> int:
+        if has_small_chunks:
+            vars(open_chunk)["MAX_MCAP_CHUNK_BYTES"] = SMALL_MCAP_CHUNK_BYTES
+        return _record_live(path, on_open=lambda: os.close(writer))
+
+    child = fork(work)
+    os.close(writer)
+    os.read(reader, 1)
+    os.close(reader)
+    return child, path, time.time_ns()
+
+
 def _record_live(
     path: Path,
     first: int = 0,
     *,
-    has_small_chunks: bool = False,
+    on_open: Callable[[], None] = lambda: None,
     on_chunk: Callable[[int], None] = lambda _: None,
 ) -> int:
-    if has_small_chunks:
-        vars(open_chunk)["MAX_MCAP_CHUNK_BYTES"] = SMALL_MCAP_CHUNK_BYTES  # in this process
     clock = ReceptionClock()
-    live = LiveStream(_Steady(clock, first), clock, "sensor")
+    live = LiveStream(_Steady(clock, first, on_open), clock, "sensor")
     stream = StreamSource("sensor", "numbers", waiting_packets(live), _Numbers(), keep_raw=True)
-    record(LiveSource([LiveInput(live, stream)], clock), path, overwrites=False, on_chunk=on_chunk)
+    source = LiveSource([LiveInput(live, stream)], clock)
+    with stopped_by_signals(source.stop):  # as the command does
+        record(source, path, overwrites=False, on_chunk=on_chunk)
     return 0
 
 
@@ -183,8 +203,8 @@ def _record_when_closed(path: Path, first: int, reader: int, writer: int) -> int
         return REFUSED
 
 
-def _lost_secs(path: Path, ended_ns: int, code: int, number: signal.Signals) -> float:
-    """Return how much of the end of a recording is missing, s."""
+def _lost_secs(path: Path, span_ns: Sequence[int], code: int, number: signal.Signals) -> float:
+    """Return how much of the end of a recording is missing, s; `span_ns` is its begin and end."""
     part = path.with_name(path.name + ".part")
     if number == signal.SIGKILL:
         path, part = part, path
@@ -194,9 +214,11 @@ def _lost_secs(path: Path, ended_ns: int, code: int, number: signal.Signals) -> 
         _require_finished(path)
     if part.exists():
         raise ValueError(f"there is a file {part.name}")
-    rpm = read(path)["rpm"]
-    np.testing.assert_array_equal(rpm.values, np.arange(len(rpm)))
-    return float(ended_ns - int(rpm.received_ns[-1])) * 1e-9
+    last_ns, ended_ns = span_ns
+    for channel in read(path).channels:  # there is none before the first flush
+        np.testing.assert_array_equal(channel.values, np.arange(len(channel)))
+        last_ns = int(channel.received_ns[-1])
+    return max(0.0, float(ended_ns - last_ns) * 1e-9)  # a signal ends it at its next batch
 
 
 def _require_finished(path: Path) -> None:

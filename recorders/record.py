@@ -1,7 +1,6 @@
 """The loop that writes a source of samples to a log, safe against crashes and signals."""
 
 import os
-import re
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
@@ -14,7 +13,7 @@ from uuid import uuid4
 from shiplog.errors import ShiplogError
 from shiplog.files import claimed_name, is_device, replace_durably, write_error
 from shiplog.interrupts import deferred, handled_signals, interruptible, take_waiting
-from shiplog.mcap.part_names import UNFINISHED
+from shiplog.mcap.part_names import UNFINISHED, recorded_files
 from shiplog.mcap.writer import LogWriter
 from shiplog.types import Channel, Event
 
@@ -127,7 +126,11 @@ def growing_file(path: Path, rotation: Rotation | None) -> Path:
     """Return the file to which a running recording of a log is written at the moment."""
     if is_device(path):
         return path
-    parts = [file for file in _files_of(path, rotation) if file.name.endswith(UNFINISHED)]
+    parts = [
+        file
+        for file in recorded_files(path, is_divided=rotation is not None)
+        if file.name.endswith(UNFINISHED)
+    ]
     return parts[-1] if parts else path
 
 
@@ -137,7 +140,7 @@ def _require_free(path: Path, rotation: Rotation | None, *, overwrites: bool) ->
         return
     if path.is_dir() or not path.parent.is_dir():
         raise write_error(path, FileNotFoundError())
-    for file in _files_of(path, rotation):
+    for file in recorded_files(path, is_divided=rotation is not None):
         if file.name.endswith(UNFINISHED):
             raise _unfinished(file)
         if not overwrites:
@@ -145,15 +148,6 @@ def _require_free(path: Path, rotation: Rotation | None, *, overwrites: bool) ->
                 f"a log of this name exists, and a live recording replaces none; name another with "
                 f"-o, or move it: {file}"
             )
-
-
-def _files_of(path: Path, rotation: Rotation | None) -> list[Path]:
-    """Return the files that a recording of a log has, or an older one has, by name."""
-    number = "" if rotation is None else r"\.\d{3,}"
-    name = re.compile(
-        rf"{re.escape(path.stem)}{number}{re.escape(path.suffix)}({re.escape(UNFINISHED)})?"
-    )
-    return sorted(file for file in path.parent.iterdir() if name.fullmatch(file.name))
 
 
 def _unfinished(part: Path) -> ShiplogError:
@@ -345,6 +339,8 @@ class _RecordedPart:
         on_chunk: Callable[[int], None],
     ) -> _End:
         opened = time.monotonic()
+        with _write_errors():
+            writer.flush()  # a file that is killed before its first sample can be read
         chunk = _next_chunk(chunks) if first is None else first
         while chunk is not None:
             self._has_data |= any(len(item) for item in chunk if not isinstance(item, Event))

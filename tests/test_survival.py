@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 from benchmarks import ended_recordings, survival
 
-ended_recordings.LAST_END_SECS = 0.9
+ended_recordings.MAX_SECS = 0.7
 folder = Path(sys.argv[1])
 verbs = ["record", "convert to csv"]
 survival.make_inputs(folder)
@@ -29,7 +29,7 @@ for verb in verbs:
     outcomes, failures = survival.interrupt(verb, 4, folder)
     assert not failures, failures
     codes = {outcome.partition(",")[0] for outcome in outcomes}
-    assert codes == {"exit code 4", "exit code -9"}, outcomes
+    assert codes >= {"exit code 4", "exit code -9"}, outcomes
     outcomes, failures = survival.fill_disk(verb, 2, folder)
     assert not failures, failures
     kept = ["readable remainder"] if verb == "record" else ["nothing", "the older file"]

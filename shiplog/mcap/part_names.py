@@ -28,8 +28,30 @@ def part_files(path: Path) -> tuple[Path, ...]:
     elif _WILDCARDS & set(path.name):
         found = [file for file in path.parent.glob(path.name) if _is_log(file)]
     else:
-        found = _numbered_files(path)
+        found = recorded_files(path, is_divided=True)
     return tuple(sorted(found)) or (path,)
+
+
+def recorded_files(path: Path, *, is_divided: bool) -> list[Path]:
+    """Return the files that a recording of a log has, or an older one has, finished or not.
+
+    Parameters
+    ----------
+    path
+        The name of the recording.
+    is_divided
+        Whether its files are numbered parts, ``trial.001.mcap`` of ``trial.mcap``.
+
+    Returns
+    -------
+    files
+        In the order of their names.
+    """
+    if not path.parent.is_dir():
+        return []
+    number = r"\.\d{3,}" if is_divided else ""
+    name = rf"{re.escape(path.stem)}{number}{re.escape(path.suffix)}(?:{re.escape(UNFINISHED)})?"
+    return sorted(file for file in path.parent.iterdir() if re.fullmatch(name, file.name))
 
 
 def log_suffix(path: Path) -> str:
@@ -53,14 +75,6 @@ def log_stem(path: Path) -> str:
     """
     plain = re.sub(r"[*?\[\]]", "", path.stem if path.suffix else path.name).strip("._-")
     return plain or path.resolve().parent.name
-
-
-def _numbered_files(path: Path) -> list[Path]:
-    """Return the parts of a recording that was named `path`."""
-    if not path.parent.is_dir():
-        return []
-    name = rf"{re.escape(path.stem)}\.\d{{3,}}{re.escape(path.suffix)}(?:{re.escape(UNFINISHED)})?"
-    return [file for file in path.parent.iterdir() if re.fullmatch(name, file.name)]
 
 
 def _is_log(file: Path) -> bool:

@@ -46,6 +46,18 @@ def test_all_samples_of_a_source_are_written_and_counted(tmp_path: Path) -> None
     assert log.metadata["source"] == "test"
 
 
+def test_the_growing_file_can_be_read_before_its_first_sample(tmp_path: Path) -> None:
+    logs = []
+
+    class LateSensor(Sensor):
+        def chunks(self) -> Iterator[tuple[Channel, ...]]:
+            logs.append(read(tmp_path / "a.mcap.part"))
+            yield from super().chunks()
+
+    record(LateSensor(), tmp_path / "a.mcap")
+    assert [(log.channels, log.metadata["source"]) for log in logs] == [((), "test")]
+
+
 def test_ctrl_c_ends_the_recording_and_keeps_the_samples(tmp_path: Path) -> None:
     recording = record(Sensor(KeyboardInterrupt()), tmp_path / "a.mcap")
     assert recording == Recording(20, 1, interrupted=True, files=(tmp_path / "a.mcap",))
