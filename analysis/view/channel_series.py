@@ -194,7 +194,9 @@ def _quantity(
     commanded = channel.name.removesuffix(ORDER_SUFFIX)
     other = stats.get(commanded)
     name = commanded if other is not None and other.unit == channel.unit else channel.name
-    return DrawnQuantity(name, channel.unit, channel.fields, display_units.get(name, ""))
+    is_usual = name in CATALOGUE and channel.unit == CATALOGUE[name].unit
+    shown = display_units.get(name, "") if is_usual else ""
+    return DrawnQuantity(name, channel.unit, channel.fields, shown)
 
 
 def channel_label(channel: ChannelStats, quantity: DrawnQuantity) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from shiplog.checks.event_table import OPERATOR
 from shiplog.types import FloatArray
+from shiplog.units import CATALOGUE
 
 from .channel_series import DrawnQuantity
 from .log_drawing import LogDrawing
@@ -35,7 +36,7 @@ def log_panels(drawings: Sequence[LogDrawing]) -> tuple[list[Panel], list[Panel]
         The logs; the times of each count from its own start.
     """
     quantities = list(dict.fromkeys(each for drawing in drawings for each in drawing.series))
-    main = [[q for q in quantities if q.name in names and not q.fields] for names in MAIN_PANELS]
+    main = [[q for q in quantities if q.name in names and _is_usual(q)] for names in MAIN_PANELS]
     others = [[each] for each in quantities if not any(each in group for group in main)]
     panels = []
     headings, rudders = main[:2]
@@ -46,6 +47,14 @@ def log_panels(drawings: Sequence[LogDrawing]) -> tuple[list[Panel], list[Panel]
     if len(drawings) > 1:  # the first legend serves all
         panels = [replace(panel, legend=panel is panels[0]) for panel in panels]
     return panels, [_panel(drawings, group) for group in others]
+
+
+def _is_usual(quantity: DrawnQuantity) -> bool:
+    """Whether a quantity of the catalogue has its unit there, so that others can be drawn with it.
+
+    A log of another program may have a unit that is not known.
+    """
+    return quantity.unit == CATALOGUE[quantity.name].unit and not quantity.fields
 
 
 def _turn(drawings: Sequence[LogDrawing], headings: Sequence[DrawnQuantity]) -> float:

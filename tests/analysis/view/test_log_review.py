@@ -80,6 +80,30 @@ def test_speeds_through_the_water_and_over_the_ground_share_a_panel() -> None:
     ]
 
 
+def test_a_quantity_in_an_unknown_unit_is_drawn_in_it_alone() -> None:
+    odd = [
+        replace(channel(TIMES / 1000, TIMES, name), unit="bar/h")
+        for name in ("yaw_rate", "heading")
+    ]
+    log = TrialLog("a", (*odd, ZIGZAG["rudder"]))
+    titles = [panel.title for panel in panels_of(log)]
+    assert titles == [
+        "rudder [deg]: -10 to 10",
+        "yaw rate [bar/h]: 0 to 0.1",
+        "heading [bar/h]: 0 to 0.1",
+    ]
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_log_of_one_sample_or_of_none_that_is_measured_has_a_review(
+    tmp_path: Path, count: int
+) -> None:
+    values = np.where(np.arange(5) < count, 0.5, np.nan)
+    log = TrialLog("a", (channel(values, name="heading"), channel(values, name="rudder")))
+    write_log_review([draw_log(log)], tmp_path / "a.rrd", "")
+    assert (len(view_titles(tmp_path / "a.rrd")) > 1) == (count == 1)
+
+
 def test_a_gap_is_a_red_bar_at_the_foot_and_an_event() -> None:
     kept = np.r_[0:20, 45:101]
     log = TrialLog("a", (channel(np.sin(TIMES[kept]), TIMES[kept], "speed"),))
