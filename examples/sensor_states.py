@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from analysis import Analysis, ReadingOptions, analyse
 from analysis.filters.further_parts import CURRENT_WALK, DRIFT_WALK, SENSOR_WALKS
-from analysis.replay.sensor_errors import SensorError, further_display
+from analysis.replay.sensor_errors import SlowState, further_display
 from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import Gust
 from shiplog import TrialLog, Vessel, load_vessel, read
@@ -200,7 +200,7 @@ def error(result: Analysis, truth: TrialLog, name: str, state: int) -> float:
     return rms((result.estimates.states[:, state] - true)[kept])
 
 
-def stated(errors: Sequence[SensorError], name: str) -> str:
+def stated(errors: Sequence[SlowState], name: str) -> str:
     """Return a sensor error with its 95 % interval; a dash where there is none."""
     for each in errors:
         if each.name == name and each.determined:

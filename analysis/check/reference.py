@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.filters.base import STATES
+from analysis.filters.wind_terms import WIND_TERMS
 from analysis.regression.coefficients import CoefficientFit
 from analysis.regression.sliding import CoefficientHistory
 from analysis.replay.replay_results import Analysis
@@ -45,6 +46,9 @@ _UNITS = {
     "surge_acceleration": "m/s²",
     "yaw_disturbance": "rad/s³",
     "surge_disturbance": "m/s²",
+    "yaw_wind_disturbance": "rad/s³",
+    "surge_wind_disturbance": "m/s²",
+    **dict.fromkeys(WIND_TERMS, "m²/s²"),  # as signals; the coefficients have their own unit
     "yaw_rate": "rad/s",
     "speed": "m/s",
     "rudder": "rad",
@@ -156,7 +160,7 @@ def _track_and_warnings(analysis: Analysis) -> Iterator[Channel]:
     track = analysis.track
     yield _blocks(analysis, "north", "track", track.north, track.time_secs)
     yield _blocks(analysis, "east", "track", track.east, track.time_secs)
-    for error in analysis.findings.sensor_errors:
+    for error in (*analysis.findings.sensor_errors, *analysis.findings.wind):
         yield _single(analysis, f"{error.name}_determined", "count", float(error.determined))
     yield _single(analysis, "warnings", "count", float(len(analysis.findings.warnings)))
 

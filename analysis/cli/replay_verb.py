@@ -18,7 +18,7 @@ from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import extension_names
 from shiplog.mcap.part_names import log_stem
 from shiplog.toml_text import parse_toml
-from shiplog.vessel.settings import DISTURBANCES, SENSOR_ERRORS
+from shiplog.vessel.settings import DISTURBANCE_CHOICES, SENSOR_ERRORS
 
 from .shared_options import add_reading_options, reading_options, show_review
 
@@ -50,7 +50,8 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--disturbance",
         metavar="MODELS",
-        help=f"the disturbances to estimate, some of {','.join(DISTURBANCES)} (default: constant)",
+        help=f"the disturbances to estimate, some of {','.join(DISTURBANCE_CHOICES)} "
+        "(default: constant); wind needs --smooth and the channels of the wind",
     )
     parser.add_argument(
         "--set",

@@ -23,6 +23,8 @@ DISTURBANCE_UNITS = {
     "surge": ("m/s²", "mm/s²", 1e3),
     "yaw_wave": ("rad/s³", "0.001 deg/s³", degrees(1) * 1e3),
     "surge_wave": ("m/s²", "mm/s²", 1e3),
+    "yaw_wind": ("rad/s³", "0.001 deg/s³", degrees(1) * 1e3),
+    "surge_wind": ("m/s²", "mm/s²", 1e3),
 }
 
 
@@ -47,6 +49,8 @@ class Disturbance:
     stds
         (n, 2): standard deviations of `yaw` and `surge`, rad/s³ and m/s²; None from the observer,
         of which only that of its noise is known (`DisturbanceSummary.noise_std`).
+    yaw_wind, surge_wind
+        The moment and the force of the wind, rad/s³ and m/s², (n,); None where none is estimated.
     """
 
     yaw: FloatArray
@@ -55,6 +59,8 @@ class Disturbance:
     yaw_wave: FloatArray | None = None
     surge_wave: FloatArray | None = None
     stds: FloatArray | None = None
+    yaw_wind: FloatArray | None = None
+    surge_wind: FloatArray | None = None
 
     @property
     def is_finite(self) -> bool:
@@ -155,7 +161,8 @@ class DisturbanceCollector:
         Parameters
         ----------
         forces
-            (n,) of ``yaw``, ``surge`` and the waves that are estimated, rad/s³ and m/s².
+            (n,) of ``yaw``, ``surge``, and of waves and wind as far as they are estimated, rad/s³
+            and m/s².
         speed, rpm
             (n,) the speed, m/s, and the revolutions.
         stds
@@ -174,6 +181,8 @@ class DisturbanceCollector:
             forces.get("yaw_wave"),
             forces.get("surge_wave"),
             stds,
+            forces.get("yaw_wind"),
+            forces.get("surge_wind"),
         )
         for name, collector in self._summaries.items():
             collector.add(getattr(disturbance, name))

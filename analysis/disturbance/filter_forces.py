@@ -3,6 +3,7 @@
 import numpy as np
 
 from analysis.filters.base import OUTPUT_STATES, Estimates
+from analysis.filters.wind_terms import WIND_TERMS
 from analysis.signals.moments import Moments
 from analysis.signals.signal_stats import SignalStats
 from shiplog.ships.paper import Coefficients
@@ -32,6 +33,8 @@ class FilterForces:
         Statistics of the signals.
     settings
         The settings of ``[disturbance]``.
+    wind
+        The terms of the wind among the states, some of `WIND_TERMS`.
     rudder_max
         The ship's largest rudder angle, rad, for `excess_share`.
     """
@@ -42,6 +45,7 @@ class FilterForces:
         stats: SignalStats,
         settings: DisturbanceSettings,
         *,
+        wind: tuple[str, ...] = (),
         rudder_max: float = RUDDER_MAX,
     ) -> None:
         degree = 1 if "ramp" in settings.models else 0
@@ -50,10 +54,15 @@ class FilterForces:
         settling = {"yaw": yaw, "rudder": yaw, "surge": surge}
         if "wave" in settings.models:
             settling |= {"yaw_wave": yaw, "surge_wave": surge}
+        self._wind = {
+            name: tuple(term for term in wind if WIND_TERMS[term].axis == axis)
+            for axis, name in enumerate(("yaw_wind", "surge_wind"))
+        }
+        settling |= {name: yaw if name == "yaw_wind" else surge for name in self._wind if wind}
         self._collector = DisturbanceCollector(
             model, stats, settling, rudder_max=rudder_max, has_transient=False
         )
-        self._variances = {name: Moments() for name in STATES if name in settling}
+        self._variances = {name: Moments() for name in (*STATES, *self._wind) if name in settling}
 
     def step(self, chunk: Signals, estimates: Estimates) -> Disturbance:
         """Return the disturbances of the next chunk.
@@ -67,13 +76,31 @@ class FilterForces:
         """
         forces, stds = {}, {}
         for name, moments in self._variances.items():
-            found = estimates.further.of(STATES[name]) if estimates.further else None
-            # a slow part that is not modelled, or a wave too fast for the samples
-            forces[name], stds[name] = found or (np.zeros(len(chunk)), np.zeros(len(chunk)))
+            if name in self._wind:
+                forces[name], stds[name] = self._force_of_wind(name, chunk, estimates)
+            else:
+                found = estimates.further.of(STATES[name]) if estimates.further else None
+                # a slow part that is not modelled, or a wave too fast for the samples
+                forces[name], stds[name] = found or (np.zeros(len(chunk)), np.zeros(len(chunk)))
             moments.add(stds[name])
         slow_stds: FloatArray = np.column_stack((stds["yaw"], stds["surge"]))
         speed = estimates.states[:, OUTPUT_STATES[1]]
         return self._collector.add(forces, speed, chunk["rpm"], slow_stds)
+
+    def _force_of_wind(
+        self, name: str, chunk: Signals, estimates: Estimates
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the moment or force of the wind (n,), and its standard deviation at most.
+
+        The standard deviation is that of coefficients that err alike.
+        """
+        force, std = np.zeros(len(chunk)), np.zeros(len(chunk))
+        for term in self._wind[name]:
+            found = estimates.further.of(term) if estimates.further else None
+            if found is not None:
+                force += found[0] * chunk[term]
+                std += found[1] * np.abs(chunk[term])
+        return force, std
 
     @property
     def excess_share(self) -> float:

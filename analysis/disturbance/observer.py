@@ -94,6 +94,8 @@ class ForceObserver:
         self._stds: dict[str, float] = {}
         settling: dict[str, float] = {}
         for name in DISTURBANCE_UNITS:
+            if name.endswith("wind"):  # a state of the filter alone
+                continue
             output, design = (1, surge) if name.startswith("surge") else (0, yaw)
             if name.endswith("wave") and models[name.removesuffix("_wave")][0].wave is None:
                 continue

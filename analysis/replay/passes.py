@@ -24,11 +24,12 @@ from shiplog.resampling import Clock, choose_clock, resample_chunks, with_steeri
 from shiplog.screening import ScreenedLog, Screening, screen_log, screen_without_delays
 from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS, Coefficients
 from shiplog.types import ChunkedLog, FloatArray, Log
-from shiplog.vessel.settings import MIN_WINDOW_SECS
+from shiplog.vessel.settings import MIN_WINDOW_SECS, WIND
 
 from .channel_warnings import channel_warnings, end_warnings, late_channel_warnings
 from .measured_channels import MeasuredChannels, RawChunks, with_measured_channels
 from .reading_options import ReadingOptions
+from .wind import WIND_CHANNEL_NAMES, WindSignals, with_wind_channels
 
 REQUIRED_CHANNELS = (*PAPER_OUTPUTS, *PAPER_INPUTS)
 OPTIONAL_CHANNELS = ("heading", "position")
@@ -107,14 +108,17 @@ def first_pass(
     ------
     LogError
         Where a required channel is missing or a channel cannot be used.
+    UsageError
+        Where a wind is asked for that the log does not state.
     """
     on_progress("check the log", 0.0)
+    needs_wind = WIND in vessel.disturbance.models
 
     def screen(recorded: Log) -> ScreenedLog:
         return screen_log(
             recorded,
             REQUIRED_CHANNELS,
-            OPTIONAL_CHANNELS,
+            (*OPTIONAL_CHANNELS, *(WIND_CHANNEL_NAMES if needs_wind else ())),
             purpose="a replay",
             sources=options.sources,
             derive=options.derive,
@@ -125,6 +129,8 @@ def first_pass(
     clock = choose_clock(screened, stats, channels=REQUIRED_CHANNELS, optional=("heading",))
     if vessel.filter.sensors:
         clock = with_measured_channels(clock, stats)
+    if needs_wind:
+        clock = with_wind_channels(clock, stats)
     return FirstPass(screened, with_steering_gear(clock, vessel.rudder_rate))
 
 
@@ -159,12 +165,12 @@ def second_pass(
         vessel.identifier.window_secs,
     )
     consistency = ConsistencyCheck(log_stats)
-    hold, collector = InputHold(clock), SignalStatsCollector(alphas)
+    hold, collector, wind = InputHold(clock), SignalStatsCollector(alphas), WindSignals(clock)
     expected = [clock.channels[name].interval_secs / clock.dt_secs for name in PAPER_OUTPUTS]
     intervals = np.maximum(np.round(expected), 1.0)
     equations = _Equations(alphas, clock, intervals, window_secs)
     listeners, chunked = (hold.add_raw, consistency.add), MeasuredChannels(log, clock, log_stats)
-    for signals in resampled_chunks(chunked, clock, on_progress, "resample", *listeners):
+    for signals in resampled_chunks(chunked, clock, on_progress, "resample", *listeners, wind=wind):
         collector.add(hold.step(signals))
         equations.add(signals, collector.max_speed)
     stats = collector.result()
@@ -182,6 +188,7 @@ def second_pass(
         *late_channel_warnings(log_stats),
         *end_warnings(log_stats, clock, REQUIRED_CHANNELS),
         *hold.warnings(),
+        *wind.warnings(),
         *equations.window_warnings(),
     ]
     wrong = tuple(finding.text for finding in findings if finding.kind in CONTRADICTIONS)
@@ -195,6 +202,7 @@ def resampled_chunks(
     on_progress: ProgressCallback,
     step: str,
     *listeners: Callable[[tuple[Channel, ...]], None],
+    wind: WindSignals | None = None,
 ) -> Iterator[Signals]:
     """Resample a log to its clock, chunk by chunk.
 
@@ -210,12 +218,15 @@ def resampled_chunks(
         The name of this pass.
     *listeners
         Called with each chunk of raw channels before it is resampled.
+    wind
+        Adds the regressors of the wind; by default one without a state.
 
     Yields
     ------
     Signals
         Consecutive chunks of the signals.
     """
+    wind = wind or WindSignals(clock)
 
     def raw_chunks() -> Iterator[tuple[Channel, ...]]:
         for chunk in log.chunks():
@@ -225,7 +236,7 @@ def resampled_chunks(
 
     on_progress(step, 0.0)
     for signals in resample_chunks(raw_chunks(), clock):
-        yield signals
+        yield wind.step(signals)
         on_progress(step, (signals.first + len(signals)) / clock.count)
 
 

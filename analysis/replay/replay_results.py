@@ -13,7 +13,7 @@ from shiplog.types import Event
 from .current import Current
 from .plan import Plan
 from .residuals import ResidualSummary
-from .sensor_errors import SensorError
+from .sensor_errors import SlowState
 from .track import Track
 
 
@@ -58,7 +58,8 @@ class Findings:
         (``north``, ``east``) that the filter uses.
     disturbances
         The summary of each disturbance: ``"yaw"``, ``"rudder"`` (yaw, as the rudder that would do
-        the same), ``"surge"``, and ``"yaw_wave"`` and ``"surge_wave"`` where they are estimated.
+        the same), ``"surge"``, and ``"yaw_wave"``, ``"surge_wave"``, ``"yaw_wind"`` and
+        ``"surge_wind"`` where they are estimated.
     yaw, surge
         The coefficients over the whole trial, with standard deviations.
     changes
@@ -73,6 +74,8 @@ class Findings:
         The sensor errors that the filter estimates, and those that it was to and cannot.
     current
         The current at the end of the trial; None where the filter does not estimate it.
+    wind
+        The coefficients of the wind that the filter estimates, and those that it cannot.
     """
 
     plan: Plan
@@ -85,8 +88,9 @@ class Findings:
     track_origin: str
     warnings: tuple[str, ...]
     events: tuple[Event, ...] = ()
-    sensor_errors: tuple[SensorError, ...] = ()
+    sensor_errors: tuple[SlowState, ...] = ()
     current: Current | None = None
+    wind: tuple[SlowState, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,13 @@
-"""Sensor errors that the filter found: their values, and whether the log determines them."""
+"""Sensor errors and coefficients of the wind as the filter found them, determined or not."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import nan
+from math import degrees, nan
 
 import numpy as np
 
-from analysis.filters.further_parts import HOUR, SENSOR_WALKS
+from analysis.filters.further_parts import HOUR, RandomWalk
+from analysis.filters.wind_terms import SURGE, WIND_TERMS
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.units import display_conversion
 
@@ -15,6 +16,8 @@ from .residuals import ResidualSummary
 DETERMINED_SHARE = 1 / 3  # of the standard deviation at the start
 MAX_NIS = 2.0  # mean normalised innovation squared: above it the standard deviations are wrong
 MAX_CHANGE_STDS = 5.0  # of an error in half a trial, in the standard deviations stated for it
+SLOW_SENSOR_ERRORS = "heading or model have slow errors; state a larger filter.heading_std"
+SLOW_WIND_ERRORS = "the wind measured on board is not that on the ship, or the model is wrong"
 OTHER_MODEL = "give another model with --vessel"
 LARGER_NOISE = {
     **dict.fromkeys(PAPER_OUTPUTS, "set filter.process_ratio to auto"),
@@ -25,6 +28,9 @@ LARGER_NOISE = {
 DISPLAYED_AS = {
     "gyro": "yaw_rate", "log": "speed", "current_north": "speed", "current_east": "speed",
 }  # fmt: skip
+
+
+WIND_DISPLAY_SPEED = 10.0  # m/s: a coefficient is shown as what it gives in such a wind
 
 
 def further_display(name: str, unit: str) -> tuple[str, float]:
@@ -39,18 +45,28 @@ def further_display(name: str, unit: str) -> tuple[str, float]:
     --------
     >>> further_display("log_scale", "1")
     ('%', 100.0)
+
+    The coefficient of the wind's force is shown as the force in a relative wind of 10 m/s:
+
+    >>> further_display("wind_head", "1/m")
+    ('mm/s²', 100000.0)
     """
+    if name in WIND_TERMS:
+        square = WIND_DISPLAY_SPEED**2
+        if WIND_TERMS[name].axis == SURGE:
+            return "mm/s²", square * 1e3
+        return "10⁻⁶ deg/s³", square * degrees(1) * 1e6
     return ("%", 100.0) if unit == "1" else display_conversion(DISPLAYED_AS.get(name, name), unit)
 
 
 @dataclass(frozen=True)
-class SensorError:
-    """A sensor error found by the filter, at the end of the trial.
+class SlowState:
+    """A sensor error or a coefficient of the wind found by the filter, at the end of the trial.
 
     Attributes
     ----------
     name, label, unit
-        One of `SENSOR_ERRORS`, its name in words, and its SI unit.
+        One of `SENSOR_ERRORS` or `WIND_TERMS`, its name in words, and its SI unit.
     value, std
         The estimate and its standard deviation; NaN where it was not estimated.
     prior_std
@@ -63,7 +79,7 @@ class SensorError:
     Examples
     --------
     >>> value, std, prior_std = 3.5e-4, 1.7e-6, 1.7e-3
-    >>> print(SensorError("gyro", "gyro bias", "rad/s", value, std, prior_std, True))
+    >>> print(SlowState("gyro", "gyro bias", "rad/s", value, std, prior_std, True))
     gyro bias: 0.02005 ± 9.7e-05 deg/s
     """
 
@@ -77,7 +93,7 @@ class SensorError:
     reason: str = ""
 
     def __str__(self) -> str:
-        """Describe the error in one line."""
+        """Describe it in one line."""
         unit, factor = further_display(self.name, self.unit)
         if np.isnan(self.value):
             return f"{self.label}: not estimated: {self.reason}"
@@ -92,27 +108,30 @@ class Middle:
     values: Mapping[str, tuple[float, float]]
     secs: float
 
-    def change(self, name: str, value: float, std: float) -> float:
+    def change(self, name: str, walk: RandomWalk, value: float, std: float) -> float:
         """Return the change since then over the standard deviation stated for it; 0 if unknown."""
         if name not in self.values:
             return 0.0
-        walk, (before, std_before) = SENSOR_WALKS[name], self.values[name]
+        before, std_before = self.values[name]
         variance = std**2 + std_before**2 + walk.hourly_std**2 / HOUR * self.secs
         return float(abs(value - before) / np.sqrt(variance))
 
 
-def sensor_errors(
-    sensors: tuple[str, ...],
+def slow_states(
+    walks: Mapping[str, RandomWalk],
+    estimated: tuple[str, ...],
     omitted: Mapping[str, str],
     last: Mapping[str, tuple[float, float]],
     middle: Middle,
     inconsistency: str,
-) -> tuple[SensorError, ...]:
-    """Return the sensor errors found.
+) -> tuple[SlowState, ...]:
+    """Return the sensor errors, or the coefficients of the wind, that were found.
 
     Parameters
     ----------
-    sensors
+    walks
+        All that there are, by name.
+    estimated
         Those that are states of the filter.
     omitted
         Those that are not, although asked for, each with the reason.
@@ -126,15 +145,15 @@ def sensor_errors(
         right.
     """
     found = []
-    for name, walk in SENSOR_WALKS.items():
-        if name in sensors:
+    for name, walk in walks.items():
+        if name in estimated:
             value, std = last[name]
             reason = inconsistency
-            if middle.change(name, value, std) > MAX_CHANGE_STDS:
+            if middle.change(name, walk, value, std) > MAX_CHANGE_STDS:
                 unit, factor = further_display(name, walk.unit)
                 reason = (
-                    f"it was {middle.values[name][0] * factor:.4g} {unit} at half time: heading or"
-                    " model have slow errors; state a larger filter.heading_std"
+                    f"it was {middle.values[name][0] * factor:.4g} {unit} at half time: "
+                    f"{SLOW_WIND_ERRORS if name in WIND_TERMS else SLOW_SENSOR_ERRORS}"
                 )
             if std >= DETERMINED_SHARE * walk.std:
                 unit, factor = further_display(name, walk.unit)
@@ -144,7 +163,7 @@ def sensor_errors(
         else:
             continue
         found.append(
-            SensorError(name, walk.label, walk.unit, value, std, walk.std, not reason, reason)
+            SlowState(name, walk.label, walk.unit, value, std, walk.std, not reason, reason)
         )
     return tuple(found)
 

@@ -8,6 +8,7 @@ from analysis.disturbance.disturbances import Disturbance
 from analysis.disturbance.filter_forces import FilterForces
 from analysis.filters.base import OUTPUT_STATES, Estimates, FurtherStates
 from analysis.filters.factory import smoothable
+from analysis.filters.further_parts import SENSOR_WALKS
 from analysis.filters.noise_model import FURTHER_OUTPUTS
 from analysis.filters.smoother import Adjoint, smooth_chunk
 from analysis.regression.changes import ShipChangeTest, determined_changes
@@ -28,8 +29,9 @@ from .passes import weak_form_on_clock
 from .plan import Plan
 from .replay_results import Findings, ReplayChunk
 from .residuals import ResidualSummary, ResidualTest
-from .sensor_errors import Middle, inconsistency_of, noise_remedy, sensor_errors
+from .sensor_errors import Middle, inconsistency_of, noise_remedy, slow_states
 from .track import Tracker
+from .wind_choice import wind_walks
 
 MIN_EXCESS_SHARE = 0.5  # of the trial, with a disturbance beyond the rudder: the model is wrong
 
@@ -52,6 +54,7 @@ class Stages:
                 plan.vessel.paper_coefficients,
                 plan.stats,
                 plan.disturbance_settings,
+                wind=further.wind,
                 rudder_max=plan.vessel.rudder_max,
             )
             if further.yaw
@@ -126,7 +129,8 @@ class Stages:
         )
         tuned, wrong = self._plan.noise.tuned, inconsistency_of(residuals, self._plan.noise.tuned)
         warnings = _gate_warnings(residuals, tuned)
-        disturbances = self._forces or self._observer
+        disturbances, further = self._forces or self._observer, self._plan.noise.further
+        middle = Middle(self._middle, self._plan.clock.count * self._plan.clock.dt_secs / 2)
         warnings += _excess_warnings(self._plan, disturbances.excess_share)
         return Findings(
             plan=self._plan,
@@ -139,14 +143,18 @@ class Stages:
             track_origin=self.tracker.origin,
             warnings=(*self._plan.warnings, *warnings, *map(str, changes)),
             events=log.events,
-            sensor_errors=sensor_errors(
-                self._plan.noise.further.sensors,
-                self._plan.omitted_sensors,
-                self._last,
-                Middle(self._middle, self._plan.clock.count * self._plan.clock.dt_secs / 2),
-                wrong,
+            sensor_errors=slow_states(
+                SENSOR_WALKS, further.sensors, self._plan.omitted_sensors, self._last, middle, wrong
             ),
             current=current_of(self._last, wrong),
+            wind=slow_states(
+                wind_walks(self._plan.vessel.paper_coefficients, self._plan.stats),
+                further.wind,
+                self._plan.omitted_wind,
+                self._last,
+                middle,
+                wrong,
+            ),
         )
 
     def _disturbance(

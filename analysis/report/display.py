@@ -13,6 +13,8 @@ DISTURBANCES = {
     "yaw_wave": ("yaw, wave", "10⁻⁶ deg/s³", degrees(1) * 1e6),
     "surge": ("surge", "mm/s²", 1e3),
     "surge_wave": ("surge, wave", "mm/s²", 1e3),
+    "yaw_wind": ("yaw, wind", "10⁻⁶ deg/s³", degrees(1) * 1e6),
+    "surge_wind": ("surge, wind", "mm/s²", 1e3),
 }
 
 

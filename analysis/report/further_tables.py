@@ -1,11 +1,11 @@
-"""Sensor errors and current as tables, as far as the filter estimates them."""
+"""Sensor errors, current and wind as tables, as far as the filter estimates them."""
 
 from collections.abc import Iterator
 from math import ceil, degrees, isnan
 
 from analysis.replay.current import Current
 from analysis.replay.replay_results import Findings
-from analysis.replay.sensor_errors import SensorError, further_display
+from analysis.replay.sensor_errors import WIND_DISPLAY_SPEED, SlowState, further_display
 from shiplog.text_table import TextTable
 
 from .display import NORMAL_95, decimals
@@ -14,21 +14,24 @@ COLUMNS = ("value", "std", "95 %\ninterval", "unit")
 
 
 def further_tables(findings: Findings) -> Iterator[TextTable]:
-    """Yield the tables of the sensor errors and of the current, as far as there are any."""
+    """Yield the tables of sensor errors, current and wind, as far as there are any."""
     if findings.sensor_errors:
         yield _sensor_error_table(findings)
     if findings.current is not None:
         yield _current_table(findings.current)
+    if findings.wind:
+        yield _wind_table(findings.wind)
 
 
 def _sensor_error_table(findings: Findings) -> TextTable:
-    errors = findings.sensor_errors
-    rows = []
-    for error in errors:
-        cells = _cells(error.name, error.unit, error.value, error.std)
-        rows.append((error.label, *cells, "yes" if error.determined else "no"))
     columns = ("sensor error", *COLUMNS, "determined")
-    return TextTable("Sensor errors", columns, tuple(rows), tuple(_sensor_remarks(findings)))
+    rows = tuple(map(_row, findings.sensor_errors))
+    return TextTable("Sensor errors", columns, rows, tuple(_sensor_remarks(findings)))
+
+
+def _row(state: SlowState) -> tuple[str, ...]:
+    cells = _cells(state.name, state.unit, state.value, state.std)
+    return (state.label, *cells, "yes" if state.determined else "no")
 
 
 def _sensor_remarks(findings: Findings) -> Iterator[str]:
@@ -53,7 +56,7 @@ def _sensor_remarks(findings: Findings) -> Iterator[str]:
         )
 
 
-def _reason(error: SensorError) -> str:
+def _reason(error: SlowState) -> str:
     state = "estimated" if isnan(error.value) else "determined"
     return f"{error.label}: not {state}: {error.reason}."
 
@@ -89,6 +92,18 @@ def _current_remarks(current: Current) -> Iterator[str]:
         "Drift length: the sway, positive to starboard, is minus this length times the yaw rate; "
         "a leeway by wind counts as current."
     )
+
+
+def _wind_table(wind: tuple[SlowState, ...]) -> TextTable:
+    columns = ("wind", *COLUMNS, "determined")
+    remarks = [_reason(term) for term in wind if term.reason]
+    remarks.append(
+        f"What a relative wind of {WIND_DISPLAY_SPEED:g} m/s does from 45° on the starboard bow, "
+        "from the starboard beam, and from ahead: a moment that turns the bow to starboard and a "
+        "force ahead, beyond that of still air, are positive. Both grow with its square. "
+        "Values at the end of the trial. Coefficients of the ship are not corrected for the wind."
+    )
+    return TextTable("Wind", columns, tuple(map(_row, wind)), tuple(remarks))
 
 
 def _cells(name: str, unit: str, value: float, std: float) -> tuple[str, str, str, str]:

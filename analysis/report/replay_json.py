@@ -14,7 +14,7 @@ from analysis.regression.coefficients import CoefficientFit
 from analysis.replay.current import Current
 from analysis.replay.replay_results import Findings
 from analysis.replay.residuals import ResidualSummary
-from analysis.replay.sensor_errors import SensorError
+from analysis.replay.sensor_errors import SlowState
 from shiplog import __version__
 from shiplog.checks.channel_stats import ChannelStats
 from shiplog.checks.event_table import events_to_json
@@ -40,8 +40,9 @@ def replay_json(findings: Findings) -> JsonObject:
         ``interval_95``, ``prior_std``, ``determined``, ``reason``), ``current`` (``north`` and
         ``east`` in m/s and ``drift_length`` in m, each with its ``std``; ``speed``,
         ``direction``, into which it flows, ``determined`` and ``reason``; None where it is not
-        estimated), ``coefficients``, ``changes``, ``windows`` (by equation), ``track_origin``,
-        ``warnings``, ``events`` and ``events_omitted``, their number beyond those listed.
+        estimated), ``wind`` (its coefficients by name, each as in ``sensor_errors``),
+        ``coefficients``, ``changes``, ``windows`` (by equation), ``track_origin``, ``warnings``,
+        ``events`` and ``events_omitted``, their number beyond those listed.
     """
     plan = findings.plan
     result = {
@@ -69,8 +70,9 @@ def replay_json(findings: Findings) -> JsonObject:
             "yaw_as_rudder" if name == "rudder" else name: _disturbance(summary)
             for name, summary in findings.disturbances.items()
         },
-        "sensor_errors": {error.name: _sensor_error(error) for error in findings.sensor_errors},
+        "sensor_errors": {error.name: _slow_state(error) for error in findings.sensor_errors},
         "current": _current(findings.current),
+        "wind": {term.name: _slow_state(term) for term in findings.wind},
         "coefficients": _coefficients(findings.yaw) | _coefficients(findings.surge),
         "changes": [_change(change) for change in findings.changes],
         "windows": {"yaw": _windows(findings.yaw), "surge": _windows(findings.surge)},
@@ -181,7 +183,7 @@ def _disturbance(summary: DisturbanceSummary) -> JsonObject:
     }
 
 
-def _sensor_error(error: SensorError) -> JsonObject:
+def _slow_state(error: SlowState) -> JsonObject:
     half = NORMAL_95 * error.std
     return {
         "unit": error.unit,

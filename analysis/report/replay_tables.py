@@ -189,7 +189,7 @@ def _disturbance_table(findings: Findings) -> TextTable:
     settings, rows = findings.plan.disturbance_settings, []
     slow = {"constant", "ramp"} & set(settings.models)
     for key, (name, unit, scale) in DISTURBANCES.items():
-        if key not in findings.disturbances or not (slow or key.endswith("wave")):
+        if key not in findings.disturbances or not (slow or key.endswith(("wave", "wind"))):
             continue
         summary = findings.disturbances[key]
         values = (summary.mean, summary.rms, summary.at_end, summary.noise_std)

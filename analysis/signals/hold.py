@@ -8,6 +8,7 @@ import numpy as np
 from shiplog import Channel, Signals
 from shiplog.resampling import Clock
 from shiplog.ships.paper import PAPER_INPUTS
+from shiplog.types import FloatArray
 
 
 class InputHold:
@@ -52,12 +53,8 @@ class InputHold:
         """Return the next chunk with its inputs held; NaN before the first sample."""
         values = dict(signals.values)
         for name in PAPER_INPUTS:
-            missing = np.isnan(values[name])
-            if missing.any():
-                self.missing[name] += int(missing.sum())
-                known = np.concatenate(([self._last[name]], values[name]))
-                last = np.where(missing, 0, np.arange(1, len(known)))
-                values[name] = known[np.maximum.accumulate(last)]
+            self.missing[name] += int(np.isnan(values[name]).sum())
+            values[name] = hold_last(values[name], self._last[name])
             self._last[name] = float(values[name][-1])
         return replace(signals, values=values)
 
@@ -69,6 +66,23 @@ class InputHold:
             for name, count in self.missing.items()
             if count
         ]
+
+
+def hold_last(values: FloatArray, before: float) -> FloatArray:
+    """Return values (n,) with each NaN replaced by the value before it, the first by `before`.
+
+    Examples
+    --------
+    >>> hold_last(np.array([np.nan, 1.0, np.nan, 2.0]), 5.0).tolist()
+    [5.0, 1.0, 1.0, 2.0]
+    """
+    missing = np.isnan(values)
+    if not missing.any():
+        return values
+    known = np.concatenate(([before], values))
+    last = np.where(missing, 0, np.arange(1, len(known)))
+    held: FloatArray = known[np.maximum.accumulate(last)]
+    return held
 
 
 def held_throughout(

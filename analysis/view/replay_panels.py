@@ -71,13 +71,17 @@ def _disturbance(findings: Findings, drawn: Drawn, name: str) -> Panel:
     settled = estimate.time_secs >= summary.settling_secs
     kept = values[settled] if settled.mean() > 0.5 else values
     noise = BAND_STDS * summary.noise_std * scale
-    series = (estimate, *_optional(drawn, f"disturbance_{name}/wave"))
+    series = (
+        estimate,
+        *_optional(drawn, f"disturbance_{name}/wave"),
+        *_optional(drawn, f"disturbance_{name}/wind"),
+    )
     if len(estimate.lines) == 1:  # a state of the filter has a band of its own
         series = (_guides(findings, "±2σ of sensor noise", noise, "bounds"), *series)
         axis = [kept, np.array([-1.5, 1.5]) * noise]
     else:
         axis = [line.values for line in estimate.lines]
-    waves = [each.lines[0].values for each in series if each.name == "wave"]
+    waves = [each.lines[0].values for each in series if each.name in ("wave", "wind")]
     title = f"{name} disturbance [{unit}]"
     return Panel(f"disturbance_{name}", title, series, limits(*axis, *waves))
 

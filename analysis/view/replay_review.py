@@ -40,7 +40,7 @@ LEGEND = """
 
 - **grey**: measured; in coefficient panels, the value of the model
 - **blue**, **orange**: estimates of yaw and of surge, with ±2σ
-- **green**: inputs
+- **green**: inputs; among the disturbances, moment and force of the wind
 - **red**: disturbances (between the grey lines they may be sensor noise), and coefficients before \
 and after a change
 - **cyan**: waves
@@ -50,8 +50,9 @@ sliding window that ends there
 """
 SENSORS_NAME = "sensors"
 SENSORS_LEGEND = f"""\
-- **tab "{SENSORS_NAME}"**: sensor errors and current with ±2σ, as estimated with the states; the \
-heading, measured and estimated, and the innovations of heading and position
+- **tab "{SENSORS_NAME}"**: sensor errors, current and coefficients of the wind with ±2σ, as \
+estimated with the states; the heading, measured and estimated, and the innovations of heading and \
+position
 """
 FURTHER_NAME = "further channels"
 FURTHER_LEGEND = f"""\

@@ -1,4 +1,4 @@
-"""Series and panels of sensor errors, heading, position and current, where a filter has them."""
+"""Series and panels of sensor errors, heading, position, current and wind, as far as states."""
 
 from collections.abc import Mapping
 
@@ -6,13 +6,13 @@ import numpy as np
 
 from analysis.filters.noise_model import FURTHER_OUTPUTS
 from analysis.replay.replay_results import Findings, ReplayChunk
-from analysis.replay.sensor_errors import SensorError, further_display
+from analysis.replay.sensor_errors import SlowState, further_display
 from analysis.report.display import BAND_STDS
 from shiplog.checks.channel_stats import gap_threshold_secs
 from shiplog.resampling import Clock
 
 from .panels import Panel, limits, rounded, title_of
-from .series import BLUE, GREY, ORANGE, RED, Colour, Line, MeasuredSamples, Series, banded
+from .series import BLUE, CYAN, GREY, ORANGE, RED, Colour, Line, MeasuredSamples, Series, banded
 
 SETTLED_SHARE = 0.25  # of a trial: the band before it is that of the prior, and sets no axis
 INNOVATIONS = {"compass": "heading", "north": "position north", "east": "position east"}
@@ -25,6 +25,9 @@ HISTORIES: dict[str, tuple[str, Colour]] = {
     "current_north": ("current to north", RED),
     "current_east": ("current to east", RED),
     "drift_length": ("drift length", BLUE),
+    "wind_oblique": ("oblique wind, 10 m/s", CYAN),
+    "wind_beam": ("beam wind, 10 m/s", CYAN),
+    "wind_head": ("head wind, 10 m/s", CYAN),
 }
 
 
@@ -100,7 +103,7 @@ def sensor_panels(
     drawn
         The series by entity, as `SensorSeries` returns them.
     """
-    errors = {error.name: error for error in findings.sensor_errors}
+    errors = {error.name: error for error in (*findings.sensor_errors, *findings.wind)}
     histories = [
         _history(name, label, drawn[f"sensor_{name}/state"], errors.get(name))
         for name, (label, _) in HISTORIES.items()
@@ -119,8 +122,8 @@ def sensor_panels(
     return histories, [heading, *innovations]
 
 
-def _history(name: str, label: str, series: Series, error: SensorError | None) -> Panel:
-    """Draw a further estimate with its band; the title states a sensor error found."""
+def _history(name: str, label: str, series: Series, error: SlowState | None) -> Panel:
+    """Draw a further estimate with its band; the title states an error or coefficient found."""
     si_unit = error.unit if error else "m" if name == "drift_length" else "m/s"
     unit, factor = further_display(name, si_unit)
     title = title_of(label, unit)

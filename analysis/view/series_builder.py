@@ -99,14 +99,17 @@ def _inputs(chunk: ReplayChunk) -> dict[str, Series]:
 
 
 def _disturbances(chunk: ReplayChunk) -> dict[str, Series]:
-    """The slow disturbances of yaw and surge, and their waves where they are estimated.
+    """The slow disturbances of yaw and surge, and waves and wind where they are estimated.
 
     Those that are states of the filter have bands.
     """
     found, at = chunk.disturbance, chunk.signals.time_secs
-    parts = (("yaw", found.yaw, found.yaw_wave), ("surge", found.surge, found.surge_wave))
+    parts = (
+        ("yaw", found.yaw, found.yaw_wave, found.yaw_wind),
+        ("surge", found.surge, found.surge_wave, found.surge_wind),
+    )
     drawn = {}
-    for axis, (name, values, wave) in enumerate(parts):
+    for axis, (name, values, wave, wind) in enumerate(parts):
         _, _, scale = DISTURBANCES[name]
         lines: tuple[Line, ...] = (Line("disturbance", values * scale, RED, 1.5),)
         if found.stds is not None:
@@ -116,6 +119,9 @@ def _disturbances(chunk: ReplayChunk) -> dict[str, Series]:
         if wave is not None:
             line = Line("wave", wave * scale, CYAN)
             drawn[f"disturbance_{name}/wave"] = Series("wave", at, (line,), spiky=True)
+        if wind is not None:
+            line = Line("wind", wind * scale, GREEN)
+            drawn[f"disturbance_{name}/wind"] = Series("wind", at, (line,), spiky=True)
     return drawn
 
 

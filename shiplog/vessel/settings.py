@@ -16,6 +16,8 @@ FILTER_GROUP = "shiplog.filters"  # the entry points whose names `[filter] kind`
 ABBREVIATIONS = {"ekf": "extended", "kf": "pseudo-input"}  # for hints about unknown names
 NONE = "none"  # a choice that excludes all others
 DISTURBANCES = ("constant", "ramp", "wave")
+WIND = "wind"
+DISTURBANCE_CHOICES = (*DISTURBANCES, WIND)
 SPECTRA = ("butterworth", "binomial")
 SENSOR_ERRORS = ("gyro", "log", "log_scale", "rudder", "compass")
 SENSOR_CHOICES = ("auto", NONE, *SENSOR_ERRORS)
@@ -134,7 +136,8 @@ class DisturbanceSettings:
     Attributes
     ----------
     models
-        Disturbance models of the yaw moment and the surge force: some of `DISTURBANCES`.
+        Disturbance models of the yaw moment and the surge force: some of `DISTURBANCE_CHOICES`.
+        ``wind`` needs a smoothed filter, whose states its coefficients are.
     spectrum
         Pattern of the observer's poles: one of `SPECTRA`.
     yaw_frequency, surge_frequency
@@ -146,7 +149,7 @@ class DisturbanceSettings:
 
     SECTION: ClassVar[str] = "disturbance"
 
-    models: tuple[str, ...] = _choice(DISTURBANCES, ("constant",), several=True)
+    models: tuple[str, ...] = _choice(DISTURBANCE_CHOICES, ("constant",), several=True)
     spectrum: str = _choice(SPECTRA, "butterworth")
     yaw_frequency: float = _number(0.05, positive=True, least=1e-6, most=1e3)
     surge_frequency: float = _number(0.02, positive=True, least=1e-6, most=1e3)

@@ -15,8 +15,9 @@ from filter_runs import (
     straight,
     three_states,
 )
-from gaussian import apart, held
+from gaussian import apart, band, held
 from scipy.linalg import block_diag
+from windy_trials import true_coefficients, windy_trial
 
 from analysis.filters.factory import make_filter
 from analysis.filters.further_parts import FORCE_SHARE, HOUR, MIN_FORCE, MOMENT_RUDDER
@@ -24,6 +25,7 @@ from analysis.filters.noise_model import ForceNoise, FurtherModel, NoiseModel
 from analysis.filters.wind_terms import (
     WIND_CHANGE,
     WIND_TERMS,
+    apparent_wind,
     wind_prior_std,
     wind_regressors,
 )
@@ -153,3 +155,53 @@ def test_coefficients_of_the_wind_agree_with_a_joint_gaussian(vessel: Vessel, ki
     assert estimates.further.names[-3:] == tuple(WIND_TERMS)
     cut = smoothed_in_chunks((deepcopy(new), deepcopy(new)), signals, [1, 7, 12])
     assert max(apart(cut, smoothed)) < 1e-9
+
+
+def test_the_coefficients_are_within_their_intervals_over_many_trials(vessel: Vessel) -> None:
+    """Of simulated turning circles, whose wind is measured with noise."""
+    c = vessel.paper_coefficients
+    errors = []
+    for seed in range(24):
+        trial = windy_trial(seed=seed)
+        channels = {channel.name: channel.values for channel in trial.channels}
+        wind = wind_regressors(
+            channels["apparent_wind_speed"], channels["apparent_wind_angle"], channels["speed"]
+        )
+        measured = np.column_stack((channels["yaw_rate"], channels["speed"]))
+        signals = signals_of(measured, channels["rudder"], channels["rpm"], 0.5)
+        signals = replace(signals, values=dict(signals.values) | wind)
+        noise = NoiseModel(
+            np.array([np.radians(0.005), 0.1]), np.array([1e-12, 1e-6]), further=NOISE.further
+        )
+        slow = {name: replace(force, frequency=0.002) for name, force in SLOW.items()}
+        noise = replace(noise, further=replace(noise.further, **slow))
+        filter_ = make_filter(c, noise, signal_stats(signals, c), FilterSettings(kind="extended"))
+        _, _, (states, covariances) = smoothed_run(filter_, signals)
+        true = np.array(list(true_coefficients(trial).values()))
+        stds = np.sqrt(np.diagonal(covariances[-1]))[-3:]
+        errors.append((states[-1, -3:] - true) / stds)
+    low, high = band(np.size(errors))
+    assert low < np.sum(np.square(errors)) < high, np.std(errors, axis=0)
+    assert np.mean(np.abs(errors) < 1.96) > 0.9
+
+
+def test_the_relative_wind_of_a_ship_is_that_of_two_velocities() -> None:
+    rng = np.random.default_rng(1)
+    speed, angle, ahead = 20 * rng.random(50), rng.uniform(-4, 4, 50), rng.uniform(-3, 10, 50)
+    V, gamma = apparent_wind(speed, angle, ahead)
+    assert np.allclose(V * np.exp(1j * gamma), speed * np.exp(1j * angle) + ahead)
+
+
+def test_the_regressors_have_the_signs_of_the_wind() -> None:
+    at = np.radians([0.0, 45.0, 90.0, 135.0, -45.0, 180.0])
+    terms = wind_regressors(np.full(6, 10.0), at, np.full(6, 5.0))
+    assert np.allclose(terms["wind_oblique"], [0, 100, 0, -100, -100, 0])
+    assert np.allclose(terms["wind_beam"], 100 * np.sin(at))
+    assert np.allclose(terms["wind_head"], 25 - 100 * np.cos(at))  # a head wind brakes
+
+
+def test_the_priors_are_finite_for_a_ship_that_hardly_moves(vessel: Vessel) -> None:
+    c = vessel.paper_coefficients
+    stats = replace(stats_of(c, *windy_run()), median_speed=0.0)
+    stds = [wind_prior_std(term, c, stats) for term in WIND_TERMS.values()]
+    assert all(0 < std < 1 for std in stds)

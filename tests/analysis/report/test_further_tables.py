@@ -9,23 +9,21 @@ from places import SAMPLE_DATA
 from analysis.replay.current import Current
 from analysis.replay.plan import plan_replay
 from analysis.replay.replay_results import Analysis, Findings
-from analysis.replay.sensor_errors import SensorError
+from analysis.replay.sensor_errors import SlowState
 from analysis.report.further_tables import further_tables
 from analysis.report.replay_json import replay_json
 from analysis.report.replay_tables import replay_markdown, replay_tables
 from shiplog import read
 from shiplog.cli.console import print_tables
 
-GYRO = SensorError("gyro", "gyro bias", "rad/s", radians(0.02), radians(1e-4), radians(0.1), True)
-LOG = SensorError("log", "speed log bias", "m/s", 1852 / 3600, 0.01, 0.5, True)
-SCALE = SensorError("log_scale", "speed log scale", "1", 0.02, 0.04, 0.05, False, "few speeds")
+GYRO = SlowState("gyro", "gyro bias", "rad/s", radians(0.02), radians(1e-4), radians(0.1), True)
+LOG = SlowState("log", "speed log bias", "m/s", 1852 / 3600, 0.01, 0.5, True)
+SCALE = SlowState("log_scale", "speed log scale", "1", 0.02, 0.04, 0.05, False, "few speeds")
 OMITTED = replace(LOG, value=nan, std=nan, determined=False, reason="it needs positions")
 CURRENT = Current(0.0, -1852 / 3600, 0.01, 0.01, 60.0, 4.0)
 
 
-def with_errors(
-    analysis: Analysis, *errors: SensorError, current: Current | None = None
-) -> Findings:
+def with_errors(analysis: Analysis, *errors: SlowState, current: Current | None = None) -> Findings:
     return replace(analysis.findings, sensor_errors=errors, current=current)
 
 

@@ -57,7 +57,7 @@ def test_every_filter_can_be_named_in_a_vessel_file(kind: str) -> None:
     assert vessel.filter.gate == 4.0
 
 
-@pytest.mark.parametrize("models", [["wave"], ["constant", "wave"], list(DISTURBANCES)])
+@pytest.mark.parametrize("models", [["wave"], ["constant", "wind"], list(DISTURBANCES)])
 def test_every_disturbance_can_be_named_in_a_vessel_file(models: list[str]) -> None:
     vessel = parse_vessel(f"{PRESETS['table1']}\n[disturbance]\nmodels = {models}\n", "ship.toml")
     assert vessel.disturbance.models == tuple(models)
@@ -99,7 +99,7 @@ def test_the_default_filter_can_model_a_wave_where_one_is_set() -> None:
         ("filter", "speed_std", float("nan"), "filter.speed_std must be finite, got nan"),
         ("filter", "yaw_rate_std", True, "filter.yaw_rate_std must be a number, got True"),
         ("filter", "shfit", 0.1, "unknown key 'filter.shfit', did you mean 'shift'?"),
-        ("disturbance", "models", [], "must be a list of some of constant, ramp, wave, got []"),
+        ("disturbance", "models", [], "some of constant, ramp, wave, wind, got []"),
         ("disturbance", "models", "wave", "must be a list of some of constant, ramp, wave"),
         ("disturbance", "models", ["swell"], "must be a list of some of constant, ramp, wave"),
         ("disturbance", "spectrum", "bessel", "disturbance.spectrum must be one of butterworth"),
