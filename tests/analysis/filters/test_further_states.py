@@ -29,7 +29,13 @@ from analysis.filters.further_parts import (
     SENSOR_WALKS,
     WAVE_DECAY,
 )
-from analysis.filters.noise_model import FURTHER_OUTPUTS, ForceNoise, FurtherModel, NoiseModel
+from analysis.filters.noise_model import (
+    FURTHER_OUTPUTS,
+    ForceNoise,
+    FurtherModel,
+    NoiseModel,
+    SlowError,
+)
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import Signals, Vessel
@@ -195,10 +201,13 @@ def test_a_heading_that_passes_north_is_no_innovation(vessel: Vessel) -> None:
     assert found[-1] == pytest.approx(heading[-1], abs=0.05)
 
 
-# ---- ramps and waves as states, of both filters that are smoothed
+# ---- ramps, waves and a slow error of the heading as states, of both filters that are smoothed
 
 RAMP_AND_WAVE = replace(
-    FURTHER, yaw=ForceNoise(1, 0.08, wave=0.7), surge=ForceNoise(1, 0.05, wave=0.5)
+    FURTHER,
+    yaw=ForceNoise(1, 0.08, wave=0.7),
+    surge=ForceNoise(1, 0.05, wave=0.5),
+    heading_error=SlowError(5e-3, 3.0),
 )
 NOISES = {
     "extended": replace(NOISE, further=RAMP_AND_WAVE),
@@ -256,7 +265,7 @@ def by_mean_force(A: np.ndarray, pushed: np.ndarray, dynamics: np.ndarray) -> np
 def forced_run(
     c: Coefficients, stats: SignalStats, inputs: np.ndarray, kind: str, heading: float
 ) -> LinearRun:
-    """The ship's states, four pairs of force states, heading, gyro bias, log bias, in this order.
+    """The ship's states, the heading's error, four pairs of force states, heading, and two biases.
 
     A force acts in a step by its mean, as in the filter; its noise acts at every moment.
     """
@@ -264,24 +273,26 @@ def forced_run(
     forces = [
         (axis, *force) for axis in (0, 1) for force in ramp_and_wave(c, stats, NOISES[kind], axis)
     ]
-    own, psi = len(A), len(A) + 8
-    A = block_diag(A, *(force[1] for force in forces), np.zeros((3, 3)))
+    own, error = len(A), NOISES[kind].further.heading_error
+    psi = own + 9
+    A = block_diag(A, [[-1 / error.secs]], *(force[1] for force in forces), np.zeros((3, 3)))
     A[psi, 0] = 1.0
     moved = [*range(own), psi]
     of_ship, pushed = A[np.ix_(moved, moved)], np.vstack((pushed, np.zeros(2)))
-    places = [[own + 2 * i, own + 2 * i + 1] for i in range(4)]
+    places = [[own + 1 + 2 * i, own + 2 + 2 * i] for i in range(4)]
     for place, (axis, *_) in zip(places, forces, strict=True):
         A[moved, place[0]] = pushed[:, axis]
     walks = [SENSOR_WALKS[name] for name in ("gyro", "log")]
     walking = np.diag([0.0, *(walk.hourly_std**2 / HOUR for walk in walks)])
-    F, Q = held(A, block_diag(intensity, *(force[2] for force in forces), walking), DT)
+    slow = 2 * error.std**2 / error.secs
+    F, Q = held(A, block_diag(intensity, [[slow]], *(force[2] for force in forces), walking), DT)
     for place, (axis, dynamics, *_) in zip(places, forces, strict=True):
         F[np.ix_(moved, place)] = by_mean_force(of_ship, pushed[:, axis], dynamics)
     priors = np.diag([FIRST_HEADING_STD, *(walk.std for walk in walks)]) ** 2
-    P = block_diag(run.P, *(force[3] for force in forces), priors)
+    P = block_diag(run.P, [[error.std**2]], *(force[3] for force in forces), priors)
     C = np.zeros((3, len(P)))
     C[:2, :own] = run.C
-    C[0, psi + 1], C[1, psi + 2], C[2, psi] = 1.0, 1.0, 1.0
+    C[0, psi + 1], C[1, psi + 2], C[2, [own, psi]] = 1.0, 1.0, 1.0
     mean = np.zeros((len(inputs), len(P)))
     mean[:, :own], mean[:, psi] = run.mean, sailed_with_heading(c, inputs)[:, 3] + heading
     return LinearRun(mean, F, Q, P, C, np.array([*STDS**2, HEADING_STD**2]))
