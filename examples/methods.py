@@ -17,6 +17,7 @@ from papers.markdown_page import BLUE, RED, number, paragraph, picture, start_pa
 from scipy.signal import tf2ss
 from scipy.stats import chi2
 from sensor_states import sensor_states
+from wind_states import wind_states
 
 from analysis.design.discrete import discretise
 from analysis.design.shaping import wave_filter
@@ -110,6 +111,10 @@ ADVICE = (
         "`--disturbance ramp`: twice as noisy, and it overshoots after a step",
     ),
     ("a wave moment in addition", "`--disturbance constant,wave`"),
+    (
+        "moment and force of the wind by name",
+        "`--smooth --disturbance constant,wind`: needs the wind on board, and a turn in it",
+    ),
 )
 CAUTION = """\
 The noise settings matter more than the choice of the filter. A small `process_ratio` in the vessel
@@ -130,6 +135,7 @@ def main() -> None:
     waves()
     disturbances()
     sensor_states()
+    wind_states()
     if KVLCC2.is_dir():
         kvlcc2_tests()
 

@@ -24,7 +24,8 @@ from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
 
 YAW, SURGE = range(2)
-# 0.2 ½ρ V² A L is about the moment of one degree of rudder where V is the ship's speed: twice that
+# 0.2 ½ρ V² A L is about the moment of one degree of rudder, where V is the ship's speed and A a
+# hundred times the rudder's area: twice that
 WIND_RUDDER = radians(2.0)
 WIND_RESISTANCE = 0.1  # of the ship's own, in a wind as fast as the ship: at most about that
 WIND_CHANGE = 0.02  # of the standard deviation at the start: that of the change in an hour
@@ -51,9 +52,9 @@ class WindTerm:
 
 
 WIND_TERMS = {
-    "wind_oblique": WindTerm("yaw moment of oblique wind", YAW, "rad/(s m²)"),
-    "wind_beam": WindTerm("yaw moment of beam wind", YAW, "rad/(s m²)"),
-    "wind_head": WindTerm("surge force of head wind", SURGE, "1/m"),
+    "wind_oblique": WindTerm("oblique wind, yaw", YAW, "rad/(s m²)"),
+    "wind_beam": WindTerm("beam wind, yaw", YAW, "rad/(s m²)"),
+    "wind_head": WindTerm("head wind, surge", SURGE, "1/m"),
 }
 
 

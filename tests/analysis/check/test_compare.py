@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faults import FAULTS
+from windy_trials import WINDY, windy_analysis, windy_log
 
 from analysis.check.compare import (
     Comparison,
@@ -20,6 +21,7 @@ from analysis.replay.replay_results import Analysis
 from recorders.record import record
 from recorders.simulated.simulate import SimulatedTrial
 from shiplog import ShiplogError, TrialLog, Vessel, read, write
+from shiplog.vessel.vessel import with_settings
 
 
 @pytest.fixture(scope="module")
@@ -321,3 +323,20 @@ def test_a_change_of_a_sensor_error_fails_the_check(sensor_analysis: Analysis) -
         if not _same(c.values, known, c.topic)
     ]
     assert changed == ["/gyro_error/estimate"]
+
+
+def test_the_wind_is_part_of_the_check(vessel: Vessel) -> None:
+    reference, windy = make_reference(windy_analysis()), with_settings(vessel, WINDY)
+    assert compare(windy_log(), reference, vessel=windy).ok
+    turned = [
+        replace(c, values=c.values + 1e-4) if c.name == "apparent_wind_angle" else c
+        for c in windy_log()
+    ]
+    found = compare(replace(windy_log(), channels=tuple(turned)), reference, vessel=windy)
+    changed = {difference.topic for difference in found.changed}
+    assert {
+        "/wind_beam/measured",
+        "/wind_beam/estimate",
+        "/yaw_wind_disturbance/estimate",
+    } <= changed
+    assert "/yaw_rate/measured" not in changed

@@ -139,7 +139,7 @@ def test_on_a_straight_course_in_a_steady_wind_the_wind_is_refused_by_name() -> 
         analyse(log, settings=WINDY)
     message = str(error.value)
     assert message.startswith("disturbance.models has wind, which cannot be distinguished")
-    assert f"yaw moment of oblique wind: {STEADY}: but for" in message
+    assert f"oblique wind, yaw: {STEADY}: but for" in message
     assert "it acts as a constant yaw moment" in message
     assert "it acts as a constant surge force" in message
     assert message.endswith("needs a manoeuvre that turns the ship in the wind; remove wind")

@@ -78,7 +78,7 @@ def test_a_steady_wind_is_estimated_where_nothing_else_acts_steadily() -> None:
 
 def test_a_calm_is_refused() -> None:
     calm = dict.fromkeys(WIND_TERMS, np.zeros(len(windy_analysis().signals)))
-    with pytest.raises(UsageError, match="yaw moment of oblique wind: there is no wind;"):
+    with pytest.raises(UsageError, match="oblique wind, yaw: there is no wind;"):
         choose_wind(CONSTANT, (), stats_with(**calm))
 
 

@@ -5,6 +5,7 @@ from math import nan, radians
 import numpy as np
 import pytest
 from places import SAMPLE_DATA
+from windy_trials import windy_analysis
 
 from analysis.replay.current import Current
 from analysis.replay.plan import plan_replay
@@ -20,6 +21,10 @@ GYRO = SlowState("gyro", "gyro bias", "rad/s", radians(0.02), radians(1e-4), rad
 LOG = SlowState("log", "speed log bias", "m/s", 1852 / 3600, 0.01, 0.5, True)
 SCALE = SlowState("log_scale", "speed log scale", "1", 0.02, 0.04, 0.05, False, "few speeds")
 OMITTED = replace(LOG, value=nan, std=nan, determined=False, reason="it needs positions")
+HEAD = SlowState("wind_head", "head wind, surge", "1/m", 1e-5, 1e-6, 1e-4, True)
+BEAM = SlowState(
+    "wind_beam", "beam wind, yaw", "rad/(s m²)", nan, nan, 1e-8, False, "the wind is too steady"
+)
 CURRENT = Current(0.0, -1852 / 3600, 0.01, 0.01, 60.0, 4.0)
 
 
@@ -90,12 +95,34 @@ def test_a_current_that_is_not_determined_has_its_reason(zigzag_analysis: Analys
     assert "Set" not in remarks
 
 
-@pytest.fixture(params=["long reasons", "a replay"])
+def test_the_wind_is_shown_as_what_10_m_per_s_do(zigzag_analysis: Analysis) -> None:
+    findings = replace(zigzag_analysis.findings, wind=(BEAM, HEAD))
+    assert rows_of(findings)["head wind, surge"] == ("1.00", "0.10", "± 0.20", "mm/s²", "yes")
+    assert rows_of(findings)["beam wind, yaw"] == ("not estimated", "", "", "10⁻⁶ deg/s³", "no")
+    assert "beam wind, yaw: not estimated: the wind is too steady." in remarks_of(findings)
+    found = replay_json(findings)["wind"]
+    assert (found["wind_head"]["value"], found["wind_head"]["unit"]) == (1e-5, "1/m")
+    assert (found["wind_beam"]["value"], found["wind_beam"]["determined"]) == (None, False)
+    assert replay_json(zigzag_analysis.findings)["wind"] == {}
+
+
+def test_moment_and_force_of_the_wind_are_among_the_disturbances() -> None:
+    findings = windy_analysis().findings
+    (table,) = (t for t in replay_tables(findings) if t.title == "Disturbances")
+    shown = {row[0] for row in table.rows}
+    assert {"yaw, wind [10⁻⁶ deg/s³]", "surge, wind [mm/s²]"} <= shown
+    assert "Disturbance models: constant, wind, states of the filter" in table.remarks[0]
+    assert replay_json(findings)["disturbances"]["surge_wind"]["unit"] == "m/s²"
+
+
+@pytest.fixture(params=["long reasons", "a replay", "a wind"])
 def widest(
     request: pytest.FixtureRequest, zigzag_analysis: Analysis, sensor_analysis: Analysis
 ) -> Iterator[Findings]:
     if request.param == "a replay":
         yield sensor_analysis.findings
+    elif request.param == "a wind":
+        yield windy_analysis().findings
     else:
         reason = "gyro bias and constant yaw moment cannot be distinguished, " * 3
         long = replace(SCALE, reason=reason)

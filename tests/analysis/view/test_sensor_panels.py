@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
+from windy_trials import windy_analysis
 
 from analysis.replay.replay_results import Analysis
 from analysis.view.panels import Panel
@@ -85,6 +86,31 @@ def test_smoothed_disturbances_have_bands(
         stds = sensor_analysis.disturbance.stds
         assert stds is not None
         np.testing.assert_allclose(high - low, 4 * stds[:, axis] * scale, rtol=1e-6)
+
+
+def test_the_wind_has_its_coefficients_and_its_moment_drawn() -> None:
+    result = windy_analysis()
+    builder = SeriesBuilder(result.findings.plan.clock, result.findings.plan.stats)
+    builder.add(result.as_chunk())
+    drawn = builder.result()
+    histories, others = sensor_panels(result.findings, drawn)
+    assert [panel.name for panel in histories] == [
+        "sensor_wind_oblique", "sensor_wind_beam", "sensor_wind_head",
+    ]  # fmt: skip
+    assert not others
+    assert histories[2].title.startswith("head wind, 10 m/s = ")
+    assert histories[2].title.endswith(" [mm/s²]")
+    yaw, surge = equation_panels(result.findings, drawn)
+    for panel, values in (
+        (yaw[2], result.disturbance.yaw_wind),
+        (surge[2], result.disturbance.surge_wind),
+    ):
+        wind = panel.series[-1]
+        assert wind.name == "wind"
+        low, high = panel.limits
+        assert low < wind.lines[0].values.min()
+        assert wind.lines[0].values.max() < high
+        assert np.sign(wind.lines[0].values[0]) == np.sign(values[0])
 
 
 def test_a_replay_without_further_states_has_no_sensors(zigzag_analysis: Analysis) -> None:
