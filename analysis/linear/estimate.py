@@ -22,7 +22,7 @@ from .estimate_plan import EstimatePlan, plan_estimate
 from .estimator import Estimator
 from .feedback import CostMeter, CostSummary
 from .linear_loop import combine
-from .system import LinearSystem
+from .system import LinearSystem, naming_system_file
 from .system_file import load_system
 from .system_signals import HeldSignals
 
@@ -218,7 +218,13 @@ class EstimateRun:
         ------
         LogError
             The estimates diverge.
+        UsageError
+            There is no gain at an instant of the trial.
         """
+        with naming_system_file(self.plan.system):
+            yield from self._chunks()
+
+    def _chunks(self) -> Iterator[EstimateChunk]:
         plan = self.plan
         adjoints = self._adjoints() if plan.smooth else None
         estimator = Estimator(plan)

@@ -32,7 +32,7 @@ from .signal_sizes import (
     with_stride,
 )
 from .spectrum_fit import MAX_FITTED, FitSignals, FittedParameter, fit_spectra
-from .system import LinearSystem
+from .system import LinearSystem, naming_system_file
 from .system_signals import BoundSignal, HeldSignals, bind_signals, require_same_units
 
 
@@ -134,6 +134,20 @@ def plan_estimate(
         )  # fmt: skip
 
     screened = screen_without_delays(log, options.sensor_delays, screen)
+    with naming_system_file(system):
+        return _plan(log.name, system, screened, on_progress, smooth=smooth)
+
+
+def _plan(
+    name: str,
+    system: LinearSystem,
+    screened: ScreenedLog,
+    on_progress: ProgressCallback,
+    *,
+    smooth: bool,
+) -> EstimatePlan:
+    """Measure the signals of the system on the screened log, and design its gain."""
+    names = tuple(dict.fromkeys(binding.channel for binding in system.bindings))
     signals = _measured_signals(screened, system, names, on_progress)
     sampling, there = signals.sampling, system.linearised_at(signals.typical)
     require_distinguishable(system, estimator_model(system, sampling, there), there)
@@ -142,11 +156,11 @@ def plan_estimate(
     fitted: tuple[FittedParameter, ...] = ()
     if any(noise.fit for noise in system.shaped):
         recorded = _fit_signals(screened, signals, on_progress)
-        system, fitted = fit_spectra(system, sampling, recorded, log.name)
+        system, fitted = fit_spectra(system, sampling, recorded, name)
     model = estimator_model(system, sampling, there)
     design = system.method.design(model)
     return EstimatePlan(
-        name=log.name,
+        name=name,
         system=system,
         screening=screened.screening,
         clock=signals.clock,

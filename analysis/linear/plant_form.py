@@ -26,6 +26,8 @@ class PlantForm:
         Scheduling signals by name, with their units.
     linearise
         Function of the estimate and the scheduling signals.
+    refused
+        Names of the matrices that have errors, from which no further ones follow.
     """
 
     A: FloatArray
@@ -37,3 +39,4 @@ class PlantForm:
     G: FloatArray | None = None
     schedule: Mapping[str, str] = field(default_factory=dict)
     linearise: Linearise | None = None
+    refused: frozenset[str] = frozenset()

@@ -1,12 +1,14 @@
 """A linear system: plant, channels, noise, disturbances, method of estimation, regulator."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from analysis.design.augmentation import Exosystem, Plant
+from shiplog.errors import UsageError
 from shiplog.types import FloatArray
 
 from .methods import KalmanMethod, Method
@@ -157,6 +159,8 @@ class LinearSystem:
         Weights of a regulator that is computed beside the recorded inputs.
     zero_inputs
         Names of inputs of the plant that have no channel and are taken as zero.
+    file
+        The file that describes it, for messages; empty for none.
     """
 
     name: str
@@ -177,6 +181,7 @@ class LinearSystem:
     step_secs: float | None = None
     regulator: RegulatorWeights | None = None
     zero_inputs: tuple[str, ...] = ()
+    file: str = ""
 
     @property
     def bindings(self) -> tuple[ChannelBinding, ...]:
@@ -192,3 +197,20 @@ class LinearSystem:
         if self.linearise is None:
             return self.start()
         return self.linearise(np.zeros(len(self.plant.A)), schedule)
+
+
+@contextmanager
+def naming_system_file(system: LinearSystem) -> Iterator[None]:
+    """Add the file of a system to an error about what the system asks for.
+
+    Raises
+    ------
+    UsageError
+        The error with the path of the file at its end.
+    """
+    try:
+        yield
+    except UsageError as error:
+        if not system.file:
+            raise
+        raise UsageError(f"{error}: {system.file}") from error

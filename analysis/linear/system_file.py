@@ -105,6 +105,7 @@ def _system(top: FileSection, where: Path) -> LinearSystem:
         step_secs=_optional(top, "step_secs"),
         regulator=parse_regulator(top, states, names),
         zero_inputs=tuple(name for name in form.inputs or () if name not in names),
+        file=os.fspath(where),
     )
 
 
@@ -146,17 +147,25 @@ def _matrices(section: FileSection) -> PlantForm:
     A = section.matrix("A", None, None)
     if "A" not in section or (A is not None and A.shape[0] != A.shape[1]):
         section.errors.append("[plant] needs a square A, or num and den, or model")
-    if A is None or A.shape[0] != A.shape[1]:
-        A = np.zeros((len(states) or 1,) * 2)  # refused already; no errors that follow from it
+    # of a matrix that is refused no further errors follow
+    refused = {"A"} if A is None or A.shape[0] != A.shape[1] else set()
+    if A is None or refused:
+        A = np.zeros((len(states) or 1,) * 2)
     n = len(A)
-    B, C = section.matrix("B", n, None), section.matrix("C", None, n)
-    B = np.zeros((n, 0)) if B is None else B
-    D = section.matrix("D", None if C is None else len(C), B.shape[1])
+    rows = n if states or not refused else None
+    B, C = section.matrix("B", rows, None), section.matrix("C", None, rows)
+    refused |= {key for key, M in (("B", B), ("C", C)) if key in section and M is None}
+    B = np.zeros((n, 0)) if B is None or len(B) != n else B
+    C = None if C is None or C.shape[1] != n else C
+    D = section.matrix("D", None if C is None else len(C), None if refused else B.shape[1])
     states = states or {f"x{k}": "1" for k in range(1, n + 1)}
     if len(states) != n:
         section.errors.append(f"plant.states has {len(states)} names, A has {n} rows")
         states = {f"x{k}": "1" for k in range(1, n + 1)}
-    return PlantForm(A, B, states, C=C, D=D, G=section.matrix("G", n, None))
+    G = section.matrix("G", rows, None)
+    refused |= {"G"} if "G" in section and G is None else set()
+    G = None if G is None or len(G) != n else G
+    return PlantForm(A, B, states, C=C, D=D, G=G, refused=frozenset(refused))
 
 
 def _bindings(top: FileSection, key: str) -> tuple[ChannelBinding, ...]:
@@ -220,7 +229,9 @@ def _bound(
     """Return the plant with one row of C for each output and one column of B for each input."""
     states, n = list(form.states), len(form.A)
     C, B, D, linearise = form.C, form.B, form.D, form.linearise
-    if C is None:
+    if form.refused & {"A", "C"}:
+        C = np.zeros((len(outputs) or 1, n))
+    elif C is None:
         C = np.zeros((len(outputs) or 1, n))
         for row, output in zip(C, outputs, strict=False):
             if output.name in states:
@@ -244,13 +255,15 @@ def _bound(
         _require_units(inputs, form.inputs, "inputs", errors)
         chosen = [known.index(each.name) for each in inputs if each.name in known]
         B, linearise = B[:, chosen], _with_inputs(linearise, chosen)
+    elif form.refused & {"A", "B"}:
+        B = np.zeros((n, len(inputs)))
     elif B.shape[1] != len(inputs):
         errors.append(f"B has {B.shape[1]} columns, but there are {len(inputs)} [inputs.NAME]")
         B = np.zeros((n, len(inputs)))
     fits = D is not None and D.shape == (len(C), B.shape[1])
     return PlantForm(
         form.A, B, form.states, form.inputs, C, D if fits else np.zeros((len(C), B.shape[1])),
-        form.G, form.schedule, linearise,
+        form.G, form.schedule, linearise, form.refused,
     )  # fmt: skip
 
 
@@ -277,7 +290,7 @@ def _intensity(section: FileSection, form: PlantForm) -> FloatArray:
     states, n = list(form.states), len(form.A)
     by_state = section.by_name("process", states, least=0.0)
     W = np.diag([by_state.get(name, 0.0) for name in states])
-    if "Q" not in section:
+    if "Q" not in section or form.refused & {"A", "G"}:
         return W
     G = np.eye(n) if form.G is None else form.G
     diagonal = section.table["Q"]

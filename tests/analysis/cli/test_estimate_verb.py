@@ -108,9 +108,48 @@ def test_a_bad_system_is_refused_in_one_line(
     assert output.out == ""
     assert len(output.err.strip().splitlines()) == 1
     assert expected in output.err
+    # whichever it is, the error names the file in which it is to be corrected
+    assert output.err.rstrip().endswith(": system.toml") or "no channel 'sped'" in output.err
     assert not Path("x.rrd").exists()
 
 
 def test_a_view_without_a_file_is_a_usage_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["estimate", LOG, "--system", system_file(SURGE), "--view"]) == ExitCode.USAGE
     assert "name its file with -o" in capsys.readouterr().err
+
+
+MATRICES = """
+[plant]
+states = { yaw_rate = "rad/s" }
+A = [[-0.03]]
+B = [[1.0]]
+C = [[1.0]]
+[outputs.yaw_rate]
+[inputs.rudder]
+[noise]
+Q = [1e-9]
+"""
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "expected"),
+    [
+        ("B = [[1.0]]", "B = [[0.0], [1.0]]", "plant.B has 2 × 1 numbers, expected 1 × 1"),
+        ("B = [[1.0]]", 'B = "none"', "plant.B must be a list of rows of numbers, all of equal"),
+        ("C = [[1.0]]", "C = [[1.0, 0.0]]", "plant.C has 1 × 2 numbers, expected 1 × 1"),
+        ("C = [[1.0]]", "C = [[1.0]]\nG = 1", "plant.G must be a list of rows of numbers"),
+        ("A = [[-0.03]]", "A = [[-0.03, 1.0]]", "[plant] needs a square A, or num and den"),
+        (
+            'states = { yaw_rate = "rad/s" }\nA = [[-0.03]]\nB = [[1.0]]\nC = [[1.0]]',
+            "A = [[0.0, 1.0]]\nB = [[0.0], [1.0]]\nC = [[1.0, 0.0]]\nG = [[0.0], [1.0]]",
+            "[plant] needs a square A, or num and den",
+        ),
+    ],
+)
+def test_no_further_errors_follow_from_a_matrix_that_is_refused(
+    right: str, wrong: str, expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert right in MATRICES
+    assert main(["estimate", LOG, "--system", system_file(MATRICES.replace(right, wrong))]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"shiplog: one error in the system file: {expected}"), error
