@@ -29,7 +29,7 @@ from shiplog.vessel.settings import MIN_WINDOW_SECS, WIND
 from .channel_warnings import channel_warnings, end_warnings, late_channel_warnings
 from .measured_channels import MeasuredChannels, RawChunks, with_measured_channels
 from .reading_options import ReadingOptions
-from .wind import WIND_CHANNEL_NAMES, WindSignals, with_wind_channels
+from .wind_signals import WIND_CHANNEL_NAMES, WindSignals, with_wind_channels
 
 REQUIRED_CHANNELS = (*PAPER_OUTPUTS, *PAPER_INPUTS)
 OPTIONAL_CHANNELS = ("heading", "position")

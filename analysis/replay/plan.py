@@ -31,8 +31,8 @@ from shiplog.vessel.vessel_parser import parse_vessel
 from .passes import FirstPass, SecondPass, first_pass, second_pass
 from .reading_options import DEFAULT_OPTIONS, ReadingOptions
 from .sensor_model import sensor_model, with_forces
-from .wind import check_wind_settings
 from .wind_choice import choose_wind
+from .wind_signals import check_wind_settings
 
 GIVEN_MODEL = "given"
 ATTACHED_MODEL = "attached to the log"
