@@ -40,6 +40,5 @@ def assumptions(options: TrialOptions) -> Iterator[str]:
         "Standard uncertainties that the log does not show: constant error of the heading "
         f"{degrees(options.compass_bias_std):g}°, scale of the speed "
         f"{options.speed_scale_std * 100:g} %, each component of a current that the log does not "
-        f"determine {options.current_std:g} m/s, time from an order to the rudder's movement "
-        f"{options.order_delay_std:g} s."
+        f"determine {options.current_std:g} m/s."
     )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from math import degrees, isfinite, nan, pi
 
-from analysis.manoeuvres.sailed_manoeuvre import NotComputed, SailedManoeuvre
+from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreKind, NotComputed, SailedManoeuvre
 from analysis.trial.trial_analysis import TrialAnalysis
 from shiplog.text_table import TextTable
 from shiplog.units import UNITS
@@ -30,7 +30,8 @@ class ManoeuvreSection:
     facts
         Labels and texts.
     figures
-        Time histories, track, spiral curve: those for which there are data.
+        Time histories, track, spiral curve: those for which there are data. A straight run, of
+        which a day at sea has many, has none.
     rows
         The indices.
     sensitivity, uncertainty
@@ -53,9 +54,13 @@ def manoeuvre_section(place: ManoeuvrePlace, trial: TrialAnalysis) -> ManoeuvreS
     """Return the section of one manoeuvre of a log."""
     manoeuvre, length = place.manoeuvre, trial.conditions.length
     figures = (
-        history_figure(manoeuvre, f"{place.anchor}-histories"),
-        track_figure(manoeuvre, length, f"{place.anchor}-track"),
-        spiral_figure(manoeuvre, f"{place.anchor}-spiral"),
+        ()
+        if manoeuvre.kind is ManoeuvreKind.STRAIGHT
+        else (
+            history_figure(manoeuvre, f"{place.anchor}-histories"),
+            track_figure(manoeuvre, length, f"{place.anchor}-track"),
+            spiral_figure(manoeuvre, f"{place.anchor}-spiral"),
+        )
     )
     return ManoeuvreSection(
         place,

@@ -8,7 +8,8 @@ from analysis.report.display import decimals
 NOT_KNOWN = "–"
 DIGITS = 3  # significant ones, of a number without uncertainty
 # the most decimals that an index is written with: finer ones are below any sensor of a ship
-MAX_DECIMALS = {"m": 1, "s": 2, "°": 2, "°/s": 4, "kn": 3, "m/s": 3, "1": 4, "L": 3}
+MAX_DECIMALS = {"m": 1, "s": 2, "°": 2, "°/s": 4, "kn": 3, "m/s": 3, "rpm": 2, "L": 3}
+OTHER_DECIMALS = 4
 
 
 def number_text(value: float, std: float, most: int = 6) -> str:
@@ -40,7 +41,7 @@ def number_text(value: float, std: float, most: int = 6) -> str:
 def index_text(index: TrialIndex, value: float) -> str:
     """Write a value of an index's unit, such as its own by another start rule, in display units."""
     factor, unit = index.display_factor, index.display_unit
-    return with_unit(number_text(value * factor, index.std * factor, MAX_DECIMALS[unit]), unit)
+    return with_unit(number_text(value * factor, index.std * factor, _most_decimals(unit)), unit)
 
 
 def value_text(index: TrialIndex) -> str:
@@ -52,7 +53,7 @@ def interval_text(index: TrialIndex) -> str:
     """Write the 95 % interval of an index; a dash where it is not known."""
     if not (isfinite(index.low) and isfinite(index.high)):
         return NOT_KNOWN
-    factor, most = index.display_factor, MAX_DECIMALS[index.display_unit]
+    factor, most = index.display_factor, _most_decimals(index.display_unit)
     low, high = (
         number_text(each * factor, index.std * factor, most) for each in (index.low, index.high)
     )
@@ -61,7 +62,7 @@ def interval_text(index: TrialIndex) -> str:
 
 def half_width_text(index: TrialIndex) -> str:
     """Write an index with half the width of its 95 % interval."""
-    factor, most = index.display_factor, MAX_DECIMALS[index.display_unit]
+    factor, most = index.display_factor, _most_decimals(index.display_unit)
     std = index.std * factor
     half = (index.high - index.low) / 2 * factor
     text = number_text(index.value * factor, std, most)
@@ -76,10 +77,11 @@ def std_text(index: TrialIndex, std: float) -> str:
     One that is smaller than what the value is written with is given as below that.
     """
     factor, unit = index.display_factor, index.display_unit
-    shown, least = std * factor, 10.0 ** -MAX_DECIMALS[unit]
+    most = _most_decimals(unit)
+    shown, least = std * factor, 10.0**-most
     if 0 < shown < least:
         return f"< {with_unit(f'{least:g}', unit)}"
-    return with_unit(number_text(shown, shown, MAX_DECIMALS[unit]), unit)
+    return with_unit(number_text(shown, shown, most), unit)
 
 
 def length_text(index: TrialIndex) -> str:
@@ -118,3 +120,7 @@ def percent_text(probability: float) -> str:
     if probability < 0.001:
         return "< 0.1 %"
     return f"{probability * 100:.{1 if probability > 0.99 or probability < 0.01 else 0}f} %"
+
+
+def _most_decimals(unit: str) -> int:
+    return MAX_DECIMALS.get(unit, OTHER_DECIMALS)
