@@ -34,13 +34,14 @@ twice the largest that Isherwood (1973) and Blendermann (1994) give for merchant
 they change by a fiftieth of them."""
 CAUTION = """\
 A steady wind on a straight course acts as a constant moment and a constant force: a term whose
-regressor, averaged over 20 s, differs by less than 5 % from what the other disturbances can be is
-omitted with the reason, and where no term remains the wind is refused. The others count as
-determined by the same rule as sensor errors. Where the anemometer is silent, the last wind is
-held, with a warning. The noise of the anemometer makes the coefficients slightly too small; a wind
-that is disturbed by the superstructure makes them those of this anemometer. The side force of the
-wind has no state of its own in these models: the turning that it causes counts in the terms of
-yaw, the leeway in the current."""
+regressor, averaged over 20 s, differs by less than 5 % from what the other disturbances can be
+counts as not determined, with the reason, and where no other term remains the wind is refused. The
+others count as determined by the same rule as sensor errors, and where the model was not fitted to
+the same log. Where the anemometer is silent, the last wind is held, with a warning. The noise of
+the anemometer makes the coefficients slightly too small; a wind that is disturbed by the
+superstructure makes them those of this anemometer. The side force of the wind has no state of its
+own in these models: the turning that it causes counts in the terms of yaw, the leeway in the
+current."""
 
 
 def wind_states() -> None:

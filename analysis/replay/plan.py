@@ -73,9 +73,9 @@ class Plan:
     omitted_sensors
         The sensor errors that the log does not determine, each with the reason, where
         ``filter.sensor_bias`` is ``auto``.
-    omitted_wind
-        The terms of the wind that cannot be distinguished from the other disturbances, each with
-        the reason.
+    undetermined_wind
+        The terms of the wind that the log does not distinguish from the other disturbances, each
+        with the reason.
     """
 
     screening: Screening
@@ -91,7 +91,7 @@ class Plan:
     warnings: tuple[str, ...]
     contradictions: tuple[str, ...] = ()
     omitted_sensors: Mapping[str, str] = field(default_factory=dict)
-    omitted_wind: Mapping[str, str] = field(default_factory=dict)
+    undetermined_wind: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -174,7 +174,7 @@ def _plan(
         noise=design.noise,
         disturbance_settings=design.disturbance,
         omitted_sensors=design.omitted_sensors,
-        omitted_wind=design.omitted_wind,
+        undetermined_wind=design.undetermined_wind,
         yaw_solution=second.yaw.solution(),
         surge_solution=second.surge.solution(),
         warnings=(*warnings, *design.warnings),
@@ -222,7 +222,7 @@ def with_default_settings(plan: Plan, names: Iterable[str]) -> Plan:
         noise=design.noise,
         disturbance_settings=design.disturbance,
         omitted_sensors=design.omitted_sensors,
-        omitted_wind=design.omitted_wind,
+        undetermined_wind=design.undetermined_wind,
     )
 
 
@@ -294,7 +294,7 @@ class _Design:
     noise: NoiseModel
     disturbance: DisturbanceSettings
     omitted_sensors: Mapping[str, str]
-    omitted_wind: Mapping[str, str]
+    undetermined_wind: Mapping[str, str]
     warnings: tuple[str, ...]
 
 
@@ -308,17 +308,17 @@ def _design(vessel: Vessel, kind: FilterKind, log_stats: LogStats, stats: Signal
     further, omitted = sensor_model(settings, model, stats, vessel.disturbance)
     has_forces = settings.smooth and kind.has_further_states
     noise, disturbance = None, vessel.disturbance
-    omitted_wind: Mapping[str, str] = {}
+    undetermined_wind: Mapping[str, str] = {}
     wave_warnings: list[str] = []
     if not has_forces or "wave" in disturbance.models:
         noise = noise_of(stats, model, settings, kind, further)
         disturbance, wave_warnings = _disturbance_settings(vessel, kind, stats, noise)
     if noise is None or has_forces:
-        wind, omitted_wind = choose_wind(disturbance, further.sensors, stats)
+        wind, undetermined_wind = choose_wind(disturbance, further.sensors, stats)
         forced = replace(with_forces(further, disturbance, stats), wind=wind)
         noise = noise_of(stats, model, settings, kind, forced)
     warnings = (*_wave_warnings(settings, noise), *wave_warnings)
-    return _Design(noise, disturbance, omitted, omitted_wind, warnings)
+    return _Design(noise, disturbance, omitted, undetermined_wind, warnings)
 
 
 def _wave_warnings(settings: FilterSettings, noise: NoiseModel) -> list[str]:

@@ -134,7 +134,7 @@ def slow_states(
     estimated
         Those that are states of the filter.
     omitted
-        Those that are not, although asked for, each with the reason.
+        Why some that were asked for are not estimated, or cannot be determined by this log.
     last
         Value and standard deviation of each at the end of the trial.
     middle
@@ -158,6 +158,7 @@ def slow_states(
             if std >= DETERMINED_SHARE * walk.std:
                 unit, factor = further_display(name, walk.unit)
                 reason = f"without this log it is 0 ± {walk.std * factor:.2g} {unit}"
+            reason = omitted.get(name, reason)
         elif name in omitted:
             value, std, reason = nan, nan, omitted[name]
         else:

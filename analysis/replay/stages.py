@@ -33,6 +33,9 @@ from .sensor_errors import Middle, inconsistency_of, noise_remedy, slow_states
 from .track import Tracker
 from .wind_choice import wind_walks
 
+WIND_IN_MODEL = (
+    "the model was fitted to this log and contains part of the wind; give a model with --vessel"
+)
 MIN_EXCESS_SHARE = 0.5  # of the trial, with a disturbance beyond the rudder: the model is wrong
 
 
@@ -150,10 +153,10 @@ class Stages:
             wind=slow_states(
                 wind_walks(self._plan.vessel.paper_coefficients, self._plan.stats),
                 further.wind,
-                self._plan.omitted_wind,
+                self._plan.undetermined_wind,
                 self._last,
                 middle,
-                wrong,
+                wrong or (WIND_IN_MODEL if self._plan.model_is_fitted else ""),
             ),
         )
 

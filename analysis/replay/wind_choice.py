@@ -1,8 +1,9 @@
 """Choice of the terms of the wind that a log distinguishes from the other disturbances.
 
 A wind that is steady in speed and angle acts on the ship as a constant moment and a constant force
-do: what its regressors have in common with the slow disturbances, and with the terms chosen before,
-tells nothing of their coefficients.
+do: what its regressors have in common with the slow disturbances, and with the terms before, shows
+nothing of their coefficients. A term that is not distinguished is a state all the same, so that the
+standard deviations of the others allow for it.
 """
 
 import numpy as np
@@ -37,9 +38,10 @@ def choose_wind(
     Returns
     -------
     terms
-        Those to estimate, some of `WIND_TERMS`; none where no wind is asked for.
-    omitted
-        The others, each with the reason.
+        The states of the filter, some of `WIND_TERMS`: all that act; none where no wind is asked
+        for.
+    undetermined
+        Those that cannot be distinguished or do not act, each with the reason.
 
     Raises
     ------
@@ -49,29 +51,34 @@ def choose_wind(
     if WIND not in disturbance.models:
         return (), {}
     chosen: list[str] = []
-    omitted: dict[str, str] = {}
+    acting: list[str] = []
+    undetermined: dict[str, str] = {}
     bases = {axis: _slow_forces(axis, disturbance, sensors, stats) for axis in SLOW_FORCES}
     for name, term in WIND_TERMS.items():
         regressor, basis = _block_means(stats, stats.head[name]), bases[term.axis]
         size = float(np.sqrt(np.mean(regressor**2)))
-        share = _residual_rms(regressor, basis) / size if size else 0.0
+        if not size:
+            undetermined[name] = "there is no wind"
+            continue
+        acting.append(name)
+        share = _residual_rms(regressor, basis) / size
         if share > MIN_WIND_VARIATION:
             chosen.append(name)
             bases[term.axis] = np.column_stack((basis, regressor))
-        elif not size:
-            omitted[name] = "there is no wind"
         else:
-            omitted[name] = (
+            undetermined[name] = (
                 f"the wind is too steady in speed and angle: but for {100 * share:.2g} % it acts as"
                 f" {_imitators(term.axis, disturbance, sensors, chosen)}"
             )
     if not chosen:
-        reasons = "; ".join(f"{WIND_TERMS[name].label}: {why}" for name, why in omitted.items())
+        reasons = "; ".join(
+            f"{WIND_TERMS[name].label}: {why}" for name, why in undetermined.items()
+        )
         raise UsageError(
             f"disturbance.models has wind, which cannot be distinguished in this log: {reasons}; "
             "it needs a manoeuvre that turns the ship in the wind; remove wind"
         )
-    return tuple(chosen), omitted
+    return tuple(acting), undetermined
 
 
 def wind_walks(c: Coefficients, stats: SignalStats) -> dict[str, RandomWalk]:

@@ -36,44 +36,52 @@ def shapes() -> dict[str, np.ndarray]:
     }
 
 
-def test_a_term_that_is_constant_is_omitted_beside_a_constant_moment() -> None:
+def test_a_term_that_is_constant_is_not_determined_beside_a_constant_moment() -> None:
     each = shapes()
     stats = stats_with(
         wind_oblique=each["turn"], wind_beam=each["constant"], wind_head=each["turn"]
     )
-    chosen, omitted = choose_wind(CONSTANT, (), stats)
-    assert chosen == ("wind_oblique", "wind_head")
-    assert omitted["wind_beam"].startswith(STEADY)
-    assert "it acts as a constant yaw moment" in omitted["wind_beam"]
+    chosen, undetermined = choose_wind(CONSTANT, (), stats)
+    assert chosen == tuple(WIND_TERMS)  # a state all the same
+    assert list(undetermined) == ["wind_beam"]
+    assert undetermined["wind_beam"].startswith(STEADY)
+    assert "it acts as a constant yaw moment" in undetermined["wind_beam"]
 
 
-def test_a_term_that_grows_linearly_is_omitted_beside_a_ramp_alone() -> None:
+def test_a_term_that_grows_linearly_is_not_determined_beside_a_ramp_alone() -> None:
     each = shapes()
     stats = stats_with(wind_oblique=each["turn"], wind_beam=each["turn"], wind_head=each["linear"])
-    assert "wind_head" in choose_wind(CONSTANT, (), stats)[0]
-    _, omitted = choose_wind(RAMP, (), stats)
-    assert omitted["wind_head"].endswith("it acts as a ramp of the surge force")
+    assert "wind_head" not in choose_wind(CONSTANT, (), stats)[1]
+    _, undetermined = choose_wind(RAMP, (), stats)
+    assert undetermined["wind_head"].endswith("it acts as a ramp of the surge force")
 
 
-def test_two_terms_of_one_shape_are_not_both_estimated() -> None:
+def test_two_terms_of_one_shape_are_not_both_distinguished() -> None:
     each = shapes()
     stats = stats_with(
         wind_oblique=each["turn"], wind_beam=-2 * each["turn"] + 5, wind_head=each["turn"]
     )
-    chosen, omitted = choose_wind(CONSTANT, (), stats)
-    assert chosen == ("wind_oblique", "wind_head")
-    assert "and the other term of the wind" in omitted["wind_beam"]
+    _, undetermined = choose_wind(CONSTANT, (), stats)
+    assert list(undetermined) == ["wind_beam"]
+    assert "and the other term of the wind" in undetermined["wind_beam"]
 
 
-def test_a_steady_wind_is_estimated_where_nothing_else_acts_steadily() -> None:
+def test_a_steady_wind_is_distinguished_where_nothing_else_acts_steadily() -> None:
     each = shapes()
     stats = stats_with(**dict.fromkeys(WIND_TERMS, each["constant"]))
-    chosen, omitted = choose_wind(WAVE, (), stats)
+    _, undetermined = choose_wind(WAVE, (), stats)
+    assert list(undetermined) == ["wind_beam"]
+    assert undetermined["wind_beam"].endswith("it acts as the other term of the wind")
+    _, undetermined = choose_wind(WAVE, ("rudder",), stats)
+    assert list(undetermined) == ["wind_oblique", "wind_beam"]
+    assert undetermined["wind_oblique"].endswith("it acts as the rudder zero")
+
+
+def test_a_term_that_does_not_act_is_no_state() -> None:
+    stats = stats_with(wind_beam=np.zeros(len(windy_analysis().signals)))
+    chosen, undetermined = choose_wind(CONSTANT, (), stats)
     assert chosen == ("wind_oblique", "wind_head")
-    assert omitted["wind_beam"].endswith("it acts as the other term of the wind")
-    chosen, omitted = choose_wind(WAVE, ("rudder",), stats)
-    assert chosen == ("wind_head",)
-    assert omitted["wind_oblique"].endswith("it acts as the rudder zero")
+    assert undetermined["wind_beam"] == "there is no wind"
 
 
 def test_a_calm_is_refused() -> None:

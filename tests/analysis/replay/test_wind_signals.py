@@ -145,6 +145,24 @@ def test_on_a_straight_course_in_a_steady_wind_the_wind_is_refused_by_name() -> 
     assert message.endswith("needs a manoeuvre that turns the ship in the wind; remove wind")
 
 
+def test_a_term_that_is_not_distinguished_widens_the_intervals_of_the_others() -> None:
+    """Beside a ramp the beam wind of a circle is not: what it does may be due to the others."""
+    settings = WINDY | {"disturbance.models": ["ramp", "wind"]}
+    true, result = true_coefficients(windy_trial()), analyse(windy_log(), settings=settings)
+    found = {term.name: term for term in result.findings.wind}
+    assert found["wind_beam"].reason.startswith(STEADY)
+    assert not found["wind_beam"].determined
+    for name, term in found.items():
+        assert abs(term.value - true[name]) < 2.6 * term.std, term
+
+
+def test_with_a_model_that_was_fitted_to_the_log_no_coefficient_is_determined() -> None:
+    result = analyse(replace(windy_log(), vessel_toml=None), settings=WINDY)
+    assert not any(term.determined for term in result.findings.wind)
+    reasons = {term.reason for term in result.findings.wind}
+    assert any("contains part of the wind; give a model with --vessel" in each for each in reasons)
+
+
 MISSING: dict[str, tuple[tuple[str, ...], str]] = {
     "speed": (
         (*APPARENT_WIND, "wind_speed"), "it has true_wind_angle, wind_direction; it needs"
