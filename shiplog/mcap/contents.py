@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from mcap import records
+from mcap.records import AttachmentIndex
 from numpy.typing import NDArray
 
 from shiplog.types import Event, FloatArray, TimeArray
@@ -175,6 +176,9 @@ class McapContents:
     records
         Those not yet taken, in the order of the file; of an MCAP chunk and of a run of messages
         outside of them, its data.
+    long_attachments
+        Receives the indexes of intact attachments that are too long to be read at once, by their
+        offsets; None where these are reported as not read.
     event_messages
         The events not yet decoded.
     events
@@ -233,6 +237,7 @@ class McapContents:
     kept: dict[int, list[KeptMessages]] = field(default_factory=dict)
     keep_records: bool = False
     records: list[Record] = field(default_factory=list)
+    long_attachments: dict[int, AttachmentIndex] | None = None
     event_messages: list[EventMessage] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     foreign_records: dict[str, None] = field(default_factory=dict)

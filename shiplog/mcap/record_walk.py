@@ -35,7 +35,10 @@ _HEAD_PATTERN = re.compile(rb"(?=[\x01-\x0f][\s\S]{4}\0{4})")
 
 
 class Record(NamedTuple):
-    """A record: its opcode, the offsets of its first byte and of the byte after it, its content."""
+    """A record: its opcode, the offsets of its first byte and of the byte after it, its content.
+
+    An attachment that is too long to be read at once has no content.
+    """
 
     opcode: int
     start: int
@@ -169,6 +172,8 @@ class RecordWalk:
     def _too_long(self, opcode: int, at: int, end: int) -> Record | None:
         if not self._is_head(end):
             return None
+        if opcode == Opcode.ATTACHMENT:
+            return Record(opcode, at, end, b"")
         text = f"a record of {end - at} bytes is longer than any of a log and was not read"
         self.remarks.append(Damage(at, end, text))
         return Record(opcode if opcode == Opcode.MESSAGE_INDEX else _FIRST_PRIVATE, at, end, b"")

@@ -4,7 +4,9 @@ import os
 import struct
 import zlib
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import IO
 
 import mcap
 import numpy as np
@@ -20,6 +22,8 @@ from shiplog.version import __version__
 from .encode import McapChunk
 from .open_chunk import COMPRESSION, OpenMcapChunk, mcap_chunk_head
 from .records import INDEX_HEAD, MAGIC, RECORD_HEAD
+
+_COPY_BYTES = 1 << 20
 
 
 class McapRecordWriter:
@@ -90,6 +94,22 @@ class McapRecordWriter:
             )
         )
         self._append(data)
+
+    def copy_attachment(self, source: IO[bytes], index: records.AttachmentIndex) -> None:
+        """Append an attachment of another file, in bounded memory.
+
+        Parameters
+        ----------
+        source
+            The other file.
+        index
+            The index entry of the attachment there.
+        """
+        self.close_mcap_chunk()
+        self._attachment_indexes.append(replace(index, offset=self._size))
+        source.seek(index.offset)
+        for at in range(0, index.length, _COPY_BYTES):
+            self._append(source.read(min(_COPY_BYTES, index.length - at)))
 
     def add_schema(self, schema: records.Schema) -> None:
         """Describe a schema at the beginning of each further MCAP chunk."""

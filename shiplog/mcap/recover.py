@@ -6,6 +6,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from mcap import records
@@ -89,7 +90,7 @@ def recover(path: str | os.PathLike[str], output: str | os.PathLike[str]) -> Rec
             if record.opcode == Opcode.HEADER and not profile:
                 profile = _profile(record.content)
         with atomic_write(output) as part:
-            writer = _RecoveryWriter(part, profile, contents)
+            writer = _RecoveryWriter(part, profile, contents, file.stream)
             for record in _intact_records(file, McapContents(selected=frozenset())):
                 writer.add(record)
             writer.finish()
@@ -113,13 +114,17 @@ class _RecoveryWriter:
     path, profile
         The file to write, and the profile of its header.
     contents
-        Has the schemas and channels of the damaged file, wherever in it they were described.
+        Has the schemas and channels of the damaged file, wherever in it they were described, and
+        its long attachments.
+    source
+        The damaged file.
     """
 
-    def __init__(self, path: Path, profile: str, contents: McapContents) -> None:
+    def __init__(self, path: Path, profile: str, contents: McapContents, source: IO[bytes]) -> None:
         self.attachments, self.metadata_records = 0, 0
         self._file = McapRecordWriter(path, profile)
-        self._contents = contents
+        self._contents, self._source = contents, source
+        self._long_attachments = contents.long_attachments or {}
         self._schemas: set[int] = set()
         self._counts: dict[int, int] = {}
 
@@ -128,7 +133,10 @@ class _RecoveryWriter:
         if record.opcode == Opcode.CHUNK:
             self._add_messages(record.content)
         elif record.opcode == Opcode.ATTACHMENT:
-            self._file.write_attachment(read_attachment(record.content))
+            if record.content:
+                self._file.write_attachment(read_attachment(record.content))
+            else:
+                self._file.copy_attachment(self._source, self._long_attachments[record.start])
             self.attachments += 1
         elif record.opcode == Opcode.METADATA:
             metadata = records.Metadata.read(_stream(record.content))
@@ -190,6 +198,7 @@ class _RecoveryWriter:
 def _intact_records(file: McapFile, contents: McapContents) -> Iterator[Record]:
     """Yield the intact records of a file; messages in runs, with the opcode of an MCAP chunk."""
     contents.keep_records, contents.keep_undescribed = True, False
+    contents.long_attachments = {}
     for _ in scan(file, contents):
         kept, contents.records = contents.records, []
         contents.event_messages.clear()

@@ -17,13 +17,13 @@ from .contents import LostMcapChunk, McapContents
 from .damage import Damage, gap_damage, lost_messages_text
 from .decode import MALFORMED, collect_messages, collect_undescribed, read_record
 from .decompress import (
-    is_mcap_chunk_intact,
     is_mcap_chunk_start,
     mcap_chunk_data,
     truncated_mcap_chunk_data,
 )
 from .limits import MAX_MESSAGES_PER_BYTE, MAX_RECORD_BYTES
 from .locate import complete_records, gather, locate_by_index
+from .long_attachment import long_attachment
 from .mcap_file import McapFile, open_mcap
 from .part_contents import PartContents
 from .part_set import LogParts
@@ -60,14 +60,16 @@ def scan(file: McapFile, contents: McapContents, skip: Collection[int] = ()) -> 
     for record, indexes in _with_indexes(walk):
         contents.reading = record.start, record.end
         if record.opcode == Opcode.CHUNK:
-            _read_mcap_chunk(record, indexes, contents)
-            if file.check.is_intact is False:
-                _check_indexes(record, indexes, contents)
+            data = _read_mcap_chunk(record, indexes, contents)
+            if file.check.is_intact is False and data is not None:
+                _check_indexes(data, record, indexes, contents)
             _refuse_bomb(file, walk, contents)
             yield
         elif record.opcode == Opcode.MESSAGE:
             contents.in_order &= not collect_messages(record.content, [], contents)
             yield
+        elif record.opcode == Opcode.ATTACHMENT and not record.content:
+            _read_long_attachment(file, contents)
         else:
             read_record(record.opcode, record.content, contents)
     if not walk.is_complete:
@@ -125,27 +127,30 @@ def _with_indexes(walk: RecordWalk) -> Iterator[tuple[Record, list[bytes]]]:
         yield Record(Opcode.MESSAGE, loose_start, walk.end, bytes(loose)), []
 
 
-def _read_mcap_chunk(record: Record, indexes: list[bytes], contents: McapContents) -> None:
+def _read_mcap_chunk(record: Record, indexes: list[bytes], contents: McapContents) -> bytes | None:
+    """Collect the messages of an MCAP chunk, and return its data; None where it is damaged."""
     key = record.content[: MCAP_CHUNK_HEAD.size]
     try:
         data = mcap_chunk_data(record.content)
     except MALFORMED as error:
         contents.lost_mcap_chunks.append(_lost_mcap_chunk(record, indexes, str(error)))
-        return
+        return None
     size, crc = struct.unpack_from("<QI", key, 16)
     if size and crc and key in contents.mcap_chunks_read:
         text = f"the MCAP chunk at byte {contents.mcap_chunks_read[key]} is there again; once read"
         contents.damage.append(Damage(record.start, record.end, text, is_lost=False))
-        return
+        return data
     contents.mcap_chunks_read[key] = record.start
     _collect_mcap_chunk(data, record.content, indexes, contents)
+    return data
 
 
-def _check_indexes(record: Record, indexes: list[bytes], contents: McapContents) -> None:
-    """Report message indexes that do not describe an intact MCAP chunk; they were not used."""
-    if not indexes or not is_mcap_chunk_intact(record.content):
+def _check_indexes(
+    data: bytes, record: Record, indexes: list[bytes], contents: McapContents
+) -> None:
+    """Report message indexes that do not describe the data of an MCAP chunk; they were not used."""
+    if not indexes:
         return
-    data = mcap_chunk_data(record.content)
     first = (at for opcode, at, _ in complete_records(data, 0) if opcode == Opcode.MESSAGE)
     located = locate_by_index(data, next(first, len(data)), indexes)
     entries = [index_entries(index)[1] for index in indexes]
@@ -157,6 +162,20 @@ def _check_indexes(record: Record, indexes: list[bytes], contents: McapContents)
         end = record.end + sum(len(index) + RECORD_HEAD.size for index in indexes)
         text = "a message index is wrong; it is not needed"
         contents.damage.append(Damage(record.end, end, text, is_lost=False))
+
+
+def _read_long_attachment(file: McapFile, contents: McapContents) -> None:
+    """Locate the attachment that is being read, where such attachments are wanted."""
+    start, end = contents.reading
+    index = long_attachment(file.stream, start, end)
+    if index is None:
+        contents.report(f"an attachment of {end - start} bytes is damaged")
+    elif contents.long_attachments is None:
+        text = f"an attachment of {end - start} bytes is longer than any of a log and was not read"
+        contents.report(f"{text}; `shiplog recover` keeps it")
+    else:
+        contents.long_attachments[start] = index
+        contents.keep(Opcode.ATTACHMENT, b"")
 
 
 def _lost_mcap_chunk(record: Record, indexes: list[bytes], cause: str) -> LostMcapChunk:

@@ -3,6 +3,7 @@
 from io import BytesIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
@@ -17,6 +18,7 @@ from mcap_files import (
 )
 
 from shiplog import LogError, LogWriter, TrialLog, read
+from shiplog.mcap import record_walk
 from shiplog.mcap.recover import recover
 
 
@@ -140,3 +142,29 @@ def test_what_is_no_mcap_file_is_refused_and_nothing_is_written(path: Path, good
     with pytest.raises(LogError, match="not an MCAP file"):
         recover(path, good)
     assert not good.exists()
+
+
+@pytest.mark.parametrize("is_damaged", [False, True])
+def test_an_attachment_that_is_too_long_to_be_read_at_once_is_copied_or_lost(
+    path: Path, good: Path, monkeypatch: pytest.MonkeyPatch, *, is_damaged: bool
+) -> None:
+    monkeypatch.setattr(record_walk, "MAX_RECORD_BYTES", 10_000)
+    notes = np.random.default_rng(0).bytes(3 << 20)
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        topic = writer.register_channel("/plain", "json", 0)
+        writer.add_message(topic, START, b"{}", START)
+        writer.add_attachment(START, START + 1, "notes.bin", "application/octet-stream", notes)
+        writer.finish()
+    data = path.read_bytes()
+    at = data.index(notes) + 1000
+    if is_damaged:
+        path.write_bytes(data[:at] + bytes(50) + data[at + 50 :])
+    recovery = recover(path, good)
+    assert recovery.attachments == (not is_damaged)
+    assert recovery.is_lost == is_damaged
+    expected = content(data)[:2] if is_damaged else content(data)
+    assert content(good.read_bytes()) == expected
+    warnings = read(path).warnings
+    assert any(str(len(notes))[:4] in text and "attachment" in text for text in warnings)
