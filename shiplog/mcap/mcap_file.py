@@ -1,6 +1,7 @@
 """An MCAP file opened for reading, of which all checksums are known."""
 
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
@@ -9,7 +10,7 @@ from typing import IO
 
 from mcap.opcode import Opcode
 
-from shiplog.errors import LogError
+from shiplog.errors import LogError, UsageError
 
 from .file_check import FileCheck, check_file
 from .inverted_bit import with_inverted_bit
@@ -29,6 +30,35 @@ class McapFile:
     check: FileCheck
 
 
+LogPaths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
+
+
+def checked_files(paths: LogPaths) -> tuple[Path, FileCheck | None]:
+    """Return what names a log, and, where it is several files, what their checksums show.
+
+    Parameters
+    ----------
+    paths
+        One path, which is returned as it is, or those of the parts of a log, in any order.
+
+    Raises
+    ------
+    UsageError
+        There is no path.
+    LogError
+        A file cannot be read, or the files are not the parts of one log.
+    """
+    if isinstance(paths, str | os.PathLike):
+        return Path(paths), None
+    files = [file for path in paths for file in part_files(Path(path))]
+    if not files:
+        raise UsageError("no log to read; name at least one file")
+    if len(files) == 1:
+        return files[0], None
+    name = files[0].with_name(f"{files[0].name} to {files[-1].name}")
+    return name, _check_parts(name, files)
+
+
 @contextmanager
 def open_mcap(path: Path, check: FileCheck | None = None) -> Iterator[McapFile]:
     """Open a file that begins as an MCAP file does, and verify its checksums.
@@ -46,10 +76,12 @@ def open_mcap(path: Path, check: FileCheck | None = None) -> Iterator[McapFile]:
         The file is missing, empty or not MCAP, reading it fails within the block, or the files
         are not the parts of one log.
     """
+    if check is not None and check.parts is not None:
+        yield McapFile(path, BytesIO(), check)
+        return
     files = part_files(path)
     if len(files) > 1:
-        check = check or _check_parts(path, files)
-        yield McapFile(path, BytesIO(), check)
+        yield McapFile(path, BytesIO(), _check_parts(path, files))
         return
     path = files[0]
     try:

@@ -1,6 +1,5 @@
 """Reading of an MCAP file, or a part of it, into memory."""
 
-import os
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,8 +13,9 @@ from .clock_repair import MixedTimes, refuse_mixed_times
 from .contents import McapContents
 from .damage import Damage
 from .decode import is_events, schema_of
+from .file_check import FileCheck
 from .index_times import received_in_order
-from .mcap_file import McapFile, open_mcap
+from .mcap_file import LogPaths, McapFile, checked_files, open_mcap
 from .scan import scan
 from .schema import EVENTS_TOPIC
 from .summary import McapChunkLocation, McapSummary, are_in_order
@@ -65,7 +65,7 @@ class ReceptionSpan:
 
 
 def read(
-    path: str | os.PathLike[str],
+    path: LogPaths,
     *,
     channels: Iterable[str] | None = None,
     start_ns: int | None = None,
@@ -79,7 +79,8 @@ def read(
     Parameters
     ----------
     path
-        The MCAP file.
+        The MCAP file; what names the parts of a log (the name of a divided recording, a folder, or
+        a pattern such as ``day/*.mcap``); or the paths of the parts.
     channels
         The channels to read, each named as in ``log[name]``. By default all. The log has them
         in the order of the file, and all events.
@@ -109,13 +110,15 @@ def read(
     >>> [channel.name for channel in log]
     ['yaw_rate', 'rudder']
     """
-    log, mixed = read_unchecked(path, channels=channels, start_ns=start_ns, end_ns=end_ns)
+    name, check = checked_files(path)
+    log, mixed = read_unchecked(name, check, channels=channels, start_ns=start_ns, end_ns=end_ns)
     refuse_mixed_times(mixed, log.span_ns)
     return log
 
 
 def read_unchecked(
-    path: str | os.PathLike[str],
+    path: Path,
+    check: FileCheck | None = None,
     *,
     channels: Iterable[str] | None = None,
     start_ns: int | None = None,
@@ -123,12 +126,20 @@ def read_unchecked(
 ) -> tuple[TrialLog, list[MixedTimes]]:
     """Read a trial as `read` does, for a caller that uses a part of it.
 
+    Parameters
+    ----------
+    path
+        The file, or what names the parts of a log.
+    check
+        What its checksums showed before, so that they are not computed again.
+    channels, start_ns, end_ns
+        What to read.
+
     Returns
     -------
     log, mixed
         The trial, and the spans for which the caller has to call `refuse_mixed_times`.
     """
-    path = Path(path)
     if isinstance(channels, str):
         channels = (channels,)
     keys = None if channels is None else tuple(channels)
@@ -138,7 +149,7 @@ def read_unchecked(
         )
     span = ReceptionSpan(start_ns, end_ns)
     is_part = keys is not None or span != ReceptionSpan()
-    with open_mcap(path) as file:
+    with open_mcap(path, check) as file:
         contents = _contents_of_part(file, keys, span) if is_part else None
         if contents is None:
             contents = McapContents()

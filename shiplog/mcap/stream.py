@@ -1,6 +1,5 @@
 """Logs longer than memory: a file whose samples come chunk by chunk."""
 
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from shiplog.types.time_cut import TimeCut, empty_cut_error, resolve_cut
 from .clock_repair import MixedTimes, refuse_mixed_times
 from .contents import McapContents
 from .file_check import FileCheck
-from .mcap_file import McapFile, open_mcap
+from .mcap_file import LogPaths, McapFile, checked_files, open_mcap
 from .reader import contents_described_by, read_unchecked, sample_count
 from .scan import scan
 from .summary import are_in_order
@@ -165,7 +164,7 @@ class LogFile:
 
 
 def open_log(
-    path: str | os.PathLike[str],
+    path: LogPaths,
     start: float | str | None = None,
     end: float | str | None = None,
 ) -> TrialLog | LogFile:
@@ -179,7 +178,7 @@ def open_log(
     Parameters
     ----------
     path
-        The MCAP file.
+        The MCAP file, what names the parts of a log, or their paths, as in `read`.
     start, end
         The part to open, as `TrialLog.between` takes them; by default all.
 
@@ -201,30 +200,32 @@ def open_log(
     >>> sum(len(channel) for chunk in log.chunks() for channel in chunk) > 20_000
     True
     """
-    log, mixed = _open_unchecked(Path(path))
+    log, mixed = _open_unchecked(*checked_files(path))
     part = log.between(start, end)
     if isinstance(part, TrialLog):
         refuse_mixed_times(mixed, part.span_ns)
     return part
 
 
-def _open_unchecked(path: Path) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
+def _open_unchecked(
+    path: Path, check: FileCheck | None
+) -> tuple[TrialLog | LogFile, list[MixedTimes]]:
     """Open a log whose parts may have mixed times, of which a `LogFile` learns by its chunks."""
-    with open_mcap(path) as file:
-        summary = file.check.summary
+    with open_mcap(path, check) as file:
+        check, summary = file.check, file.check.summary
         mcap_chunks = None if summary is None else summary.mcap_chunk_locations()
-        if summary is None or file.check.is_intact is False:
+        if summary is None or check.is_intact is False:
             return _open_by_scan(file)
         if sample_count(summary) <= MAX_SAMPLES_IN_MEMORY:
-            return read_unchecked(path)
+            return read_unchecked(path, check)
         if mcap_chunks is None:
             return _open_by_scan(file)
     if not are_in_order(mcap_chunks):
-        return read_unchecked(path)
+        return read_unchecked(path, check)
     contents = contents_described_by(summary)
     contents.finished = True
     contents.metadata, contents.vessel_toml = dict(summary.metadata), summary.vessel_toml
-    return _log_file(path, file.check, contents)
+    return _log_file(path, check, contents)
 
 
 def _log_file(
@@ -233,7 +234,7 @@ def _log_file(
     """Return a log in its file, or in memory where some times may need a repair."""
     contents.event_messages = []  # of an earlier pass
     if _need_repair(path, check, contents):
-        return read_unchecked(path)
+        return read_unchecked(path, check)
     outline = build_trial_log(path, contents)
     return LogFile(path, outline, contents.schemas, contents.channels, check), []
 
@@ -270,4 +271,4 @@ def _open_by_scan(file: McapFile) -> tuple[TrialLog | LogFile, list[MixedTimes]]
         return build_trial_log(file.path, contents), contents.mixed_times
     if contents.in_order:
         return _log_file(file.path, file.check, contents)
-    return read_unchecked(file.path)
+    return read_unchecked(file.path, file.check)

@@ -8,7 +8,7 @@ import pytest
 
 from recorders.record import Rotation, record
 from recorders.source import Recordable
-from shiplog import Channel, LogError, LogWriter, TrialLog, open_log, read
+from shiplog import Channel, LogError, LogWriter, TrialLog, UsageError, open_log, read
 from shiplog.checks.info import read_log_info
 from shiplog.mcap.part_names import part_files
 from shiplog.mcap.raw_reader import read_raw
@@ -64,6 +64,30 @@ def _require_equal(one: TrialLog, other: TrialLog) -> None:
 def test_the_parts_of_a_recording_are_the_log_that_one_file_is(divided: Path, name: str) -> None:
     whole = read(divided.parents[1] / "trial.mcap")
     _require_equal(read(divided.parent / name), whole)
+
+
+def test_the_paths_of_the_parts_in_any_order_are_one_log(
+    divided: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, paths = read(divided), [*divided.parent.iterdir()]
+    paths.sort(key=lambda path: path.name[::-1])
+    for each in (paths, map(str, paths)):
+        _require_equal(read(each), whole)
+    monkeypatch.setattr("shiplog.mcap.stream.MAX_SAMPLES_IN_MEMORY", 100)
+    log = open_log(paths)
+    values = [chunk[0].values for chunk in log.chunks()]
+    np.testing.assert_array_equal(np.concatenate(values), whole.channels[0].values)
+
+
+def test_paths_that_are_no_log_together_are_refused(divided: Path) -> None:
+    first, second, *_ = sorted(divided.parent.iterdir())
+    assert read([first]).name == first.name
+    with pytest.raises(LogError, match="both part 1"):
+        read([first, second, first])
+    with pytest.raises(LogError, match="no such file"):
+        read([first, divided.parent / "absent.mcap"])
+    with pytest.raises(UsageError, match="name at least one file"):
+        read([])
 
 
 def test_events_and_raw_packets_of_all_parts_are_read(divided: Path) -> None:
