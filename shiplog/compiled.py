@@ -216,6 +216,17 @@ def overload_for(generic: Callable[..., object], kind: type) -> Callable[[F], F]
     return registered
 
 
+@compiled
+def copy_vector(target: Any, source: Any) -> None:  # noqa: ANN401
+    """Copy an array or a tuple of numbers (n,) into an array, element by element.
+
+    The assignment ``target[:] = source`` compiles for two seconds longer: numba compiles the text
+    of its error with it.
+    """
+    for i in range(len(source)):
+        target[i] = source[i]
+
+
 def element(arrays: Any, i: int) -> Any:  # noqa: ANN401
     """Return the NamedTuple of the i-th value of each array of a NamedTuple, of the same type.
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shiplog.compiled import compiled
+from shiplog.compiled import compiled, copy_vector
 from shiplog.types import FloatArray
 
 from .core import StepInputs, advance, begin_instant, gain, output_row
@@ -25,7 +25,7 @@ from .further_steps import (
     set_slopes,
     show,
 )
-from .kernels import ACCEPTED, REJECTED, copy_matrix, copy_vector, correct, innovate, propagate
+from .kernels import ACCEPTED, REJECTED, copy_matrix, correct, innovate, propagate
 
 
 class System(NamedTuple):

@@ -166,19 +166,8 @@ def propagate(P: FloatArray, F: FloatArray, Q: FloatArray, FP: FloatArray, dynam
 
 
 @compiled
-def copy_vector(target: FloatArray, source: FloatArray) -> None:
-    """Copy a vector element by element.
-
-    The assignment ``target[:] = source`` compiles for a second longer: numba compiles the text of
-    its error with it.
-    """
-    for i in range(len(source)):
-        target[i] = source[i]
-
-
-@compiled
 def copy_matrix(target: FloatArray, source: FloatArray) -> None:
-    """Copy a matrix element by element, as `copy_vector`."""
+    """Copy a matrix element by element, as `compiled.copy_vector` does a vector."""
     for i in range(source.shape[0]):
         for j in range(source.shape[1]):
             target[i, j] = source[i, j]

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from analysis.signals.concat import concatenate
 from analysis.signals.hold import in_pieces
-from shiplog.compiled import compiled
+from shiplog.compiled import compiled, copy_vector
 from shiplog.types import FloatArray, Signals
 
 from .base import Estimates, SmoothableFilter, Trace
-from .kernels import copy_matrix, copy_vector
+from .kernels import copy_matrix
 
 PIECE = 4096  # instants that are traced at once: their matrices fit the processor's cache
 MIN_VARIANCE_SHARE = 1e-9  # of a smoothed variance in the filtered: below it is rounding

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.filters.kernels import copy_matrix, copy_vector, correct, output_covariance, propagate
-from shiplog.compiled import compiled
+from analysis.filters.kernels import copy_matrix, correct, output_covariance, propagate
+from shiplog.compiled import compiled, copy_vector
 from shiplog.types import FloatArray
 
 from .estimator_model import EstimatorModel

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shiplog.compiled import compiled
+from shiplog.compiled import compiled, copy_vector
 from shiplog.ships.under_way import (
     CoefficientTuple,
     Excitation,
@@ -117,8 +117,8 @@ def integrate_run(
         if count == len(rows):
             rows = np.concatenate((rows, np.empty_like(rows)))
         rows[count, TIME] = t
-        rows[count, 1:own] = state
-        rows[count, own:] = u
+        copy_vector(rows[count, 1:own], state)
+        copy_vector(rows[count, own:], u)
         count += 1
         if t >= plan.duration:
             return rows[:count]
@@ -134,7 +134,7 @@ def integrate_run(
             after = runge_kutta_step(c, constants, state, u, t, end - t, work)
             order = -order
         delta += delta_dot * (end - t)
-        state[:] = after
+        copy_vector(state, after)
         t = end
 
 
@@ -216,7 +216,7 @@ def outputs_at(
         write_rates_si(
             c, constants, state, _excitation(now[own:]), now[0], times[i] - now[0], rates
         )
-        out[i] = outputs_si(c, constants, state, rates, yaw)
+        copy_vector(out[i], outputs_si(c, constants, state, rates, yaw))
     return out
 
 

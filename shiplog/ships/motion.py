@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from shiplog.compiled import compiled_in_caller, element, overload_for
+from shiplog.compiled import compiled_in_caller, copy_vector, element, overload_for
 from shiplog.types import FloatArray
 
 ComplexArray = NDArray[np.complex128]
@@ -184,7 +184,7 @@ def _integrate_one(
         at_start = Forcing(delta, rate + 0j, n)
         halfway = Forcing(delta + rate * (h / 2), rate + 0j, n)
         at_end = Forcing(delta + rate * h, rate + 0j, n)
-        after[:] = x
+        copy_vector(after, x)
         leaving = state_rates(c, x, at_start)
         _add(after, x, leaving, h / 6, between, h / 2)
         _add(after, x, state_rates(c, between, halfway), h / 3, between, h / 2)
@@ -199,7 +199,7 @@ def _integrate_one(
             for j in range(1, count):
                 _interpolate(at_sample, x, leaving, after, arriving, h, j / count)
                 _store(out, path.sample[k] - count + j, observed(c, at_sample))
-        x[:] = after
+        copy_vector(x, after)
         if count > 0:
             _store(out, path.sample[k], observed(c, x))
 

@@ -231,9 +231,8 @@ def runge_kutta_step(
     after: FloatArray = work[0]
     between, rates = work[1], work[2]
     write_rates_si(c, constants, x, u, t, 0.0, rates)
-    after[:] = x
     for i in range(len(x)):
-        after[i] += h / 6 * rates[i]
+        after[i] = x[i] + h / 6 * rates[i]
         between[i] = x[i] + h / 2 * rates[i]
     write_rates_si(c, constants, between, u, t, h / 2, rates)
     for i in range(len(x)):
