@@ -60,6 +60,7 @@ def gappy(signals: Signals) -> Signals:
     return replace(signals, values=values)
 
 
+@pytest.mark.slow
 def test_every_line_runs_and_reports_a_ratio_and_slowness_is_no_failure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -111,6 +111,7 @@ def test_a_page_of_a_paper_is_the_output_of_its_script(script: Path, printed: Pr
         assert same_number(ours, theirs), (line, theirs)
 
 
+@pytest.mark.slow
 def test_the_page_of_all_methods_is_the_output_of_its_script(
     printed: Printed, tmp_path: Path
 ) -> None:
