@@ -16,7 +16,7 @@ from .svg_figure import MUTED, SERIES, PageFigure, new_figure, page_figure
 Panel = Callable[[Axes], None]  # draws its time histories
 KNOT = UNITS["kn"][1]  # m/s
 HEADING_LINE, RUDDER_LINE, RATE_LINE, SPEED_LINE, RPM_LINE, DRIFT_LINE = SERIES
-PANEL_INCHES, FIRST_PANEL_INCHES = 0.85, 2.1  # heights
+PANEL_INCHES, FIRST_PANEL_INCHES = 1.0, 2.4  # heights
 SPIRAL_INCHES = 2.6
 ONE_AXIS_TURN = pi / 3  # of heading: up to it rudder and heading share one axis
 TURN_TICK_DEG, MAX_TURN_TICKS = 90.0, 7
@@ -122,8 +122,8 @@ def _mark_headings(axes: Axes, manoeuvre: SailedManoeuvre) -> None:
     if not has_numbers(series.heading_change):
         return
     for mark in manoeuvre.marks:
-        if not series.time_secs[0] <= mark.time_secs <= series.time_secs[-1]:
-            continue
+        if mark.time_secs == 0 or not series.time_secs[0] < mark.time_secs < series.time_secs[-1]:
+            continue  # the execute has its own line
         angle = degrees(np.interp(mark.time_secs, series.time_secs, series.heading_change))
         up = angle >= 0
         axes.plot(mark.time_secs, angle, marker="o", markersize=3, color=HEADING_LINE)

@@ -100,9 +100,9 @@ def _facts(manoeuvre: SailedManoeuvre, trial: TrialAnalysis) -> tuple[tuple[str,
             "Duration",
             _text(manoeuvre.end_secs - manoeuvre.execute_secs, "{:.0f} s from the execute"),
         ),
-        ("Rudder ordered", _angle_text(manoeuvre.rudder)),
-        ("Neutral rudder", _angle_text(manoeuvre.neutral_rudder, 2)),
-        ("Approach heading", _angle_text(manoeuvre.approach_heading % (2 * pi))),
+        ("Rudder ordered", _side_text(manoeuvre.rudder, 1)),
+        ("Neutral rudder", _side_text(manoeuvre.neutral_rudder, 2)),
+        ("Approach heading", _text(degrees(manoeuvre.approach_heading % (2 * pi)), "{:.1f}°")),
         ("Approach speed", _text(manoeuvre.approach_speed / KNOT, "{:.2f} kn")),
         ("Approach yaw rate", _text(degrees(manoeuvre.approach_yaw_rate), "{:.3f} °/s")),
         ("Approach revolutions", _text(manoeuvre.approach_rpm, "{:.1f} rpm")),
@@ -110,8 +110,10 @@ def _facts(manoeuvre: SailedManoeuvre, trial: TrialAnalysis) -> tuple[tuple[str,
     return tuple((label, text) for label, text in facts if text)
 
 
-def _angle_text(angle: float, digits: int = 1) -> str:
-    return _text(degrees(angle), f"{{:.{digits}f}}°")
+def _side_text(angle: float, digits: int) -> str:
+    """Write a rudder angle with its side."""
+    text = _text(abs(degrees(angle)), f"{{:.{digits}f}}°")
+    return f"{text} to {'port' if angle < 0 else 'starboard'}" if text else ""
 
 
 def _text(value: float, template: str) -> str:

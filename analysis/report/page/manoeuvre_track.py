@@ -16,8 +16,8 @@ HEIGHTS_INCHES = (1.2, 3.7)  # least and greatest height of the axes
 TURN_MARKS = (pi / 2, pi, 3 * pi / 2, 2 * pi)
 APPROACH_LENGTHS = 1.5  # of the approach that is shown before the execute, in ship lengths
 HALF_BEAM_SHARE = 0.08  # of the ship's length, of the outlines along the track
-MARGIN_SHARE = 0.08  # of the extent of a track, around it
-MIN_WIDTH_SHARE = 0.2  # of the longer side, of the area around a straight track
+MARGIN_SHARE = 0.06  # of the extent of a track, around it
+MIN_WIDTH_SHARE = 0.12  # of the longer side, of the area around a straight track
 SMALL = 7.5  # font size of labels within the chart
 
 
@@ -140,7 +140,7 @@ def length_scale(chart: TrackAxes, length: float) -> None:
         return
     axes = chart.axes
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    margin, is_right = 0.03 * (right - left), left + right > 0
+    margin, is_right = 0.05 * (right - left), left + right > 0
     x = right - margin - length if is_right else left + margin
     y = bottom + 0.05 * (top - bottom)
     axes.plot([x, x + length], [y, y], color=INK, linewidth=2.0, solid_capstyle="butt")
