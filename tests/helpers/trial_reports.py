@@ -69,7 +69,10 @@ def zigzag() -> SailedManoeuvre:
     return _manoeuvre(
         ManoeuvreKind.ZIGZAG, title, "starboard", 10.0, series, indices=(OVERSHOOT,),
         switch_heading=radians(10.0),
-        not_computed=(NotComputed("initial turning distance", "the log has no positions"),),
+        not_computed=tuple(
+            NotComputed(subject, "the log has no positions")
+            for subject in ("initial turning distance", "track")
+        ),
     )  # fmt: skip
 
 

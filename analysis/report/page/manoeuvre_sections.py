@@ -1,5 +1,6 @@
 """The section of each manoeuvre: facts, figures, indices against limits, and what they rest on."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from math import degrees, isfinite, nan, pi
@@ -36,8 +37,10 @@ class ManoeuvreSection:
         The indices.
     sensitivity, uncertainty
         The indices by other start rules, and the standard uncertainty by source; None without any.
-    not_computed, notes
-        What could not be computed, and what was assumed.
+    not_computed
+        Names of what could not be computed, and the reason that they share.
+    notes
+        What was assumed.
     """
 
     place: ManoeuvrePlace
@@ -46,7 +49,7 @@ class ManoeuvreSection:
     rows: tuple[VerdictRow, ...]
     sensitivity: TextTable | None
     uncertainty: TextTable | None
-    not_computed: tuple[NotComputed, ...]
+    not_computed: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
 
 
@@ -69,9 +72,23 @@ def manoeuvre_section(place: ManoeuvrePlace, trial: TrialAnalysis) -> ManoeuvreS
         tuple(index_row(index) for index in manoeuvre.indices),
         _sensitivity_table(manoeuvre),
         _uncertainty_table(manoeuvre),
-        manoeuvre.not_computed,
+        reasons_in_short(manoeuvre.not_computed),
         manoeuvre.notes,
     )
+
+
+def reasons_in_short(items: Iterable[NotComputed]) -> tuple[tuple[str, str], ...]:
+    """Join what could not be computed for the same reason.
+
+    Examples
+    --------
+    >>> reasons_in_short([NotComputed("advance", "no fix"), NotComputed("reach", "no fix")])
+    (('advance, reach', 'no fix'),)
+    """
+    subjects: dict[str, list[str]] = {}
+    for item in items:
+        subjects.setdefault(item.reason, []).append(item.subject)
+    return tuple((", ".join(names), reason) for reason, names in subjects.items())
 
 
 def time_text(start_ns: int, secs: float) -> str:

@@ -14,7 +14,7 @@ from shiplog.progress import ProgressCallback, no_progress
 from .assumptions import assumptions
 from .comparisons import comparisons_of
 from .condition_rows import condition_groups
-from .manoeuvre_sections import ManoeuvreSection, manoeuvre_section, time_text
+from .manoeuvre_sections import ManoeuvreSection, manoeuvre_section, reasons_in_short, time_text
 from .numbering import manoeuvre_places
 from .trial_report import ReportedLog, TrialReport
 from .verdict_rows import verdict_rows
@@ -89,6 +89,7 @@ def _log_section(log: ReportedLog, number: int) -> dict[str, object]:
     return {
         "number": number,
         "log": log,
+        "not_computed": reasons_in_short(log.trial.not_computed),
         "start": time_text(log.trial.start_ns, 0.0),
         "quality": (log_table(log.stats), *events),
         "estimates": finding_tables(log.replay) if log.replay else (),

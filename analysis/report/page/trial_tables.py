@@ -2,6 +2,7 @@
 
 from shiplog.text_table import TextTable
 
+from .manoeuvre_sections import reasons_in_short
 from .numbering import manoeuvre_places
 from .trial_report import TrialReport
 from .verdict_rows import VerdictRow, verdict_rows
@@ -40,15 +41,15 @@ def _verdict_text(row: VerdictRow) -> str:
 def _not_computed_table(report: TrialReport) -> tuple[TextTable, ...]:
     """Return what could not be computed, with the reasons; no table where there is nothing."""
     rows = [
-        (f"{log.trial.name}: {each.subject}", each.reason)
+        (f"{log.trial.name}: {subjects}", reason)
         for log in report.logs
-        for each in log.trial.not_computed
+        for subjects, reason in reasons_in_short(log.trial.not_computed)
     ]
     rows += [
-        (f"manoeuvre {place.position}: {each.subject}", each.reason)
+        (f"manoeuvre {place.position}: {subjects}", reason)
         for of_log in manoeuvre_places(report)
         for place in of_log
-        for each in place.manoeuvre.not_computed
+        for subjects, reason in reasons_in_short(place.manoeuvre.not_computed)
     ]
     if not rows:
         return ()

@@ -119,7 +119,7 @@ def _untested_row(finding: CriterionFinding) -> VerdictRow:
         finding.name,
         limit=finding.text,
         paragraph=_paragraph(finding.paragraph),
-        verdict="not tested",
+        verdict="no verdict",
         css_class=VERDICT_CLASSES[None],
         note=finding.reason,
     )

@@ -19,7 +19,7 @@ from shiplog import TrialLog, read, write
 from shiplog.cli.main import main
 
 CIRCLE = SAMPLE_DATA / "turning_circle_35.mcap"
-FAILURE, USAGE = 1, 2
+FAILURE, USAGE, DATA_LOST = 1, 2, 3
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +54,19 @@ def test_the_verb_writes_the_page_and_the_numbers(folder: Path, output: dict[str
     assert "times stated, s from the start of the log: 10" in page
     assert f"shiplog report {CIRCLE} --length=200.0 --execute=10" in page
     assert len(page.encode()) < 400_000
+
+
+def test_a_damaged_log_is_reported_with_the_exit_code_of_lost_data(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    damaged, page = folder / "damaged.mcap", folder / "damaged.html"
+    damaged.write_bytes(CIRCLE.read_bytes()[:-100_000])
+    assert main(["report", str(damaged), "-o", str(page), "--json", "-"]) == DATA_LOST
+    output = capsys.readouterr()
+    (log,) = json.loads(output.out)["logs"]  # nothing else on stdout
+    assert log["data_lost"] is True
+    assert "Verdict, IMO MSC.137(76)" in output.err
+    assert "A part of this log could not be read." in page.read_text("utf-8")
 
 
 def broken(name: str, change: Callable[[TrialLog], TrialLog], folder: Path) -> Path:
