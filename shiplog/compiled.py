@@ -7,10 +7,8 @@ their sources too: such a package is compiled anew when it changes, and our own 
 """
 
 import os
-import shutil
-import tempfile
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -19,12 +17,12 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 from numba import types
-from numba.core.caching import FunctionCache
 from numba.core.sigutils import normalize_signature
 from numba.extending import overload
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from .extensions import extension_sources
+from .machine_code import SUFFIX, CheckedCache, delete_outdated, usable_folder
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -33,6 +31,7 @@ OWN_PACKAGES = ("shiplog", "recorders", "analysis")
 # Folders and files with compiled functions, or with what these call and read; a test checks it.
 COMPILED_SOURCES = (
     "shiplog/compiled.py",
+    "shiplog/machine_code.py",
     "shiplog/ships",
     "recorders/simulated",
     "analysis/disturbance",
@@ -43,7 +42,6 @@ COMPILED_SOURCES = (
     "analysis/replay/residuals.py",
     "analysis/view/decimation.py",
 )
-MIN_AGE_TO_DELETE_SECS = 86_400.0  # a younger cache may belong to a running process
 
 
 def compiled_sources() -> list[Path]:
@@ -52,15 +50,14 @@ def compiled_sources() -> list[Path]:
     return [path for p in places for path in (p.rglob("*.py") if p.is_dir() else [p])]
 
 
-def _cache_folder() -> Path:
-    """Return the folder of the machine code, named after a hash of our sources it depends on.
+def _cache_name() -> str:
+    """Return the name of the cache's folder, with a hash of our sources it depends on.
 
     Numba's own cache checks only the file of a compiled function. The machine code also contains
     the functions it calls, the constants it reads and the layout of the NamedTuples it takes;
     after a change in another file, outdated machine code would run.
     """
-    parent = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else _default_cache_parent()
-    return parent / f"shiplog-{_digest(compiled_sources())}"
+    return f"shiplog-{_digest(compiled_sources(), numba.__version__, np.__version__)}"
 
 
 @cache
@@ -68,46 +65,45 @@ def _extension_folder() -> Path:
     """Return the folder of the machine code that the installed ship models are a part of."""
     sources = extension_sources("shiplog.ship_models")
     folder = CACHE_FOLDER / f"extensions-{_digest(sources)}"
-    _delete_outdated_caches(folder)
+    delete_outdated(folder)
     return folder
 
 
-def _digest(paths: list[Path]) -> str:
-    digest = sha256()
+def _digest(paths: list[Path], *versions: str) -> str:
+    digest = sha256(" ".join(versions).encode())
     for path in sorted(set(paths)):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def _default_cache_parent() -> Path:
-    """Return the folder beside the package, or the user's cache if that is not writable.
+def _cache_parents() -> Iterator[Path]:
+    """Yield the folder that the user chose, or that beside the package and the user's cache.
 
-    It is never a folder where another user could place files, since their code would be executed.
+    They are never folders where another user could place files, since their code would be executed.
     """
-    beside = Path(__file__).parent
-    if os.access(beside, os.W_OK):
-        return beside / "__pycache__"
-    own = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "shiplog"
+    if numba.config.CACHE_DIR:
+        yield Path(numba.config.CACHE_DIR)
+        return
+    beside = Path(__file__).parent / "__pycache__"
+    if os.access(beside.parent, os.W_OK):
+        yield beside
     try:
+        own = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "shiplog"
+    except RuntimeError:  # a user without a home
+        yield beside
+        return
+    with suppress(OSError):
         own.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="shiplog-"))  # for this run only
-    return own
+    yield own
 
 
-def _delete_outdated_caches(current: Path) -> None:
-    for other in current.parent.glob(f"{current.name.partition('-')[0]}-*"):
-        if other != current and time.time() - other.stat().st_mtime > MIN_AGE_TO_DELETE_SECS:
-            shutil.rmtree(other, ignore_errors=True)
-
-
-CACHE_FOLDER = _cache_folder()
+CACHE_FOLDER = usable_folder(_cache_parents(), _cache_name())
 numba.config.CACHE_DIR = str(CACHE_FOLDER)
-_delete_outdated_caches(CACHE_FOLDER)
+delete_outdated(CACHE_FOLDER)
 
 
-class _CacheByTypes(FunctionCache):  # type: ignore[misc]
-    """Numba's cache of a function, but for types of other packages in the folder of these."""
+class _CacheByTypes(CheckedCache):
+    """Cache of a function, which for types of other packages is in the folder of these."""
 
     def load_overload(self, signature: Any, context: Any) -> Any:  # noqa: ANN401
         if self._is_own(signature):
@@ -125,10 +121,10 @@ class _CacheByTypes(FunctionCache):  # type: ignore[misc]
         return _is_of_own_package(self._py_func) and all(map(_is_own_type, arguments))
 
     @cached_property
-    def _of_extensions(self) -> FunctionCache:
+    def _of_extensions(self) -> CheckedCache:
         numba.config.CACHE_DIR = str(_extension_folder())
         try:
-            return FunctionCache(self._py_func)
+            return CheckedCache(self._py_func)
         finally:
             numba.config.CACHE_DIR = str(CACHE_FOLDER)
 
@@ -153,7 +149,8 @@ def compiled(function: F) -> F:
     It releases the GIL, so that threads run it at the same time.
     """
     dispatcher = numba.njit(error_model="numpy", nogil=True)(function)
-    dispatcher._cache = _CacheByTypes(function)  # noqa: SLF001, what its enable_caching() does
+    if Path(function.__code__.co_filename).is_file():  # not at a prompt
+        dispatcher._cache = _CacheByTypes(function)  # noqa: SLF001, what its enable_caching() does
     return cast("F", dispatcher)
 
 
@@ -161,7 +158,7 @@ def is_compiled(package: str) -> bool:
     """Whether the cache has machine code of a package, such as "analysis", from an earlier run."""
     own = (path for path in compiled_sources() if path.is_relative_to(PROJECT_FOLDER / package))
     folders = {path.parent.name for path in own}
-    return any(next(CACHE_FOLDER.glob(f"{folder}_*/*.nbi"), None) for folder in folders)
+    return any(next(CACHE_FOLDER.glob(f"{folder}_*/*{SUFFIX}"), None) for folder in folders)
 
 
 def compiled_in_caller(function: F) -> F:

@@ -1,4 +1,4 @@
-"""Exceptions that a user's files or requests can cause.
+"""Exceptions and warnings that a user's files, requests or disks can cause.
 
 Each message is one line that names the object, the place and the remedy, the path last. Only the
 command line catches them.
@@ -27,3 +27,7 @@ class LayoutError(ShiplogError):
 
 class SystemFileError(ShiplogError):
     """A system file with errors; the message lists all of them."""
+
+
+class CacheWarning(UserWarning):
+    """The cache of compiled loops cannot be used; results are the same, and take longer."""

@@ -8,9 +8,12 @@ import json
 import sys
 import textwrap
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
+from shiplog.errors import CacheWarning
 from shiplog.files import atomic_write
 from shiplog.printable import escape_json, printable
 from shiplog.progress import ProgressCallback, no_progress
@@ -212,6 +215,19 @@ def print_warnings(warnings: Sequence[str]) -> None:
     """Print warnings on stderr, a line each."""
     for warning in warnings:
         print_line(f"warning: {warning}", to_stderr=True)
+
+
+def print_cache_warnings() -> None:
+    """Print warnings about the cache of compiled loops as those of data; others as Python does."""
+    show_others = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *place: Any, **kept: Any) -> None:  # noqa: ANN401
+        if issubclass(category, CacheWarning):
+            print_warnings([str(message)])
+        else:
+            show_others(message, category, *place, **kept)
+
+    warnings.showwarning = show
 
 
 def print_toml(text: str) -> None:

@@ -21,7 +21,7 @@ from shiplog.interrupts import deferred, handled_signals, interruptible, take_si
 from shiplog.printable import printable
 from shiplog.version import __version__
 
-from .console import print_line
+from .console import print_cache_warnings, print_line
 from .terminal import prepare_streams, stdout_error
 from .verb import ExitCode, Verb
 
@@ -56,6 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         take_signals()
         prepare_streams()
+        print_cache_warnings()
         return _run(sys.argv[1:], is_process=True)
     with handled_signals(), deferred():
         return _run(list(arguments), is_process=False)
