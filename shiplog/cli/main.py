@@ -136,11 +136,17 @@ def _fail(error: object, code: ExitCode) -> ExitCode:
 
 
 class _ArgumentParser(argparse.ArgumentParser):
-    """Parser whose errors quote arguments, such as names of files, in characters that print."""
+    """Parser whose errors quote arguments in characters that print, and whose help is complete."""
 
     def error(self, message: str) -> NoReturn:
         """Print the usage and the error, and end the process."""
         super().error(printable(message))
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        """End the process after a help; raise OSError where it could not be written."""
+        if not status and (error := stdout_error()):
+            raise error
+        super().exit(status, message)
 
 
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:

@@ -185,7 +185,7 @@ def _contents_of_part(
         pass
     check.add(contents.blocks, contents)
     _check_skipped(file, summary, offsets - ({last} & skip - {first}), check)
-    return None if check.need_repair() else contents
+    return None if check.need_repair() or check.any_stood_still() else contents
 
 
 def _check_skipped(

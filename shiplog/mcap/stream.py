@@ -253,6 +253,8 @@ def _need_repair(path: Path, check: FileCheck, described: McapContents) -> bool:
             times.add(contents.drain(), contents)
             if times.need_repair():
                 return True
+    if times.any_stood_still():
+        return True
     described.event_messages = contents.event_messages
     described.last_sample_ns = times.last_received_ns
     return False

@@ -9,6 +9,7 @@ from shiplog.types import TimeArray, is_sorted
 
 from .contents import McapContents, SampleBlock
 from .forward_steps import MIN_FORWARD_NS
+from .still_clocks import stands_still
 from .unset_times import are_set
 
 END_SAMPLES = 5  # at each end of a block; a step has at least three samples beside it
@@ -17,11 +18,16 @@ MAX_LAG_CHANGE = MIN_FORWARD_NS // 2  # ns; a smaller one is no step of a sensor
 
 @dataclass(frozen=True)
 class _LastSamples:
-    """The last samples of a topic so far: its times, and the median of its lag at the end, ns."""
+    """The last samples of a topic so far: its times, and the median of its lag at the end, ns.
+
+    With the number of all samples so far, and the first time of measurement.
+    """
 
     received_ns: int
     measured_ns: int
     lag: int
+    samples: int
+    first_measured_ns: int
 
 
 @dataclass
@@ -48,6 +54,13 @@ class TimesCheck:
         """Whether some of the times so far may have to be changed or dropped."""
         is_empty = self.first_ns > self.last_ns
         return not (self.is_steady and (is_empty or are_set(self.first_ns, self.last_ns)))
+
+    def any_stood_still(self) -> bool:
+        """Whether all samples so far of some topic have one time; to be asked at the end."""
+        return any(
+            stands_still(last.samples, last.first_measured_ns, last.measured_ns)
+            for last in self._last.values()
+        )
 
     def add(self, blocks: Mapping[int, Sequence[SampleBlock]], contents: McapContents) -> None:
         """Check the next samples.
@@ -83,7 +96,11 @@ class TimesCheck:
             self.is_steady &= int(received[0]) >= before.received_ns
             self.is_steady &= int(measured[0]) >= before.measured_ns
         self.is_steady &= max(map(abs, changes)) < MAX_LAG_CHANGE
-        self._last[topic] = _LastSamples(int(received[-1]), int(measured[-1]), last)
+        first_ns = int(measured[0]) if before is None else before.first_measured_ns
+        samples = len(received) + (0 if before is None else before.samples)
+        self._last[topic] = _LastSamples(
+            int(received[-1]), int(measured[-1]), last, samples, first_ns
+        )
 
 
 def _median(values: TimeArray) -> int:

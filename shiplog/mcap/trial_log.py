@@ -21,6 +21,7 @@ from .contents import McapContents, SampleBlock
 from .damage import is_any_lost
 from .decode import is_foreign, schema_of
 from .schema import FORMAT_VERSION, Schema
+from .still_clocks import replace_still_times
 from .unset_times import replace_unset_times
 
 FOREIGN_TOPICS = "topics of other programs"
@@ -105,9 +106,10 @@ def _with_repaired_times(
     """Drop impossible times and remove steps of the clocks; the contents receive the warnings."""
     as_recorded = columns
     columns, replaced = replace_unset_times(columns)
+    columns, still = replace_still_times(columns)
     columns, dropped = drop_impossible_times(columns)
     repair = repair_clock_steps(path.name, columns)
-    contents.clock_warnings += replaced + dropped + repair.warnings
+    contents.clock_warnings += replaced + still + dropped + repair.warnings
     contents.mixed_times += repair.mixed
     _decode_events(contents, as_recorded, repair.columns)
     return repair.columns

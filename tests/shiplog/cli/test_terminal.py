@@ -125,6 +125,19 @@ def test_names_of_files_are_escaped_on_stdout_and_in_errors(tmp_path: Path) -> N
     assert b"unrecognized arguments: b\\x1b[2J\\n" in done.stderr
 
 
+@pytest.mark.parametrize("arguments", ["--help", "--version", "replay --help"])
+@pytest.mark.parametrize(
+    ("redirection", "code"), [(">/dev/full", 1), ("| true; exit ${PIPESTATUS[0]}", 0)]
+)
+def test_a_help_that_cannot_be_written_is_an_error_unless_nobody_reads_it(
+    tmp_path: Path, arguments: str, redirection: str, code: int
+) -> None:
+    done = shiplog(f"shiplog {arguments} {redirection}", tmp_path)
+    assert done.returncode == code
+    errors = b"shiplog: cannot write the output: No space left on device\n"
+    assert done.stderr == (errors if code else b"")
+
+
 @pytest.mark.parametrize(
     ("redirection", "code"),
     [
