@@ -3,12 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from shiplog.types import TimeArray
 from shiplog.units import utc_text
 
 from .clock_repair import MessageColumns
 
-MIN_SAMPLES = 10  # fewer may have come at once
+MIN_SAMPLES = 100  # fewer may have come at once
+MIN_RECEPTION_NS = 1_000_000_000  # over which the others came, for their times to be used
 
 
 def stands_still(samples: int, first_ns: int, last_ns: int) -> bool:
@@ -16,7 +19,7 @@ def stands_still(samples: int, first_ns: int, last_ns: int) -> bool:
 
     Examples
     --------
-    >>> stands_still(2000, 5, 5), stands_still(2, 5, 5), stands_still(2000, 5, 6)
+    >>> stands_still(2000, 5, 5), stands_still(20, 5, 5), stands_still(2000, 5, 6)
     (True, False, False)
     """
     return samples >= MIN_SAMPLES and first_ns == last_ns
@@ -47,6 +50,7 @@ def replace_still_times(
         at = f"have one time of measurement, {utc_text(int(channel.measured_ns[0]) * 1e-9)}"
         if _are_still(channel.received_ns):
             timeless.setdefault(at, []).append(channel.topic)
+        if int(np.ptp(channel.received_ns)) < MIN_RECEPTION_NS:
             continue
         result[id_] = replace(channel, measured_ns=channel.received_ns)
         warnings.append(

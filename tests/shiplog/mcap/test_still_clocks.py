@@ -14,8 +14,8 @@ from shiplog.mcap.still_clocks import replace_still_times
 from shiplog.mcap.times_check import TimesCheck
 
 DATE = 1_700_000_000_000_000_000
-CLOCK = DATE + np.arange(20) * 1_000_000_000
-STILL = np.full(20, DATE)
+CLOCK = DATE + np.arange(100) * 1_000_000_000
+STILL = np.full(100, DATE)
 
 
 def columns(topic: str, received: np.ndarray, measured: np.ndarray) -> MessageColumns:
@@ -23,7 +23,7 @@ def columns(topic: str, received: np.ndarray, measured: np.ndarray) -> MessageCo
     return MessageColumns(topic, np.arange(len(received)), received, measured, values)
 
 
-@pytest.mark.parametrize("measured", [CLOCK, np.where(np.arange(20) < 19, DATE, DATE + 1)])
+@pytest.mark.parametrize("measured", [CLOCK, np.where(np.arange(100) < 99, DATE, DATE + 1)])
 def test_times_that_change_at_all_are_unchanged(measured: np.ndarray) -> None:
     original = columns("/rpm/a", STILL, measured)
     result, warnings = replace_still_times({1: original})
@@ -31,8 +31,15 @@ def test_times_that_change_at_all_are_unchanged(measured: np.ndarray) -> None:
     assert warnings == []
 
 
-def test_nine_samples_of_one_instant_are_no_still_clock() -> None:
-    original = columns("/rpm/a", CLOCK[:9], STILL[:9])
+@pytest.mark.parametrize(
+    ("received", "measured"),
+    [(CLOCK[:99], STILL[:99]), (DATE + np.arange(100), STILL)],
+    ids=["few samples", "received within a second"],
+)
+def test_samples_that_may_have_come_at_once_are_of_no_still_clock(
+    received: np.ndarray, measured: np.ndarray
+) -> None:
+    original = columns("/rpm/a", received, measured)
     assert replace_still_times({1: original}) == ({1: original}, [])
 
 
@@ -40,7 +47,7 @@ def test_times_of_measurement_that_stand_still_are_those_of_reception() -> None:
     result, (warning,) = replace_still_times({1: columns("/rpm/a", CLOCK, STILL)})
     np.testing.assert_array_equal(result[1].measured_ns, CLOCK)
     assert warning.startswith(
-        "/rpm/a: all 20 samples have one time of measurement, 2023-11-14 22:13:20; "
+        "/rpm/a: all 100 samples have one time of measurement, 2023-11-14 22:13:20; "
         "their times of reception are used"
     )
 
@@ -59,7 +66,7 @@ def test_a_clock_that_stood_still_is_found_chunk_by_chunk(
 ) -> None:
     contents = McapContents(channels={1: Channel(1, "/rpm/a", "protobuf", {}, 1)})
     check = TimesCheck()
-    for rows in (slice(0, 6), slice(6, 20)):
+    for rows in (slice(0, 6), slice(6, 100)):
         check.add({1: [SampleBlock(measured[rows], measured[rows], [], rows.start, 0)]}, contents)
     assert check.any_stood_still() is expected
 
