@@ -150,6 +150,8 @@ class McapContents:
     ----------
     schemas, channels
         The schema and channel records, by id.
+    description_bytes
+        The memory that they take, about.
     selected
         The ids of the channels whose messages are kept; None for all.
     blocks
@@ -161,6 +163,8 @@ class McapContents:
     undescribed
         Messages whose channel is not described yet: the data, the channel id, the offsets, and the
         number of their MCAP chunk.
+    undescribed_bytes
+        The size of these data.
     undescribed_counts
         The number of such messages, by channel id.
     keep_undescribed
@@ -171,6 +175,8 @@ class McapContents:
         Selects the channels whose messages are kept as they are in `kept`; none where it is None.
     kept
         The messages kept and not yet taken, by channel id, in the order of the file.
+    held_bytes
+        The size of the messages in `blocks` and `kept` that are not decoded.
     keep_records
         Whether to keep the intact records in `records` too.
     records
@@ -225,16 +231,19 @@ class McapContents:
 
     schemas: dict[int, records.Schema] = field(default_factory=dict)
     channels: dict[int, records.Channel] = field(default_factory=dict)
+    description_bytes: int = 0
     selected: frozenset[int] | None = None
     blocks: dict[int, list[SampleBlock]] = field(default_factory=dict)
     pending_samples: int = 0
     total_samples: int = 0
     undescribed: list[tuple[bytes, int, Offsets, int]] = field(default_factory=list)
+    undescribed_bytes: int = 0
     undescribed_counts: dict[int, int] = field(default_factory=dict)
     keep_undescribed: bool = True
     not_decoded: dict[int, MessageCount] = field(default_factory=dict)
     keeps: Keeps | None = None
     kept: dict[int, list[KeptMessages]] = field(default_factory=dict)
+    held_bytes: int = 0
     keep_records: bool = False
     records: list[Record] = field(default_factory=list)
     long_attachments: dict[int, AttachmentIndex] | None = None
@@ -264,7 +273,7 @@ class McapContents:
     def drain(self) -> dict[int, list[SampleBlock]]:
         """Return the blocks collected so far, by channel id, and release them."""
         blocks, self.blocks, self.pending_samples = self.blocks, {}, 0
-        self.is_whole = False
+        self.held_bytes, self.is_whole = 0, False
         return blocks
 
     def keep(self, opcode: int, content: bytes) -> None:
@@ -278,5 +287,5 @@ class McapContents:
 
     def take_kept(self) -> dict[int, list[KeptMessages]]:
         """Return the messages kept so far, by channel id, and release them."""
-        kept, self.kept = self.kept, {}
+        kept, self.kept, self.held_bytes = self.kept, {}, 0
         return kept

@@ -17,7 +17,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from .contents import EventMessage, KeptMessages, McapContents, MessageCount, SampleBlock
-from .limits import MAX_DESCRIPTION_BYTES
+from .limits import MAP_ENTRY_BYTES, MAX_DESCRIPTION_BYTES
 from .locate import (
     Offsets,
     complete_records,
@@ -83,14 +83,14 @@ def collect_undescribed(contents: McapContents) -> None:
     A channel is described after its messages when the MCAP chunk that describes it first is
     damaged. The messages come before those that were added already.
     """
-    undescribed, contents.undescribed = contents.undescribed, []
+    undescribed, contents.undescribed, contents.undescribed_bytes = contents.undescribed, [], 0
     counts, contents.undescribed_counts = contents.undescribed_counts, {}
     later, contents.blocks = contents.blocks, {}
     for messages in undescribed:
         _collect_channel(*messages, contents)
     for channel_id, blocks in later.items():
         contents.blocks.setdefault(channel_id, []).extend(blocks)
-    contents.undescribed = []
+    contents.undescribed, contents.undescribed_bytes = [], 0
     lost = sum(
         count for channel_id, count in counts.items() if not _is_described(channel_id, contents)
     )
@@ -141,10 +141,13 @@ def _read_record(opcode: int, content: bytes, contents: McapContents) -> None:
         stream = ReadDataStream(BytesIO(content))
         if opcode == Opcode.SCHEMA:
             schema = records.Schema.read(stream)
-            contents.schemas.setdefault(schema.id, schema)
+            is_new = contents.schemas.setdefault(schema.id, schema) is schema
+            size = len(content)
         else:
             channel = records.Channel.read(stream)
-            contents.channels.setdefault(channel.id, channel)
+            is_new = contents.channels.setdefault(channel.id, channel) is channel
+            size = len(content) + MAP_ENTRY_BYTES * len(channel.metadata)
+        contents.description_bytes += size if is_new else 0
     elif opcode == Opcode.METADATA:
         metadata = read_metadata(content)
         if metadata.name == METADATA_NAME:
@@ -196,6 +199,8 @@ def _collect_channel(
         counts = contents.undescribed_counts
         counts[channel_id] = counts.get(channel_id, 0) + len(offsets)
         if contents.keep_undescribed:
+            if not contents.undescribed or contents.undescribed[-1][0] is not data:
+                contents.undescribed_bytes += len(data)
             contents.undescribed.append((data, channel_id, offsets, number))
         return
     channel = contents.channels[channel_id]
@@ -204,8 +209,11 @@ def _collect_channel(
     if is_kept:
         kept = _kept_messages(data, offsets, number)
         contents.kept.setdefault(channel_id, []).append(kept)
+        contents.held_bytes += sum(map(len, kept.messages))
     if is_events(channel, contents.schemas):
-        contents.event_messages += _event_messages(data, offsets, number)
+        events = list(_event_messages(data, offsets, number))
+        contents.event_messages += events
+        contents.held_bytes += sum(len(event.data) for event in events)
         return
     if schema is None:
         count = contents.not_decoded.setdefault(channel_id, MessageCount())
@@ -214,7 +222,9 @@ def _collect_channel(
     if is_kept or (contents.selected is not None and channel_id not in contents.selected):
         return
     block = _fixed_width_block(data, offsets, schema, number)
-    block = block or _undecoded_block(data, offsets, number)
+    if block is None:
+        block = _undecoded_block(data, offsets, number)
+        contents.held_bytes += sum(map(len, block.values))
     contents.blocks.setdefault(channel_id, []).append(block)
     contents.pending_samples += len(offsets)
     contents.total_samples += len(offsets)

@@ -10,8 +10,6 @@ from collections.abc import Collection, Iterator
 import numpy as np
 from mcap.opcode import Opcode
 
-from shiplog.errors import LogError
-
 from .chunk_order import restore_order
 from .contents import LostMcapChunk, McapContents
 from .damage import Damage, gap_damage, lost_messages_text
@@ -21,7 +19,8 @@ from .decompress import (
     mcap_chunk_data,
     truncated_mcap_chunk_data,
 )
-from .limits import MAX_MESSAGES_PER_BYTE, MAX_RECORD_BYTES
+from .excess import refuse_excess
+from .limits import MAX_RECORD_BYTES
 from .locate import complete_records, gather, locate_by_index
 from .long_attachment import long_attachment
 from .mcap_file import McapFile, open_mcap
@@ -49,7 +48,7 @@ def scan(file: McapFile, contents: McapContents, skip: Collection[int] = ()) -> 
     Raises
     ------
     LogError
-        The file holds more messages than one of its size can.
+        The file holds more than a log of its size can.
     """
     if file.check.parts is not None:
         yield from _scan_parts(file.check.parts, contents)
@@ -63,18 +62,21 @@ def scan(file: McapFile, contents: McapContents, skip: Collection[int] = ()) -> 
             data = _read_mcap_chunk(record, indexes, contents)
             if file.check.is_intact is False and data is not None:
                 _check_indexes(data, record, indexes, contents)
-            _refuse_bomb(file, walk, contents)
+            refuse_excess(file.path, walk.size, contents)
             yield
         elif record.opcode == Opcode.MESSAGE:
             contents.in_order &= not collect_messages(record.content, [], contents)
+            refuse_excess(file.path, walk.size, contents)
             yield
         elif record.opcode == Opcode.ATTACHMENT and not record.content:
             _read_long_attachment(file, contents)
         else:
             read_record(record.opcode, record.content, contents)
+            refuse_excess(file.path, walk.size, contents)
     if not walk.is_complete:
         _read_truncated_end(file, walk, contents)
     _use_summary(file.check.summary, contents)
+    refuse_excess(file.path, walk.size, contents)
     collect_undescribed(contents)
     if contents.is_whole:
         restore_order(contents)
@@ -209,13 +211,6 @@ def _collect_mcap_chunk(
         first, last = struct.unpack_from("<qq", content)  # signed, as all times in shiplog
         contents.in_order &= contents.latest_ns <= first <= last
         contents.latest_ns = last
-
-
-def _refuse_bomb(file: McapFile, walk: RecordWalk, contents: McapContents) -> None:
-    messages = contents.total_samples + len(contents.event_messages)
-    messages += sum(contents.undescribed_counts.values())
-    if messages > MAX_MESSAGES_PER_BYTE * walk.size:
-        raise LogError(f"its MCAP chunks unpack to more than a log of its size has: {file.path}")
 
 
 def _read_truncated_end(file: McapFile, walk: RecordWalk, contents: McapContents) -> None:

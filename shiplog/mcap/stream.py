@@ -268,7 +268,7 @@ def _open_by_scan(file: McapFile) -> tuple[TrialLog | LogFile, list[MixedTimes]]
         if samples > MAX_SAMPLES_IN_MEMORY:
             contents.drain()
             contents.undescribed.clear()
-            contents.keep_undescribed = False
+            contents.undescribed_bytes, contents.keep_undescribed = 0, False
     if contents.keep_undescribed:
         return build_trial_log(file.path, contents), contents.mixed_times
     if contents.in_order:

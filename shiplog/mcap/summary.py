@@ -184,16 +184,18 @@ def _own_records(
 ) -> tuple[dict[str, str], str | None, bool]:
     """Return the metadata, the vessel file, and whether one of their records is damaged."""
     metadata: dict[str, str] = {}
-    vessel_toml, is_damaged = None, False
+    vessel_toml, is_damaged, size = None, False, 0
     for entry in _streams(by_opcode, Opcode.METADATA_INDEX):
         index = records.MetadataIndex.read(entry)
         if index.name == METADATA_NAME:
+            size = _with_length(size, index.length)
             content = _indexed_record(stream, index.offset, index.length, Opcode.METADATA)
             is_damaged |= not metadata_is_intact(content)
             metadata |= {} if is_damaged else read_metadata(content).metadata
     for entry in _streams(by_opcode, Opcode.ATTACHMENT_INDEX):
         index = records.AttachmentIndex.read(entry)
         if index.name == VESSEL_ATTACHMENT:
+            size = _with_length(size, index.length)
             content = _indexed_record(stream, index.offset, index.length, Opcode.ATTACHMENT)
             if attachment_is_intact(content):
                 vessel_toml = read_attachment(content).data.decode()
@@ -202,10 +204,15 @@ def _own_records(
     return metadata, vessel_toml, is_damaged
 
 
+def _with_length(size: int, length: int) -> int:
+    """Add the length of a record to that of others; many indexes may point to a long one."""
+    if size + length > MAX_RECORD_BYTES:
+        raise ValueError("indexes of records that are longer than those of any log")
+    return size + length
+
+
 def _indexed_record(stream: IO[bytes], offset: int, length: int, opcode: Opcode) -> bytes:
     """Return the content of the record that an index points to."""
-    if length > MAX_RECORD_BYTES:
-        raise ValueError("an index of a record that is longer than any of a log")
     stream.seek(offset)
     data = stream.read(length)
     if RECORD_HEAD.unpack_from(data) != (opcode, length - RECORD_HEAD.size):

@@ -72,10 +72,35 @@ def messages() -> bytes:
     return mcap_chunk(zstandard.ZstdCompressor().compress(data), len(data), zlib.crc32(data))
 
 
-def metadata() -> bytes:
-    """Return a metadata record of 100,000 different keys."""
-    pairs = b"".join(struct.pack("<I4sI", 4, n.to_bytes(4, "little"), 0) for n in range(100_000))
+def metadata(keys: int = 100_000, first: int = 0) -> bytes:
+    """Return a metadata record of many different keys."""
+    names = range(first * keys, (first + 1) * keys)
+    pairs = b"".join(struct.pack("<I4sI", 4, n.to_bytes(4, "little"), 0) for n in names)
     return record(Opcode.METADATA, struct.pack("<I7sI", 7, b"shiplog", len(pairs)) + pairs)
+
+
+def text(data: bytes) -> bytes:
+    return struct.pack("<I", len(data)) + data
+
+
+def schema(number: int, size: int) -> bytes:
+    head = struct.pack("<H", number) + text(b"a.B") + text(b"jsonschema")
+    return record(Opcode.SCHEMA, head + text(bytes(size)))
+
+
+def channel(number: int, metadata: bytes = b"") -> bytes:
+    head = struct.pack("<HH", number, 1) + text(b"/rpm/%d" % number) + text(b"protobuf")
+    return record(Opcode.CHANNEL, head + text(text(b"unit") + text(b"rpm") + metadata))
+
+
+def packed(data: bytes) -> bytes:
+    return mcap_chunk(zstandard.ZstdCompressor().compress(data), len(data))
+
+
+def long_messages(channel_id: int) -> bytes:
+    """Return MCAP chunks with a long message each, of zeros, in a few kB."""
+    data = record(Opcode.MESSAGE, struct.pack("<HIQQ", channel_id, 0, 1, 1) + bytes(50 << 20))
+    return described() + packed(data) * 10
 
 
 HOSTILE: dict[str, Callable[[], bytes]] = {
@@ -85,6 +110,18 @@ HOSTILE: dict[str, Callable[[], bytes]] = {
     "a chunk that is cut off and unpacks to 500 MB": lambda: mcap_chunk(zeros(500), 0)[:-20],
     "20 million equal samples in 100 kB": lambda: messages() * 20,
     "metadata of 100,000 keys": metadata,
+    "metadata of 10,000 keys, ten times": lambda: b"".join(metadata(10_000, k) for k in range(10)),
+    "5,000 channels": lambda: b"".join(map(channel, range(2, 5002))),
+    "5,000 schemas": lambda: b"".join(schema(n, 0) for n in range(2, 5002)),
+    "schemas of 135 MB in a few kB": lambda: b"".join(
+        packed(b"".join(schema(n + k, 15 << 20) for k in range(3))) for n in (2, 5, 8)
+    ),
+    "channels with 200,000 keys": lambda: b"".join(
+        channel(n, b"".join(text(b"%d" % k) + text(b"") for k in range(16_000)))
+        for n in range(2, 15)
+    ),
+    "500 MB of one channel in a few kB": lambda: long_messages(1),
+    "500 MB of a channel that is described nowhere": lambda: long_messages(2),
     "a record that claims 8 EB": lambda: RECORD_HEAD.pack(Opcode.ATTACHMENT, 1 << 62) + bytes(50),
 }
 
