@@ -1,9 +1,10 @@
-"""Every format of streams against random packets: `python -m benchmarks.fuzz --packets 1000000`.
+"""Every format of streams and of settings against errors: `python -m benchmarks.fuzz`.
 
 Fuzzed packets from fixed seeds pass the decoders as from a live transport. No exception may leave
 them, each line (of Signal K: each value) must be counted once as accepted, unused or rejected, no
-sample may be infinite, and memory must not grow; the exit code is 1 where one of these fails. The
-tests do the same with fewer.
+sample may be infinite, and memory must not grow. Settings files and headers of tables with random
+errors are read, or refused in one line. The exit code is 1 where one of these fails. The tests do
+the same with fewer.
 """
 
 import argparse
@@ -23,10 +24,12 @@ from recorders.streams.decoder import Decoder
 from recorders.streams.format import GROUP, StreamFormat
 from recorders.streams.packets import Packet
 from recorders.streams.sample_buffer import SampleBuffer
+from shiplog.errors import ShiplogError
 from shiplog.extensions import load_extension
 from shiplog.types import Channel
 
 from .fuzzed_packets import STREAMS, FuzzedStream, distorted
+from .fuzzed_settings import KINDS, FuzzedText, mutated
 
 BATCH = 1000
 WARM_UP = 20_000  # packets that fill the bounded tables
@@ -126,6 +129,22 @@ def _peak_bytes() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
 
 
+def unexpected_errors(kind: FuzzedText, texts: int, seed: int) -> list[str]:
+    """Read fuzzed texts of a kind; return what is neither a result nor an error of one line."""
+    rng = Random(f"{kind.name} {seed}")  # noqa: S311 - repeatable
+    found = []
+    for _ in range(texts):
+        text = mutated(kind, rng)
+        try:
+            kind.read(text)
+        except ShiplogError as error:
+            if "\n" in str(error):
+                found.append(f"{error!r} of {text!r}")
+        except Exception as error:  # noqa: BLE001 - any is a finding
+            found.append(f"{error!r} of {text!r}")
+    return found
+
+
 def _print(stream: FuzzedStream, result: FuzzResult) -> None:
     accepted, unused, rejected = result.counted
     print(
@@ -145,6 +164,7 @@ def main() -> int:
     """Decode the packets of all streams, each in a process of its own, and print the results."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--packets", type=int, default=1_000_000, help="of all streams together")
+    parser.add_argument("--texts", type=int, default=20_000, help="of all kinds together")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     each = -(-arguments.packets // len(STREAMS))
@@ -155,6 +175,13 @@ def main() -> int:
             result = future.result()
             _print(stream, result)
             right &= result.is_right and result.growth < MAX_GROWTH
+    each = -(-arguments.texts // len(KINDS))
+    for kind in KINDS:
+        errors = unexpected_errors(kind, each, arguments.seed)
+        print(f"{kind.name}: {each} texts, {len(errors)} unexpected errors")
+        for text in errors[:3]:
+            print(f"    {text[:300]}")
+        right &= not errors
     return int(not right)
 
 

@@ -22,6 +22,20 @@ def printable(text: str) -> str:
     )
 
 
+def shortened(text: str, size: int) -> str:
+    """Shorten a text in the middle to a number of characters.
+
+    Examples
+    --------
+    >>> shortened("trials/2026/zigzag_20_20.mcap", 18)
+    'trials/2…0_20.mcap'
+    """
+    if len(text) <= size:
+        return text
+    head = (size - 1) // 2
+    return f"{text[:head]}…{text[len(text) - (size - 1 - head) :]}"
+
+
 def escape_json(line: str) -> str:
     r"""Escape the characters of a line of JSON that do not print; its value stays the same.
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import ShiplogError
+from .printable import shortened
 from .units import did_you_mean
 
 # The TOML parser takes memory by the square of the parts of a dotted key and a level of its stack
@@ -16,7 +17,7 @@ MAX_CHARACTERS = 1_000_000
 MAX_DEPTH = 20  # of lists and inline tables, and of the parts of a dotted key
 MAX_KEY_PARTS = 10_000  # of all keys and sections together
 MAX_KEY_CHARACTERS = 400  # messages show keys, and compare them with those that are known
-MAX_REASON_CHARACTERS = 200
+MAX_ERROR_CHARACTERS = 600  # of an error: its place is before the value of the file that it shows
 MAX_LISTED_ERRORS = 30
 MAX_INTEGER = 1 << 63  # the largest that TOML has, and one
 
@@ -90,7 +91,7 @@ def parse_toml(text: str, where: str, kind: str, error: type[ShiplogError]) -> d
     try:
         table = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, ValueError) as cause:
-        reason = " ".join(str(cause).split())[:MAX_REASON_CHARACTERS]
+        reason = shortened(" ".join(str(cause).split()), MAX_ERROR_CHARACTERS)
         raise error(f"not a TOML file ({reason}); correct that line: {where}") from cause
     if excess := _excess_of_values(table):
         raise error(f"{excess} for a {kind}; correct it: {where}")
@@ -141,7 +142,9 @@ def list_errors(errors: Sequence[str], kind: str, where: str) -> str:
     'one error in the vessel file: [yaw] lacks T1: ship.toml'
     """
     count = "one error" if len(errors) == 1 else f"{len(errors)} errors"
-    texts = "; ".join(" ".join(each.split()) for each in errors[:MAX_LISTED_ERRORS])
+    texts = "; ".join(
+        shortened(" ".join(e.split()), MAX_ERROR_CHARACTERS) for e in errors[:MAX_LISTED_ERRORS]
+    )
     if len(errors) > MAX_LISTED_ERRORS:
         texts += f"; and {len(errors) - MAX_LISTED_ERRORS} more"
     return f"{count} in the {kind}: {texts}: {where}"

@@ -140,7 +140,8 @@ class _Parser:
     def _vessel(self, name: str) -> str | None:
         """Return the vessel file, relative to the trial file where it lies there, or a preset."""
         beside = self._path.parent / name
-        return os.fspath(beside) if name and beside.is_file() else name or None
+        # unlike Path.is_file, false of a name that no disk can have
+        return os.fspath(beside) if name and os.path.isfile(beside) else name or None  # noqa: PTH113
 
     def _section(self, name: str, keys: Iterable[str]) -> Mapping[str, Any]:
         section = self._table.get(name, {})

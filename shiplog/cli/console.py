@@ -15,7 +15,7 @@ from typing import Any
 
 from shiplog.errors import CacheWarning
 from shiplog.files import atomic_write
-from shiplog.printable import escape_json, printable
+from shiplog.printable import escape_json, printable, shortened
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.text_table import TextTable
 
@@ -184,20 +184,6 @@ def _total(sizes: Sequence[int]) -> int:
 def _wrapped(heading: str, size: int) -> str:
     lines = [textwrap.wrap(line, size, break_long_words=False) for line in heading.split("\n")]
     return "\n".join(part for line in lines for part in line)
-
-
-def shortened(text: str, size: int) -> str:
-    """Shorten a text in the middle to a number of characters.
-
-    Examples
-    --------
-    >>> shortened("trials/2026/zigzag_20_20.mcap", 18)
-    'trials/2…0_20.mcap'
-    """
-    if len(text) <= size:
-        return text
-    head = (size - 1) // 2
-    return f"{text[:head]}…{text[len(text) - (size - 1 - head) :]}"
 
 
 def print_line(text: str, *, to_stderr: bool = False) -> None:

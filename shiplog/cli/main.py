@@ -18,7 +18,7 @@ from typing import NoReturn
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import declared_entries, extension_names, load_extension
 from shiplog.interrupts import deferred, handled_signals, interruptible, take_signals
-from shiplog.printable import printable
+from shiplog.printable import printable, shortened
 from shiplog.version import __version__
 
 from .console import print_cache_warnings, print_line
@@ -28,6 +28,7 @@ from .verb import ExitCode, Verb
 GROUP = "shiplog.verbs"
 # new objects before a search for garbage; a replay leaves none of size, and imports are kept
 RARE_COLLECTION = 100_000
+MAX_ERROR_CHARACTERS = 20_000  # an error may show a text of a file, of any length
 ORDER = (
     "record",
     "info",
@@ -131,7 +132,8 @@ class _UnneededModules(MetaPathFinder):
 
 
 def _fail(error: object, code: ExitCode) -> ExitCode:
-    print_line(f"shiplog: {' '.join(str(error).split())}", to_stderr=True)
+    text = shortened(" ".join(str(error).split()), MAX_ERROR_CHARACTERS)
+    print_line(f"shiplog: {text}", to_stderr=True)
     return code
 
 

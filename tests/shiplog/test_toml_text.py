@@ -35,7 +35,7 @@ DEEP_KEY = ".".join("abcdefghijklmnopqrst")  # as many parts as a key may have
         ("x = [{y = 0x8000_0000_0000_0000}]", "an integer of 64 bits, too large"),
         ("x = 0x" + "f" * 500_000, "an integer of 2000000 bits, too large"),
         ("x = " + "9" * 5000, "not a TOML file"),
-        (f"[{'a' * 9000}]\n[{'a' * 9000}]", "not a TOML file.{,250}$"),
+        (f"[{'a' * 9000}]\n[{'a' * 9000}]", "not a TOML file.{,650}$"),
         ("length = \n", "not a TOML file"),
         ("day = 2020-02-31", "not a TOML file"),
         ('"""', "not a TOML file"),
@@ -80,6 +80,13 @@ def test_of_very_many_errors_the_first_are_listed() -> None:
     text = list_errors([f"error {n}" for n in range(10_000)], "vessel file", "x.toml")
     assert text.startswith("10000 errors in the vessel file: error 0; error 1; ")
     assert text.endswith("; error 29; and 9970 more: x.toml")
+
+
+def test_an_error_that_shows_a_long_value_is_shortened_in_the_middle() -> None:
+    text = list_errors(["name must be short, got " + "x" * 5000 + "; see docs"], "layout", "a.toml")
+    assert len(text) < 700
+    assert text.startswith("one error in the layout: name must be short, got xxx")
+    assert text.endswith("xxx; see docs: a.toml")
 
 
 def test_an_unknown_key_is_named_with_its_section_and_the_nearest_known_one() -> None:

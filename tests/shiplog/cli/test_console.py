@@ -6,7 +6,8 @@ from io import StringIO
 
 import pytest
 
-from shiplog.cli.console import print_tables, progress, shortened
+from shiplog.cli.console import print_tables, progress
+from shiplog.printable import shortened
 from shiplog.text_table import TextTable
 
 NUMBERS = ("-2.22e-05", "0.00478", "62.7 s", "123.456", "± 0.0029")
