@@ -23,6 +23,7 @@ def _recover(arguments: argparse.Namespace) -> ExitCode:
     require_inputs(arguments.source)
     require_outputs(arguments.output)
     require_distinct([arguments.output], [arguments.source])
+    from shiplog.mcap.damage import damage_warnings
     from shiplog.mcap.recover import Recovery, recover
 
     recovery: Recovery = recover(arguments.source, arguments.output)
@@ -35,7 +36,7 @@ def _recover(arguments: argparse.Namespace) -> ExitCode:
     print_line(
         f"also {recovery.attachments} attachments and {recovery.metadata_records} metadata records"
     )
-    warnings = [str(damage) for damage in recovery.damage]
+    warnings = damage_warnings(recovery.damage)
     if not recovery.is_finished:
         warnings.append(
             "the file was not finished (the recorder was stopped or killed)"

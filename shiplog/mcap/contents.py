@@ -152,6 +152,8 @@ class McapContents:
         The schema and channel records, by id.
     description_bytes
         The memory that they take, about.
+    messages
+        The number of messages of all kinds read so far.
     selected
         The ids of the channels whose messages are kept; None for all.
     blocks
@@ -232,6 +234,7 @@ class McapContents:
     schemas: dict[int, records.Schema] = field(default_factory=dict)
     channels: dict[int, records.Channel] = field(default_factory=dict)
     description_bytes: int = 0
+    messages: int = 0
     selected: frozenset[int] | None = None
     blocks: dict[int, list[SampleBlock]] = field(default_factory=dict)
     pending_samples: int = 0

@@ -1,11 +1,13 @@
 """Damaged parts of a file: where they are, and what was lost by them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .summary import McapSummary
+
+MAX_NAMED = 200  # damaged parts with a warning each; a hostile file has 100,000
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,21 @@ def span_text(span_ns: tuple[int, int]) -> str:
 def is_any_lost(damage: Iterable[Damage]) -> bool:
     """Whether something could not be read because of any of these."""
     return any(part.is_lost for part in damage)
+
+
+def damage_warnings(damage: Sequence[Damage]) -> list[str]:
+    """Return a warning for each damaged part, up to `MAX_NAMED`, and one for all others.
+
+    Examples
+    --------
+    >>> damage_warnings([Damage(n, n + 1, "a wrong opcode") for n in range(300)])[-2:]
+    ['damaged at byte 199: a wrong opcode', 'damaged in 100 further places, up to byte 300']
+    """
+    warnings = [str(each) for each in damage[:MAX_NAMED]]
+    if more := damage[MAX_NAMED:]:
+        place = f"up to byte {more[-1].end}{f' of {more[-1].file}' if more[-1].file else ''}"
+        warnings.append(f"damaged in {len(more)} further places, {place}")
+    return warnings
 
 
 def lost_messages_text(messages: int, topics: Iterable[str], span_ns: tuple[int, int]) -> str:

@@ -71,6 +71,7 @@ def collect_messages(data: bytes, indexes: list[bytes], contents: McapContents) 
         or _locate_by_walk(data, start, contents)
     )
     for channel_id, offsets in located.items():
+        contents.messages += len(offsets)
         _collect_channel(data, channel_id, offsets, contents.data_blocks, contents)
     contents.data_blocks += 1
     contents.block_starts.append(contents.reading[0])

@@ -48,8 +48,9 @@ def _excesses(size: int, contents: McapContents) -> Iterator[str]:
         yield f"it has more than {MAX_MAP_ENTRIES} keys of metadata, more than any log"
     if len(contents.foreign_records) > MAX_OTHER_RECORDS:
         yield f"it has more than {MAX_OTHER_RECORDS} attachments and metadata records"
-    messages = contents.total_samples + len(contents.event_messages)
-    messages += sum(contents.undescribed_counts.values())
     held = contents.held_bytes + contents.undescribed_bytes
-    if messages > MAX_MESSAGES_PER_BYTE * size or held > MAX_HELD_BYTES + MAX_HELD_PER_BYTE * size:
+    if (
+        contents.messages > MAX_MESSAGES_PER_BYTE * size
+        or held > MAX_HELD_BYTES + MAX_HELD_PER_BYTE * size
+    ):
         yield "its MCAP chunks unpack to more than a log of its size has"

@@ -104,17 +104,19 @@ def _with_indexes(walk: RecordWalk) -> Iterator[tuple[Record, list[bytes]]]:
     """Yield MCAP chunks with their message indexes, runs of loose messages, and other records."""
     mcap_chunk: Record | None = None
     indexes: list[bytes] = []
+    size = 0  # of the indexes
     loose, loose_start = bytearray(), 0
     end = 0  # of the record before
     for record in walk:
         follows, end = record.start == end, record.end
         if record.opcode == Opcode.MESSAGE_INDEX:
-            if follows and sum(map(len, indexes)) <= MAX_RECORD_BYTES:
+            size += len(record.content)
+            if follows and size <= MAX_RECORD_BYTES:
                 indexes.append(record.content)
             continue
         if mcap_chunk is not None:
             yield mcap_chunk, indexes
-        mcap_chunk, indexes = (record if record.opcode == Opcode.CHUNK else None), []
+        mcap_chunk, indexes, size = (record if record.opcode == Opcode.CHUNK else None), [], 0
         if loose and (record.opcode != Opcode.MESSAGE or len(loose) >= _MAX_LOOSE_BYTES):
             yield Record(Opcode.MESSAGE, loose_start, record.start, bytes(loose)), []
             loose.clear()

@@ -18,7 +18,7 @@ from shiplog.units import CATALOGUE, conversion_factor, utc_text
 
 from .clock_repair import MessageColumns, drop_impossible_times, repair_clock_steps
 from .contents import McapContents, SampleBlock
-from .damage import is_any_lost
+from .damage import damage_warnings, is_any_lost
 from .decode import is_foreign, schema_of
 from .schema import FORMAT_VERSION, Schema
 from .still_clocks import replace_still_times
@@ -163,7 +163,7 @@ def _warnings(contents: McapContents) -> list[str]:
     pauses = [] if is_lost else contents.pauses.warnings()  # else of the lost samples
     warnings = [
         *contents.part_warnings,
-        *map(str, contents.damage),
+        *damage_warnings(contents.damage),
         *contents.clock_warnings,
         *pauses,
     ]

@@ -72,6 +72,13 @@ def messages() -> bytes:
     return mcap_chunk(zstandard.ZstdCompressor().compress(data), len(data), zlib.crc32(data))
 
 
+def foreign_messages() -> bytes:
+    """Return an MCAP chunk of a million equal messages of another program, in a few kB."""
+    one = record(Opcode.MESSAGE, struct.pack("<HIQQ", 2, 0, 10**18, 10**18) + b"{}")
+    head = struct.pack("<HH", 2, 0) + text(b"/a") + text(b"json") + text(b"")
+    return packed(record(Opcode.CHANNEL, head) + one * 1_000_000)
+
+
 def metadata(keys: int = 100_000, first: int = 0) -> bytes:
     """Return a metadata record of many different keys."""
     names = range(first * keys, (first + 1) * keys)
@@ -109,6 +116,7 @@ HOSTILE: dict[str, Callable[[], bytes]] = {
     "a chunk that claims 8 EB": lambda: mcap_chunk(zeros(1), 1 << 63),
     "a chunk that is cut off and unpacks to 500 MB": lambda: mcap_chunk(zeros(500), 0)[:-20],
     "20 million equal samples in 100 kB": lambda: messages() * 20,
+    "a million equal messages of another program in 5 kB": foreign_messages,
     "metadata of 100,000 keys": metadata,
     "metadata of 10,000 keys, ten times": lambda: b"".join(metadata(10_000, k) for k in range(10)),
     "5,000 channels": lambda: b"".join(map(channel, range(2, 5002))),
