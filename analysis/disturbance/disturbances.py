@@ -38,7 +38,7 @@ class Disturbance:
     ----------
     yaw
         Slow part (constant or ramp) of the yaw disturbance, rad/s³, (n,): a term of w''. Zero where
-        neither a constant nor a ramp is estimated.
+        neither a constant nor a ramp is estimated, or where the log is likelier without one.
     surge
         Slow part of the surge disturbance, m/s², (n,): a term of v'. Zero as for `yaw`.
     rudder
@@ -48,7 +48,8 @@ class Disturbance:
         The waves, rad/s³ and m/s², (n,); None where none is estimated.
     stds
         (n, 2): standard deviations of `yaw` and `surge`, rad/s³ and m/s²; None from the observer,
-        of which only that of its noise is known (`DisturbanceSummary.noise_std`).
+        of which only that of its noise is known (`DisturbanceSummary.noise_std`). NaN where the
+        slow part is none of the filter's states.
     yaw_wind, surge_wind
         The moment and the force of the wind, rad/s³ and m/s², (n,); None where none is estimated.
     """
@@ -85,7 +86,7 @@ class DisturbanceSummary:
         the trial's rms yaw rate; model errors are not included, they count as a disturbance. For a
         wave it is that of its value, and, where the wave is well above it, of its amplitude. NaN
         for the rudder where the rudder has no effect. Of a disturbance that is a state of the
-        filter: the rms of its standard deviation.
+        filter: the rms of its standard deviation; NaN where the filter has no such state.
     settling_secs
         Duration of the first transient, s, which is not counted in a trial more than twice as long;
         of a smoothed disturbance, which has none, the time over which `at_end` is the mean.

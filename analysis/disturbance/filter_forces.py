@@ -80,8 +80,11 @@ class FilterForces:
                 forces[name], stds[name] = self._force_of_wind(name, chunk, estimates)
             else:
                 found = estimates.further.of(STATES[name]) if estimates.further else None
-                # a slow part that is not modelled, or a wave too fast for the samples
-                forces[name], stds[name] = found or (np.zeros(len(chunk)), np.zeros(len(chunk)))
+                # a slow part without evidence or not requested, or a wave too fast for the samples
+                forces[name], stds[name] = found or (
+                    np.zeros(len(chunk)),
+                    np.full(len(chunk), np.nan),
+                )
             moments.add(stds[name])
         slow_stds: FloatArray = np.column_stack((stds["yaw"], stds["surge"]))
         speed = estimates.states[:, OUTPUT_STATES[1]]

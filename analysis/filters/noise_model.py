@@ -75,11 +75,15 @@ class ForceNoise:
         Butterworth poles of this magnitude, as the disturbance observer has.
     wave
         Frequency of a wave, rad/s; None for no wave.
+    reduction
+        How much lower Akaike's criterion is without a slow part, where there is none for this
+        reason; else zero.
     """
 
     degree: int | None
     frequency: float
     wave: float | None = None
+    reduction: float = 0.0
 
 
 @dataclass(frozen=True)

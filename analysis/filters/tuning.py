@@ -2,24 +2,27 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from math import sqrt
 
 import numpy as np
 
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog.ships.paper import Coefficients
+from shiplog.types import FloatArray
 from shiplog.vessel.settings import FilterSettings
 
 from .base import Estimates, FilterKind
 from .factory import filter_kind
-from .noise_model import NO_FURTHER, FurtherModel, NoiseModel, Wave
+from .noise_model import NO_FURTHER, ForceNoise, FurtherModel, NoiseModel, Wave
 
 PAPER_RATIO = 0.01 / 400  # Burylin's Q over his R, 1/s²; no filter trusts its model more by default
 MAX_RATIO = 1e8  # 1/s²; above it the estimate is the measurement itself
 OPEN_GATE = 1e12  # standard deviations: nothing is rejected
 SPIKE_STDS = 8.0  # a residual beyond this many standard deviations is a spike
 MAD_TO_STD = 1.4826  # of normal noise: standard deviation over median absolute deviation
+RATIO_TOLERANCE, FREQUENCY_TOLERANCE = 0.02, 0.05  # of their decimal logarithms
+DIVERGED = 1e300  # the deviance of a filter that diverges
 MIN_FREQUENCY_SHARE = 0.1  # of the frequency set: a slower random walk is constant in most trials
 
 _Pair = tuple[float, float]
@@ -53,7 +56,8 @@ def noise_of(
 
     The further states are there when the process noise is estimated: an error of a sensor is not
     taken for process noise. Then the frequencies of the disturbances among them are estimated in
-    the same way, below those set.
+    the same way, below those set. Where the whole trial is in `stats.head`, a disturbance without
+    which Akaike's criterion of the innovations is lower has no slow part.
 
     Parameters
     ----------
@@ -76,19 +80,18 @@ def noise_of(
     head = _Head(signal_stats(stats.head, model), model, settings, kind)
     if settings.wave:
         noise = replace(noise, wave=_distinct_wave(head, noise))
-    noise = replace(noise, further=further)
+    noise = replace(noise, further=further, tuned=(stated[0] is None, stated[1] is None))
     for output, ratio in enumerate(stated):
-        if ratio is not None:
-            noise = _with_ratio(noise, output, ratio)
-            continue
-        of_ratio = partial(_with_ratio, noise, output)
-        noise = _likeliest(head, output, of_ratio, (least[output], most[output]))
-    for output, force in enumerate((further.yaw, further.surge)):
-        if force is not None and force.degree is not None:
-            slowest = MIN_FREQUENCY_SHARE * force.frequency
-            of_frequency = partial(_with_frequency, noise, output)
-            noise = _likeliest(head, output, of_frequency, (slowest, force.frequency))
-    return replace(noise, tuned=(stated[0] is None, stated[1] is None))
+        noise = (
+            _with_likeliest_ratio(head, noise, output, (least, most))
+            if ratio is None
+            else _with_ratio(noise, output, ratio)
+        )
+    for output in _slow_forces(further):
+        noise = _with_likeliest_frequency(head, noise, output)
+    if len(stats.head) < stats.count:  # a disturbance may begin after it
+        return noise
+    return _without_absent_forces(head, noise, (least, most))
 
 
 def _ratios(settings: FilterSettings, kind: FilterKind) -> tuple[_Stated, _Pair, _Pair]:
@@ -115,39 +118,132 @@ def _with_ratio(noise: NoiseModel, output: int, ratio: float) -> NoiseModel:
     return replace(noise, process_ratio=ratios)
 
 
-def _with_frequency(noise: NoiseModel, output: int, frequency: float) -> NoiseModel:
-    """Return the noise with another frequency of the force that acts on an output."""
+def _slow_forces(further: FurtherModel) -> dict[int, ForceNoise]:
+    """Return the forces with a slow part, by the output on which they act."""
+    forces = enumerate((further.yaw, further.surge))
+    return {i: force for i, force in forces if force is not None and force.degree is not None}
+
+
+def _with_force(noise: NoiseModel, output: int, **changes: float | None) -> NoiseModel:
+    """Return the noise with other attributes of the force that acts on an output."""
     axis = ("yaw", "surge")[output]
-    force = replace(getattr(noise.further, axis), frequency=frequency)
+    force = replace(getattr(noise.further, axis), **changes)
     return replace(noise, further=replace(noise.further, **{axis: force}))
 
 
-def _likeliest(
-    head: _Head, output: int, candidate: Callable[[float], NoiseModel], bounds: _Pair
+def _with_likeliest_ratio(
+    head: _Head, noise: NoiseModel, output: int, bounds: tuple[_Pair, _Pair]
 ) -> NoiseModel:
-    """Return the candidate that makes the innovations of one output most likely.
+    """Return the noise with the ratio that makes the innovations of an output most likely.
 
-    The candidates are those of a number between the bounds, of which the logarithm is searched.
-    Innovations outside the gate count as if they were at the gate.
+    The logarithm of the ratio is searched between the least and the largest.
     """
-
-    def deviance(log_number: float) -> float:
-        estimates = _filter_head(head, candidate(10.0**log_number), head.settings)
-        e, s = estimates.innovations[:, output], estimates.innovation_stds[:, output]
-        with np.errstate(over="ignore", invalid="ignore"):  # of a filter that diverges
-            squares = np.minimum((e / s) ** 2, head.settings.gate**2)
-            total = float(np.nansum(squares + 2 * np.log(s)))
-        return total if np.isfinite(total) else 1e300
-
     from scipy.optimize import minimize_scalar  # noqa: PLC0415 - it takes long to import
 
+    least, most = (float(np.log10(pair[output])) for pair in bounds)
     best = minimize_scalar(
-        deviance,
-        bounds=(float(np.log10(bounds[0])), float(np.log10(bounds[1]))),
+        lambda log_ratio: _deviances(head, _with_ratio(noise, output, 10.0**log_ratio))[output],
+        bounds=(least, most),
         method="bounded",
-        options={"xatol": 0.02},
+        options={"xatol": RATIO_TOLERANCE},
     )
-    return candidate(float(10.0**best.x))
+    return _with_ratio(noise, output, float(10.0**best.x))
+
+
+def _with_likeliest_frequency(head: _Head, noise: NoiseModel, output: int) -> NoiseModel:
+    """Return the noise with the frequency of a force that makes its output most likely.
+
+    The logarithm of the frequency is searched. Most are at a bound: a disturbance that begins
+    suddenly is followed as fast as allowed, one that is constant as slowly.
+    """
+    fastest = _slow_forces(noise.further)[output].frequency
+
+    def deviance(log_share: float) -> float:
+        candidate = _with_force(noise, output, frequency=fastest * 10.0**log_share)
+        return float(_deviances(head, candidate)[output])
+
+    low = float(np.log10(MIN_FREQUENCY_SHARE))
+    best = golden_section(deviance, (low, 0.0), FREQUENCY_TOLERANCE)
+    return _with_force(noise, output, frequency=fastest * 10.0**best)
+
+
+def golden_section(function: Callable[[float], float], bounds: _Pair, tolerance: float) -> float:
+    """Minimise a function of one number by golden section, the bounds included.
+
+    The function is evaluated no more often than the tolerance needs. Where its minimum is within
+    the tolerance of a bound, the bound is returned, which other methods only approach.
+
+    Parameters
+    ----------
+    function
+        The function, with one minimum.
+    bounds
+        The least and the largest number.
+    tolerance
+        The largest error of the minimum.
+
+    Examples
+    --------
+    >>> golden_section(lambda x: (x - 2) ** 2, (0.0, 1.0), 0.01)
+    1.0
+    """
+    share = (sqrt(5.0) - 1) / 2
+    low, high = bounds
+    left, right = high - share * (high - low), low + share * (high - low)
+    at_left, at_right = function(left), function(right)
+    while high - low > 2 * tolerance:
+        if at_left < at_right:
+            high, right, at_right = right, left, at_left
+            left = high - share * (high - low)
+            at_left = function(left)
+        else:
+            low, left, at_left = left, right, at_right
+            right = low + share * (high - low)
+            at_right = function(right)
+    if low == bounds[0]:
+        return low
+    return high if high == bounds[1] else (low + high) / 2
+
+
+def _without_absent_forces(
+    head: _Head, noise: NoiseModel, bounds: tuple[_Pair, _Pair]
+) -> NoiseModel:
+    """Return the noise without the slow forces for which the log has no evidence.
+
+    There is none where Akaike's criterion, the deviance of all innovations and twice the number of
+    parameters, is lower without the force: its frequency is one parameter more. How uncertain the
+    force is at the start is in the deviance. A force with a wave stays as it is: the wave's random
+    amplitude takes up a slow force, and no evidence would not mean that there is none.
+
+    References
+    ----------
+    Akaike, "A new look at the statistical model identification", 1974.
+    """
+    deviance = float(np.sum(_deviances(head, noise)))
+    for output, force in _slow_forces(noise.further).items():
+        if force.wave is not None:
+            continue
+        without = _with_force(noise, output, degree=None)
+        if noise.tuned[output]:
+            without = _with_likeliest_ratio(head, without, output, bounds)
+        deviance_without = float(np.sum(_deviances(head, without)))
+        reduction = deviance + 2 - deviance_without
+        if reduction > 0:
+            noise, deviance = _with_force(without, output, reduction=reduction), deviance_without
+    return noise
+
+
+def _deviances(head: _Head, noise: NoiseModel) -> FloatArray:
+    """Return minus twice the log likelihood of the innovations of each output, but for a constant.
+
+    Innovations outside the gate count as if they were at the gate.
+    """
+    estimates = _filter_head(head, noise, head.settings)
+    e, s = estimates.innovations, estimates.innovation_stds
+    with np.errstate(over="ignore", invalid="ignore"):  # of a filter that diverges
+        squares = np.minimum((e / s) ** 2, head.settings.gate**2)
+        totals: FloatArray = np.nansum(squares + 2 * np.log(s), axis=0)
+    return np.where(np.isfinite(totals), totals, DIVERGED)
 
 
 def wave_in(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from analysis.disturbance.disturbances import DisturbanceSummary
-from analysis.filters.noise_model import FURTHER_OUTPUTS, NoiseModel, Wave
+from analysis.filters.noise_model import FURTHER_OUTPUTS, FurtherModel, NoiseModel, Wave
 from analysis.regression.changes import Change
 from analysis.regression.coefficients import CoefficientFit
 from analysis.replay.current import Current
@@ -70,6 +70,7 @@ def replay_json(findings: Findings) -> JsonObject:
             "yaw_as_rudder" if name == "rudder" else name: _disturbance(summary)
             for name, summary in findings.disturbances.items()
         },
+        "absent_disturbances": _absent(plan.noise.further),
         "sensor_errors": {error.name: _slow_state(error) for error in findings.sensor_errors},
         "current": _current(findings.current),
         "wind": {term.name: _slow_state(term) for term in findings.wind},
@@ -180,6 +181,16 @@ def _disturbance(summary: DisturbanceSummary) -> JsonObject:
         "at_end": summary.at_end,
         "sensor_noise_std": summary.noise_std,
         "settling_secs": summary.settling_secs,
+    }
+
+
+def _absent(further: FurtherModel) -> JsonObject:
+    """Return how much lower Akaike's criterion is without each disturbance that is absent."""
+    forces = {"yaw": further.yaw, "surge": further.surge}
+    return {
+        name: {"aic_reduction": force.reduction}
+        for name, force in forces.items()
+        if force is not None and force.reduction > 0
     }
 
 

@@ -207,6 +207,13 @@ def _disturbance_table(findings: Findings) -> TextTable:
     )
     method = ", states of the filter and smoothed with them" if smoothed else ""
     remarks = [f"Disturbance models: {', '.join(models)}{method}.", explanation]
+    further = findings.plan.noise.further
+    remarks += [
+        f"{name}: no slow disturbance; Akaike's criterion of the innovations is "
+        f"{force.reduction:.2g} lower without one."
+        for name, force in (("yaw", further.yaw), ("surge", further.surge))
+        if force is not None and force.reduction > 0
+    ]
     if findings.plan.model_is_fitted:
         remarks.append("The model was fitted to this log: this is what it does not explain.")
     return TextTable("Disturbances", columns, tuple(rows), tuple(remarks))

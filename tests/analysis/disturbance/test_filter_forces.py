@@ -10,6 +10,8 @@ from trial_logs import as_log
 from analysis.replay.reading_options import ReadingOptions
 from analysis.replay.replay import analyse
 from analysis.replay.replay_results import Analysis
+from analysis.report.replay_json import replay_json
+from analysis.report.replay_tables import replay_markdown
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import SimulatedTrial, simulate
 from recorders.simulated.trajectory import Gust, WaveMoment
@@ -94,3 +96,16 @@ def test_a_smoothed_wave_moment_is_followed_better_than_by_the_observer() -> Non
     )
     assert causal > 0.13
     assert smoothed < 0.11
+
+
+def test_a_log_without_a_disturbance_has_none_and_the_remark_states_why() -> None:
+    result = replayed(disturbed(()), "constant", smooth=True)
+    assert not result.disturbance.yaw.any()
+    assert not result.disturbance.surge.any()
+    assert np.isnan(result.disturbance.stds).all()
+    assert np.isnan(result.findings.disturbances["rudder"].noise_std)
+    page = replay_markdown(result.findings)
+    assert "yaw: no slow disturbance; Akaike's criterion" in page
+    absent = replay_json(result.findings)["absent_disturbances"]
+    assert set(absent) == {"yaw", "surge"}
+    assert min(each["aic_reduction"] for each in absent.values()) > 0

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from math import radians
 
 import numpy as np
 import pytest
@@ -13,11 +14,13 @@ from filter_runs import (
 )
 
 from analysis.filters.factory import filter_states, make_filter
-from analysis.filters.noise_model import NoiseModel
-from analysis.filters.tuning import PAPER_RATIO, noise_of
+from analysis.filters.noise_model import ForceNoise, FurtherModel, NoiseModel
+from analysis.filters.tuning import PAPER_RATIO, golden_section, noise_of
 from analysis.signals.hold import last_inputs
 from analysis.signals.signal_stats import SignalStats, signal_stats
-from recorders.simulated.simulate import SimulatedTrial
+from recorders.simulated.sensors import suite
+from recorders.simulated.simulate import SimulatedTrial, simulate
+from recorders.simulated.trajectory import Gust
 from shiplog import Signals, TrialLog, Vessel, resample
 from shiplog.ships.paper import Coefficients
 from shiplog.vessel.settings import FilterSettings
@@ -229,3 +232,78 @@ def test_with_its_wave_told_of_a_log_takes_less_process_noise(
     )
     assert knowing.wave is not None
     assert knowing.process_ratio[0] < 0.01 * plain.process_ratio[0]
+
+
+@pytest.mark.parametrize("minimum", [-2.0, -0.99, -0.7, -0.31, -0.02, 0.5])
+def test_a_minimum_is_found_within_the_tolerance_and_a_bound_exactly(minimum: float) -> None:
+    tried = []
+
+    def function(at: float) -> float:
+        tried.append(at)
+        return abs(at - minimum) ** 1.5
+
+    found = golden_section(function, (-1.0, 0.0), 0.05)
+    assert found == pytest.approx(np.clip(minimum, -1.0, 0.0), abs=0.05)
+    if not -0.95 < minimum < -0.05:
+        assert found in (-1.0, 0.0)
+    assert len(tried) == 7  # 0.618⁵ < 2 · 0.05, and two to begin with
+
+
+SLOW = FurtherModel(yaw=ForceNoise(0, 0.05), surge=ForceNoise(0, 0.02))
+
+
+def slow_forces(
+    vessel: Vessel,
+    seed: int,
+    rudder_deg: float,
+    further: FurtherModel = SLOW,
+    *,
+    later: int = 0,
+    **settings: object,
+) -> FurtherModel:
+    """The moment and the force estimated in a zig-zag with a step of the yaw moment.
+
+    The trial is longer than what is used of it by `later` instants.
+    """
+    gusts = (Gust(radians(rudder_deg), 60.0),) if rudder_deg else ()
+    trial = simulate(
+        vessel, "zigzag-20-20", duration_secs=200.0, seed=seed, sensors=suite("white"), gusts=gusts
+    )
+    signals = resample(TrialLog("trial", trial.channels), channels=NAMES)
+    stats = signal_stats(signals, vessel.coefficients)
+    stats = replace(stats, count=stats.count + later)
+    chosen = FilterSettings(kind="extended", **settings)
+    return noise_of(stats, vessel.coefficients, chosen, further=further).further
+
+
+@pytest.mark.parametrize("settings", [{"process_ratio": 2.5e-5}, {}])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_log_without_a_disturbance_has_no_slow_part(
+    vessel: Vessel, seed: int, settings: dict[str, float]
+) -> None:
+    further = slow_forces(vessel, seed, 0.0, **settings)
+    for force in (further.yaw, further.surge):
+        assert force is not None
+        assert force.degree is None
+        assert force.reduction > 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_small_step_of_the_yaw_moment_is_a_slow_part(vessel: Vessel, seed: int) -> None:
+    further = slow_forces(vessel, seed, 0.1, process_ratio=2.5e-5)
+    assert (further.yaw.degree, further.yaw.reduction) == (0, 0.0)
+    assert further.surge.degree is None
+
+
+def test_beside_a_wave_of_the_same_force_the_slow_part_stays(vessel: Vessel) -> None:
+    waved = replace(SLOW, yaw=ForceNoise(0, 0.05, wave=0.6))
+    further = slow_forces(vessel, 0, 0.0, waved, process_ratio=2.5e-5)
+    assert (further.yaw.degree, further.yaw.wave) == (0, 0.6)
+    assert further.surge.degree is None
+
+
+def test_a_trial_longer_than_what_the_noise_is_estimated_from_keeps_its_slow_parts(
+    vessel: Vessel,
+) -> None:
+    further = slow_forces(vessel, 0, 0.0, later=1, process_ratio=2.5e-5)
+    assert further.yaw.degree == further.surge.degree == 0
