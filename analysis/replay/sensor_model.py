@@ -20,6 +20,7 @@ from shiplog.ships.paper import Coefficients, yaw_stiffness
 from shiplog.vessel.settings import SENSOR_ERRORS, DisturbanceSettings, FilterSettings
 
 from .heading_errors import heading_errors
+from .position_errors import position_noise
 
 MIN_HEADING_STD = radians(0.001)
 MIN_POSITION_STD = 0.5  # m
@@ -180,7 +181,8 @@ def sensor_model(
 def _output_std(stats: SignalStats, settings: FilterSettings, output: str) -> float:
     """Return the noise of a heading or position: stated, or from the third differences.
 
-    Third differences do not show the slow errors of a compass or a receiver: hence a least value.
+    Third differences do not show the slow errors of a compass or a receiver: hence a least value,
+    and for positions the noise of their means over some seconds.
     """
     is_heading = output == FURTHER_OUTPUTS[0]
     stated = settings.heading_std if is_heading else settings.position_std
@@ -190,8 +192,10 @@ def _output_std(stats: SignalStats, settings: FilterSettings, output: str) -> fl
     thirds = np.diff(values[np.isfinite(values)], 3) / np.sqrt(20.0)
     limit = MAX_NOISE_DEVIATION * STD_PER_MAD * float(np.median(np.abs(thirds)))
     kept = thirds[np.abs(thirds) <= limit] if limit > 0 else thirds
-    least = MIN_HEADING_STD if is_heading else MIN_POSITION_STD
-    return max(float(np.sqrt(np.mean(kept**2))), least)
+    std = float(np.sqrt(np.mean(kept**2)))
+    if is_heading:
+        return max(std, MIN_HEADING_STD)
+    return position_noise(stats, output, max(std, MIN_POSITION_STD))
 
 
 def with_forces(
