@@ -1,6 +1,6 @@
 """Linear Gaussian models without a recursion: all states of a run at once, and what they cost."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.linalg import expm
@@ -29,7 +29,7 @@ class LinearRun:
     def covariance(self) -> np.ndarray:
         """(n s, n s) of all states of the run."""
         n, s = self.mean.shape
-        whole, own = np.empty((n, s, n, s)), self.P
+        whole, own = np.empty((n, s, n, s), self.P.dtype), self.P
         for i in range(n):
             later = own
             for j in range(i, n):
@@ -38,6 +38,10 @@ class LinearRun:
             own = self.F @ own @ self.F.T + self.Q
         return whole.reshape(n * s, n * s)
 
+    def in_extended_precision(self) -> "LinearRun":
+        """The same with numbers of more digits than a float's, as far as the processor has them."""
+        return LinearRun(*(getattr(self, each.name).astype(np.longdouble) for each in fields(self)))
+
     def given(self, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States (n, s) and covariances (n, s, s), all that is not NaN in (n, 2) being known."""
         n, s = self.mean.shape
@@ -45,10 +49,11 @@ class LinearRun:
         seen = np.isfinite(measured).ravel()
         H = np.kron(np.eye(n), self.C)[seen]
         S = H @ prior @ H.T + np.diag(np.tile(self.r, n)[seen])
-        gain = np.linalg.solve(S, H @ prior).T
+        solve = np.linalg.solve if S.dtype == float else eliminated
+        gain = solve(S, H @ prior).T
         deviation = measured.ravel()[seen] - H @ self.mean.ravel()
         states = self.mean + (gain @ deviation).reshape(n, s)
-        blocks = (prior - gain @ H @ prior).reshape(n, s, n, s)
+        blocks = (prior - gain @ (H @ prior)).reshape(n, s, n, s)
         return states, np.array([blocks[k, :, k] for k in range(n)])
 
     def filtered(self, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -70,6 +75,18 @@ class LinearRun:
             deviation[k + 1] = self.F @ deviation[k] + noise
         states = self.mean + deviation
         return states, states @ self.C.T + np.sqrt(self.r) * rng.standard_normal((n, len(self.r)))
+
+
+def eliminated(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """A⁻¹ B of a positive definite A, by Gauss's elimination in whatever precision they have."""
+    A, B = A.copy(), B.copy()
+    for i in range(len(A)):
+        factors = A[i + 1 :, i] / A[i, i]
+        A[i + 1 :] -= np.outer(factors, A[i])
+        B[i + 1 :] -= np.outer(factors, B[i])
+    for i in range(len(A) - 1, -1, -1):
+        B[i] = (B[i] - A[i, i + 1 :] @ B[i + 1 :]) / A[i, i]
+    return B
 
 
 def draws(rng: np.random.Generator, covariance: np.ndarray, count: int) -> np.ndarray:

@@ -19,6 +19,7 @@ from filter_runs import (
 from gaussian import LinearRun, apart, band, held, normalised_squared
 from scipy.linalg import block_diag, expm
 
+from analysis.filters.base import SmoothableFilter, Trace
 from analysis.filters.factory import make_filter
 from analysis.filters.further_parts import (
     FIRST_HEADING_STD,
@@ -124,6 +125,66 @@ def test_filter_and_smoother_agree_with_a_joint_gaussian(vessel: Vessel, seed: i
     # the batch rounds more, as the heading is at first known to half a radian only
     assert max(apart((trace.states, trace.covariances), run.filtered(measured))) < 1e-7
     assert max(apart(smoothed, run.given(measured))) < 1e-7
+
+
+def gyro_run(vessel: Vessel, count: int) -> tuple[LinearRun, np.ndarray, Signals, SmoothableFilter]:
+    """A run of a straight ship with a gyro bias, and a filter at its start."""
+    c, rng = straight(vessel.paper_coefficients), np.random.default_rng(0)
+    inputs = np.column_stack(steered(count, DT))
+    stats = stats_of(c, inputs)
+    run = linear_run(c, stats, inputs, NOISE)
+    _, measured = run.drawn(rng)
+    signals = measured_signals(measured, inputs)
+    run = replace(run, mean=run.mean + measured[0, 2] * np.eye(7)[3])
+    settings = FilterSettings(kind="extended", gate=1e6)
+    stats = replace(stats, head=signals)
+    return run, measured, signals, make_filter(c, NOISE, stats, settings)
+
+
+@pytest.mark.parametrize("cuts", [[], [7, 20, 41]], ids=["whole", "in pieces"])
+def test_smoothed_covariances_are_those_of_a_joint_gaussian_in_extended_precision(
+    vessel: Vessel, cuts: list[int]
+) -> None:
+    run, measured, signals, filter_ = gyro_run(vessel, 45)
+    smoothed = smoothed_in_chunks((deepcopy(filter_), filter_), signals, cuts)
+    expected = run.in_extended_precision().given(measured)
+    states, covariances = (each.astype(float) for each in expected)
+    assert apart(smoothed, (states, covariances))[1] < 1e-8
+
+
+def test_smoothed_variances_round_as_far_as_the_filtered_ones_exceed_them(vessel: Vessel) -> None:
+    """Where a piece ends changes the rounding, and neither way is nearer to the exact variances.
+
+    At the start a filtered variance is far above the smoothed one, which is the difference of it
+    and of what follows: the rounding of that, by each instant, is a share of the filtered one.
+    """
+    count = 600
+    _, _, signals, filter_ = gyro_run(vessel, count)
+    _, trace, _ = smoothed_run(deepcopy(filter_), signals)
+    exact = smoothed_variances(trace)
+    filtered = np.diagonal(trace.covariances, axis1=1, axis2=2)
+    assert np.max(filtered / exact) > 1e4
+    bound = exact.size * np.finfo(float).eps * filtered / exact
+    for cuts in ([], [200, 450]):
+        _, P = smoothed_in_chunks((deepcopy(filter_), deepcopy(filter_)), signals, cuts)
+        errors = np.abs(np.diagonal(P, axis1=1, axis2=2) / exact - 1)
+        assert np.all(errors <= bound), np.max(errors / bound)
+
+
+def smoothed_variances(trace: Trace) -> np.ndarray:
+    """Variances (n, s) by the recursion of Bierman in extended precision."""
+    size, variances = trace.states.shape[1], np.empty(trace.states.shape)
+    unit = np.eye(size, dtype=np.longdouble)
+    curvature = np.zeros_like(unit)
+    for k in range(len(variances) - 1, -1, -1):
+        F, P = (array[k].astype(np.longdouble) for array in (trace.transitions, trace.covariances))
+        curvature = F.T @ curvature @ F
+        variances[k] = np.diag(P - P @ curvature @ P)
+        for output in range(trace.rows.shape[1] - 1, -1, -1):
+            c = trace.rows[k, output].astype(np.longdouble)
+            M = unit - np.outer(trace.gains[k, output], c)
+            curvature = M.T @ curvature @ M + np.outer(c, c) / trace.variances[k, output]
+    return variances
 
 
 @pytest.mark.parametrize("kind", KINDS)
