@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from . import files, filters, ranking, replays, start_up, windows
+from . import files, filters, ranking, replays, start_up, states, windows
 from .bench import Bench
 from .distortion_matrix import measure_distortions
 from .logs import day_of_trial, write_repeated
@@ -27,8 +27,8 @@ from .report import BenchmarkReport, print_report, report_as_markdown
 from .stages import our_stages
 
 THEMES = (
-    "files", "filter", "windows", "info", "start-up", "replay", "ranking", "stages", "growth",
-    "distortions",
+    "files", "filter", "windows", "info", "start-up", "replay", "states", "ranking", "stages",
+    "growth", "distortions",
 )  # fmt: skip
 MIN_JUDGED_HOURS = 24.0  # in shorter logs fixed costs count too much for the limits
 EPILOG = """\
@@ -143,6 +143,7 @@ def _themes(bench: Bench, report: BenchmarkReport) -> dict[str, Callable[[], Ite
         "info": lambda: files.info_lines(bench),
         "start-up": lambda: start_up.start_up_lines(bench),
         "replay": lambda: replays.replay_lines(bench, report.peer_stages),
+        "states": lambda: states.state_lines(bench),
         "ranking": lambda: ranking.ranking_lines(bench),
     }
 

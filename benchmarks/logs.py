@@ -1,6 +1,7 @@
 """The simulated trial that is measured, written to logs of any length."""
 
 import shutil
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,17 +18,18 @@ LOG_BYTES_PER_HOUR = 4.4e6  # a little more than such a log takes
 WRITTEN_CHUNK_SECS = 3600.0
 
 
-def day_of_trial(hours: float) -> TrialLog:
-    """Simulate a zig-zag of the given length, four channels at 10 Hz.
+def day_of_trial(
+    hours: float, manoeuvre: str = "zigzag-20-20", channels: Collection[str] = NAMES
+) -> TrialLog:
+    """Simulate a trial of the given length, by default a zig-zag with four channels at 10 Hz.
 
     Anyone can produce the same log: the ship is the preset `table1`, the seed is 1.
     """
     vessel, text = load_vessel("table1")
-    sensors = {name: sensor for name, sensor in suite("paper").items() if name in NAMES}
+    sensors = {name: sensor for name, sensor in suite("paper").items() if name in channels}
     trial = simulate(
-        vessel, "zigzag-20-20", duration_secs=3600 * hours, seed=1, sensors=sensors,
-        vessel_toml=text,
-    )  # fmt: skip
+        vessel, manoeuvre, duration_secs=3600 * hours, seed=1, sensors=sensors, vessel_toml=text
+    )
     return TrialLog("day.mcap", trial.channels, trial.metadata, trial.vessel_toml)
 
 

@@ -70,7 +70,7 @@ def test_every_line_runs_and_reports_a_ratio_and_slowness_is_no_failure(
     monkeypatch.setattr(sys, "argv", ["benchmarks", *options])
     runpy.run_module("benchmarks", run_name="__main__")
     report = json.loads(out.read_text(encoding="utf-8"))
-    assert len(report["results"]) == 16
+    assert len(report["results"]) == 20
     for result in report["results"]:
         if result["skipped"]:
             assert any(reason in result["skipped"] for reason in skip_reasons()), result

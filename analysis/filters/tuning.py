@@ -87,11 +87,12 @@ def noise_of(
             if ratio is None
             else _with_ratio(noise, output, ratio)
         )
-    for output in _slow_forces(further):
+    slow = _slow_forces(further)
+    for output in slow:
         noise = _with_likeliest_frequency(head, noise, output)
-    if len(stats.head) < stats.count:  # a disturbance may begin after it
-        return noise
-    return _without_absent_forces(head, noise, (least, most))
+    if slow and len(stats.head) == stats.count:  # else a disturbance may begin after it
+        noise = _without_absent_forces(head, noise, (least, most))
+    return noise
 
 
 def _ratios(settings: FilterSettings, kind: FilterKind) -> tuple[_Stated, _Pair, _Pair]:

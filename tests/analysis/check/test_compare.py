@@ -300,7 +300,7 @@ def test_sensor_errors_are_part_of_the_reference_where_they_are_estimated(
     assert len(set(topics)) == len(topics)
     assert {
         "/gyro_error/estimate", "/gyro_error/std", "/log_error/estimate", "/heading/innovation",
-        "/north_nis/residual_test", "/current_north/estimate", "/yaw_moment/std",
+        "/north_nis/residual_test", "/current_north/estimate", "/drift_length/std",
         "/compass_measurement_std/noise_model", "/yaw_moment_frequency/noise_model",
         "/gyro_determined/count",
     } <= set(topics)  # fmt: skip
