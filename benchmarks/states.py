@@ -11,10 +11,11 @@ from .bench import Bench
 from .logs import NAMES, day_of_trial
 from .measure import Comparison, Limit
 
+Settings = Mapping[str, object]
 CHANNELS = (*NAMES, "heading", "position")
-SENSORS = {"filter.sensor_bias": "auto"}
-EXTENDED = {"filter.kind": "extended"}
-SMOOTHED = EXTENDED | {"filter.smooth": True}
+SENSORS: Settings = {"filter.sensor_bias": "auto"}
+EXTENDED: Settings = {"filter.kind": "extended"}
+SMOOTHED: Settings = {**EXTENDED, "filter.smooth": True}
 MAX_SENSOR_RATIO = 2.0
 NOTE = "processor time in one process, without a review; heading at 2 Hz, positions at 1 Hz"
 
@@ -22,11 +23,11 @@ NOTE = "processor time in one process, without a review; heading at 2 Hz, positi
 def state_lines(bench: Bench) -> list[Comparison]:
     """Return the comparisons of replays of a turning circle as long as the log of the bench."""
     log = day_of_trial(bench.log.duration_secs / 3600, "turning-circle-35", CHANNELS)
-    lines = (
+    lines: tuple[tuple[str, Settings, str, Settings, float | None], ...] = (
         ("sensor errors", SENSORS, "without", {}, MAX_SENSOR_RATIO),
-        ("extended, sensor errors", EXTENDED | SENSORS, "without", EXTENDED, MAX_SENSOR_RATIO),
+        ("extended, sensor errors", {**EXTENDED, **SENSORS}, "without", EXTENDED, MAX_SENSOR_RATIO),
         ("extended, smoothed", SMOOTHED, "not smoothed", EXTENDED, None),
-        ("extended, smoothed, sensor errors", SMOOTHED | SENSORS, "extended", EXTENDED, None),
+        ("extended, smoothed, sensor errors", {**SMOOTHED, **SENSORS}, "extended", EXTENDED, None),
     )
     return [
         Comparison(
@@ -38,7 +39,7 @@ def state_lines(bench: Bench) -> list[Comparison]:
     ]  # fmt: skip
 
 
-def estimation(log: TrialLog, settings: Mapping[str, object]) -> Callable[[], float]:
+def estimation(log: TrialLog, settings: Settings) -> Callable[[], float]:
     """Return a function that replays a log and returns the processor time, s."""
 
     def secs() -> float:
