@@ -250,8 +250,8 @@ def sample_data() -> None:
         " take it for motion as far as their bandwidth allows, and so does the smoother: where the"
         " noise is not as the filter assumes, smoothing does not always reduce the error. The"
         " smoothers have a disturbance among their states only where Akaike's criterion of the"
-        " innovations is lower with it: in these logs none, but in the last one, where it stands"
-        " for the bias of the gyro."
+        " innovations is lower with it: in the last log, where it stands for the bias of the gyro,"
+        " and a surge force in the turning circle and beside the pseudo-input filter."
     )
 
 

@@ -57,7 +57,8 @@ def noise_of(
     The further states are there when the process noise is estimated: an error of a sensor is not
     taken for process noise. Then the frequencies of the disturbances among them are estimated in
     the same way, below those set. Where the whole trial is in `stats.head`, a disturbance without
-    which Akaike's criterion of the innovations is lower has no slow part.
+    which Akaike's criterion of the innovations is lower has no slow part, if the process noise that
+    acts with it is stated.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def noise_of(
     for output in slow:
         noise = _with_likeliest_frequency(head, noise, output)
     if slow and len(stats.head) == stats.count:  # else a disturbance may begin after it
-        noise = _without_absent_forces(head, noise, (least, most))
+        noise = _without_absent_forces(head, noise)
     return noise
 
 
@@ -206,15 +207,14 @@ def golden_section(function: Callable[[float], float], bounds: _Pair, tolerance:
     return high if high == bounds[1] else (low + high) / 2
 
 
-def _without_absent_forces(
-    head: _Head, noise: NoiseModel, bounds: tuple[_Pair, _Pair]
-) -> NoiseModel:
+def _without_absent_forces(head: _Head, noise: NoiseModel) -> NoiseModel:
     """Return the noise without the slow forces for which the log has no evidence.
 
     There is none where Akaike's criterion, the deviance of all innovations and twice the number of
     parameters, is lower without the force: its frequency is one parameter more. How uncertain the
-    force is at the start is in the deviance. A force with a wave stays as it is: the wave's random
-    amplitude takes up a slow force, and no evidence would not mean that there is none.
+    force is at the start is in the deviance. A force stays as it is beside process noise that was
+    estimated and beside a wave: these take up a slow force, and no evidence would not mean that
+    there is none.
 
     References
     ----------
@@ -222,11 +222,9 @@ def _without_absent_forces(
     """
     deviance = float(np.sum(_deviances(head, noise)))
     for output, force in _slow_forces(noise.further).items():
-        if force.wave is not None:
+        if force.wave is not None or noise.tuned[output]:
             continue
         without = _with_force(noise, output, degree=None)
-        if noise.tuned[output]:
-            without = _with_likeliest_ratio(head, without, output, bounds)
         deviance_without = float(np.sum(_deviances(head, without)))
         reduction = deviance + 2 - deviance_without
         if reduction > 0:

@@ -276,12 +276,9 @@ def slow_forces(
     return noise_of(stats, vessel.coefficients, chosen, further=further).further
 
 
-@pytest.mark.parametrize("settings", [{"process_ratio": 2.5e-5}, {}])
 @pytest.mark.parametrize("seed", range(3))
-def test_a_log_without_a_disturbance_has_no_slow_part(
-    vessel: Vessel, seed: int, settings: dict[str, float]
-) -> None:
-    further = slow_forces(vessel, seed, 0.0, **settings)
+def test_a_log_without_a_disturbance_has_no_slow_part(vessel: Vessel, seed: int) -> None:
+    further = slow_forces(vessel, seed, 0.0, process_ratio=2.5e-5)
     for force in (further.yaw, further.surge):
         assert force is not None
         assert force.degree is None
@@ -292,6 +289,12 @@ def test_a_log_without_a_disturbance_has_no_slow_part(
 def test_a_small_step_of_the_yaw_moment_is_a_slow_part(vessel: Vessel, seed: int) -> None:
     further = slow_forces(vessel, seed, 0.1, process_ratio=2.5e-5)
     assert (further.yaw.degree, further.yaw.reduction) == (0, 0.0)
+    assert further.surge.degree is None
+
+
+def test_beside_process_noise_that_was_estimated_the_slow_part_stays(vessel: Vessel) -> None:
+    further = slow_forces(vessel, 0, 0.0, surge_bandwidth=5e-3)
+    assert further.yaw.degree == 0
     assert further.surge.degree is None
 
 
