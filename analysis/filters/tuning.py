@@ -91,7 +91,8 @@ def noise_of(
     slow = _slow_forces(further)
     for output in slow:
         noise = _with_likeliest_frequency(head, noise, output)
-    if slow and len(stats.head) == stats.count:  # else a disturbance may begin after it
+    is_whole = len(stats.head) == stats.count  # else a disturbance may begin after it
+    if slow and is_whole and not further.wind:
         noise = _without_absent_forces(head, noise)
     return noise
 
@@ -213,8 +214,8 @@ def _without_absent_forces(head: _Head, noise: NoiseModel) -> NoiseModel:
     There is none where Akaike's criterion, the deviance of all innovations and twice the number of
     parameters, is lower without the force: its frequency is one parameter more. How uncertain the
     force is at the start is in the deviance. A force stays as it is beside process noise that was
-    estimated and beside a wave: these take up a slow force, and no evidence would not mean that
-    there is none.
+    estimated, beside a wave and beside the wind: these take up a slow force, and no evidence would
+    not mean that there is none.
 
     References
     ----------
