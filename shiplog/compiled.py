@@ -28,6 +28,8 @@ F = TypeVar("F", bound=Callable[..., object])
 
 PROJECT_FOLDER = Path(__file__).parents[1]
 OWN_PACKAGES = ("shiplog", "recorders", "analysis")
+# no function is passed as a C pointer: the wrapper for it takes a twelfth of the compilation
+OPTIONS = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 # Folders and files with compiled functions, or with what these call and read; a test checks it.
 COMPILED_SOURCES = (
     "shiplog/compiled.py",
@@ -148,7 +150,7 @@ def compiled(function: F) -> F:
 
     It releases the GIL, so that threads run it at the same time.
     """
-    dispatcher = numba.njit(error_model="numpy", nogil=True)(function)
+    dispatcher = numba.njit(**OPTIONS)(function)
     if Path(function.__code__.co_filename).is_file():  # not at a prompt
         dispatcher._cache = _CacheByTypes(function)  # noqa: SLF001, what its enable_caching() does
     return cast("F", dispatcher)
@@ -168,7 +170,7 @@ def compiled_in_caller(function: F) -> F:
     a cache entry of its own, the machine code would outlive a change of the module for which it
     was compiled.
     """
-    return cast("F", numba.njit(error_model="numpy", nogil=True)(function))
+    return cast("F", numba.njit(**OPTIONS)(function))
 
 
 def inlined(function: F) -> F:
@@ -177,8 +179,7 @@ def inlined(function: F) -> F:
     For a part of a long loop that is called in one place. A compiled function is optimised anew in
     each compiled function that calls it, directly or through others; an inlined one only once.
     """
-    options = {"error_model": "numpy", "nogil": True, "inline": "always"}
-    return cast("F", numba.njit(**options)(function))
+    return cast("F", numba.njit(**OPTIONS, inline="always")(function))
 
 
 def overload_for(generic: Callable[..., object], kind: type) -> Callable[[F], F]:
