@@ -19,7 +19,7 @@ BROWSERS = (
     "chrome",
 )
 BROWSER_VARIABLE = "SHIPLOG_BROWSER"  # of the environment: the path of a browser of this kind
-MAX_SECS = 120.0
+MAX_SECS = 300.0
 OPTIONS = (
     "--headless",
     "--disable-gpu",

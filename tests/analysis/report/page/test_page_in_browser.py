@@ -16,7 +16,7 @@ from analysis.report.page.report_page import report_page
 from shiplog.errors import ShiplogError
 
 AXE_VARIABLE = "SHIPLOG_AXE"  # the path of axe.min.js
-SECS = 100.0
+SECS = 300.0
 
 
 @cache
