@@ -30,11 +30,12 @@ from .zigzag import FINE_SWITCH_STEP, SWITCH_STEP
 
 MARGIN_SECS = 90.0  # of the approach, before the execute
 TAIL_SECS = 10.0
-MAX_PART_SAMPLES = 3000  # of a manoeuvre, from which its indices are computed
+MAX_PART_SAMPLES = 2400  # of a manoeuvre, from which its indices are computed
 OTHER_HALF_SECS = 5.0  # half width of the smoothing where nothing else determines it
 MAX_HALF_SECS = 30.0
 NOTED_GAP_SECS = 5.0
 UNSTEADY_YAW_RATE = radians(0.1)  # rad/s, of an approach
+MAX_EARLY_SWITCH = radians(1.5)
 MAX_LATE_SWITCH = radians(4.0)  # of a reversal beyond the nominal switch heading
 SCATTERED_SWITCH = radians(2.0)
 SYMBOLS = {
@@ -201,7 +202,9 @@ class _Part:
         heading, execute = self.filled.heading, round(self.execute.sample)
         window = heading[max(0, execute - round(30.0 / self.filled.dt_secs)) : execute + 1]
         changes = np.abs(heading[list(self.found.reversals)] - np.mean(window))
-        typical = float(np.median(changes))
+        # the mean of both sides does not depend on the approach heading
+        sides = [np.median(side) for side in (changes[::2], changes[1::2]) if len(side)]
+        typical = float(np.mean(sides))
         switch = nominal_switch(typical, self.rudder)
         scatter = float(np.max(np.abs(changes - typical)))
         if scatter <= SCATTERED_SWITCH:
@@ -319,7 +322,7 @@ def nominal_switch(typical: float, rudder: float) -> float:
     10.0
     """
     for usual in (abs(rudder), abs(rudder) / 2):
-        if -FINE_SWITCH_STEP < typical - usual < min(MAX_LATE_SWITCH, 0.3 * usual):
+        if -MAX_EARLY_SWITCH < typical - usual < min(MAX_LATE_SWITCH, 0.3 * usual):
             return usual
     coarse = np.floor((typical + FINE_SWITCH_STEP) / SWITCH_STEP) * SWITCH_STEP
     if coarse > 0 and typical - coarse < 0.5 * MAX_LATE_SWITCH:
@@ -417,8 +420,8 @@ def _series(part: _Part, case: IndexCase) -> ManoeuvreSeries:
         made = (signals.positions[:count] - start) @ [1, 1j] * np.exp(-1j * case.approach)
         track = np.column_stack((made.real, made.imag))
     drift = (
-        -np.arctan2(measured.sway[:count], measured.speed[:count])
-        if measured.has("sway") and measured.has("speed")
+        -np.arctan2(signals.sway[:count], signals.speed[:count])
+        if signals.has("sway") and signals.has("speed")
         else none
     )
     change = signals.heading[:count] - case.approach

@@ -10,21 +10,31 @@ from .found_manoeuvre import FoundManoeuvre
 from .rudder_levels import HeldLevel, merged_levels, neutral_rudder, rudder_levels
 from .sailed_manoeuvre import ManoeuvreKind, NotComputed
 from .speed_manoeuvres import find_speed_manoeuvres
-from .spirals import find_direct_spirals, find_reverse_spirals
+from .spirals import (
+    RATE_SMOOTHING_SECS,
+    find_direct_spirals,
+    find_reverse_spirals,
+    is_steered,
+)
+from .start_rules import ramp_start
 from .straight_runs import find_straight_runs
-from .trial_signals import TrialSignals, filled_signals, slope
+from .trial_signals import TrialSignals, filled_signals, noise_std, slope
 
 MIN_DEFLECTION = radians(4.0)  # of a manoeuvre's rudder from neutral
 REPORTED_DEFLECTION = radians(5.0)  # beyond it, rudder that is no manoeuvre is reported
 LIKE_ANGLES, LIKE_ANGLES_SHARE = radians(3.0), 0.25  # of both sides of a zig-zag
-SLOWEST_GEAR = radians(0.7)  # rad/s, of a reversal without a stop
+SLOWEST_GEAR = radians(0.45)  # rad/s, of a reversal without a stop
 REVERSAL_SECS = 6.0  # of a reversal, beside the time the gear needs
 PASSING_SECS = 3.0  # shorter stops of a rudder on its way to the other side
 MIN_TURN = pi / 2  # of a turning circle
 MIN_STEADY_TURN = radians(60.0)  # before a pull-out
 MIN_PULL_OUT_SECS = 40.0
+PULL_OUT_HELM = radians(1.0)  # of the rudder held midships, noise aside
+FULL_TURN = radians(210.0)  # with less rudder than `HARD_RUDDER`, a shorter turn changes course
+HARD_RUDDER = radians(25.0)
+MAX_RETURN = radians(30.0)  # beyond twice the heading of a zig-zag's reversal, with no reversal
 INITIAL_TURN = radians(10.0)
-INITIAL_TURN_RUDDER = (radians(8.0), radians(12.5))
+INITIAL_TURN_RUDDER, RUDDER_TOLERANCE = radians(10.0), radians(0.9)
 MIN_MOVING_SPEED = 0.5  # m/s: a slower ship is stopped
 OVERSHOOT_TAIL = 0.5  # of the last hold of a zig-zag, in which its last overshoot is looked for
 
@@ -73,8 +83,12 @@ def detect_manoeuvres(signals: TrialSignals) -> Detection:
     scan = _RudderScan(filled, merged_levels(levels, neutral, filled.dt_secs), neutral)
     for each in scan.results(found):
         (rejected if isinstance(each, NotComputed) else found).append(each)  # type: ignore[arg-type]
-    reverse = find_reverse_spirals(filled, neutral)
-    found += [each for each in reverse if not _overlaps(each, found)]
+    rate = slope(filled.heading, filled.dt_secs, RATE_SMOOTHING_SECS)
+    found += [
+        each
+        for each in find_reverse_spirals(rate, neutral, filled.dt_secs)
+        if not _overlaps(each, found) and is_steered(filled.rudder, each)
+    ]
     found += find_straight_runs(filled, found)
     return Detection(tuple(sorted(found, key=lambda each: each.execute)), neutral, tuple(rejected))
 
@@ -126,6 +140,12 @@ class _RudderScan:
         """Return the sample at which the rudder leaves the level before the k-th."""
         return self._levels[k - 1].last if k else 0
 
+    def _leaves(self, held: HeldLevel) -> int:
+        """Return the sample at which the rudder leaves its angle for the other side."""
+        side = -1.0 if held.level > self._neutral else 1.0
+        start, _ = ramp_start(self._signals.rudder, held.last, side, self._dt)
+        return round(start)
+
     def _approach_level(self, k: int) -> float:
         return self._levels[k - 1].level if k else float(self._signals.rudder[0])
 
@@ -148,16 +168,17 @@ class _RudderScan:
         heading = self._signals.heading
         k = self._levels.index(chain[0])
         execute = self._begins(k)
-        reversals = tuple(held.last for held in chain[:-1])
+        reversals = tuple(self._leaves(held) for held in chain[:-1])
         changes = heading[list(reversals)] - np.mean(
             heading[max(0, execute - round(30 / self._dt)) : execute + 1]
         )
         sides = np.sign([held.level - self._neutral for held in chain[:-1]])
         if not np.isfinite(changes).all() or np.any(changes * sides < radians(1.0)):
             return None
-        if np.max(np.abs(changes)) > MIN_TURN:
-            return None
         last = chain[-1]
+        returned = -sides[-1] * (heading[last.last] - heading[reversals[-1]])
+        if np.max(np.abs(changes)) > MIN_TURN or returned > 3 * abs(changes[-1]) + MAX_RETURN:
+            return None
         return FoundManoeuvre(
             ManoeuvreKind.ZIGZAG,
             execute,
@@ -184,21 +205,35 @@ class _RudderScan:
         most = float(turned[-1]) if len(turned) else np.nan
         pull_out = self._pull_out(k, most)
         made = (execute, held.last + 1, level, self._approach_level(k))
-        if most >= 2 * MIN_TURN or (most >= MIN_TURN and pull_out is None):
+        is_circle = self._is_circle(held, most)
+        if is_circle and (most >= 2 * MIN_TURN or pull_out is None):
             yield FoundManoeuvre(ManoeuvreKind.TURNING_CIRCLE, *made)
         elif pull_out is None:
-            low, high = INITIAL_TURN_RUDDER
-            if low <= abs(level) <= high and most >= INITIAL_TURN:
+            angles = np.abs([level, held.level])  # from neutral, or as ordered
+            is_10 = bool(np.min(np.abs(angles - INITIAL_TURN_RUDDER)) <= RUDDER_TOLERANCE)
+            if is_10 and most >= INITIAL_TURN:
                 yield FoundManoeuvre(ManoeuvreKind.INITIAL_TURNING, *made)
             elif abs(level) >= REPORTED_DEFLECTION:
                 yield self._rejected(held, self._reason(held, most))
         if pull_out is not None:
             yield pull_out
 
+    def _is_circle(self, held: HeldLevel, turned: float) -> bool:
+        """Whether a turn is a turning circle, perhaps cut short, and no change of course."""
+        is_hard = abs(held.level - self._neutral) >= HARD_RUDDER
+        is_last = held.last >= len(self._signals) - 1 - MIN_PULL_OUT_SECS / self._dt
+        return turned >= (MIN_TURN if is_hard or is_last else FULL_TURN)
+
     def _reason(self, held: HeldLevel, turned: float) -> str:
         secs = (held.last - held.first) * self._dt
         if not np.isfinite(turned):
             return "no heading and no yaw rate in the log"
+        if turned >= MIN_TURN:
+            return (
+                f"the heading changes by {degrees(turned):.0f}° and is kept then: a change of "
+                f"course; a turning circle at less than {degrees(HARD_RUDDER):.0f}° needs "
+                f"{degrees(FULL_TURN):.0f}°"
+            )
         return (
             f"held for {secs:.0f} s, in which the heading changes by {degrees(turned):.0f}°: a "
             f"turning circle needs {degrees(MIN_TURN):.0f}°, a zig-zag an equal angle to the "
@@ -218,6 +253,14 @@ class _RudderScan:
         midships = abs(after.level - self._neutral) < radians(2.0)
         if not midships or (after.last - after.first) * self._dt < MIN_PULL_OUT_SECS:
             return None
+        secs = (after.first - held.last) * self._dt
+        if secs > REVERSAL_SECS + abs(held.level - after.level) / SLOWEST_GEAR:
+            return None
+        settled = after.first + round(PASSING_SECS / self._dt)
+        midship = self._signals.rudder[settled : settled + round(MIN_PULL_OUT_SECS / self._dt)]
+        noise = min(noise_std(self._signals.rudder), PULL_OUT_HELM)
+        if np.percentile(midship, 95) - np.percentile(midship, 5) > PULL_OUT_HELM + 4 * noise:
+            return None  # steered
         rate = slope(self._signals.heading, self._dt, 5.0)
         late = rate[held.last - (held.last - held.first) // 4 : held.last + 1]
         if np.ptp(late) > 0.2 * abs(float(np.mean(late))) + radians(0.05):

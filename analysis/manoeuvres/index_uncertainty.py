@@ -27,7 +27,7 @@ NOISE, VELOCITY, START, APPROACH, GYRO = (
     "gyro bias",
 )  # fmt: skip
 GYRO_BIAS_STD = np.radians(0.005)  # rad/s, of a heading that is the integral of the yaw rate
-HELM_CORRELATION_SECS = 10.0  # of the heading under helm
+HELM_CORRELATION_SECS = 15.0  # of the heading under helm
 WANDER_SECS = 30.0
 SAMPLED = ("heading", "yaw_rate", "speed", "sway", "positions")
 
@@ -152,8 +152,11 @@ def approach_std(inputs: IndexInputs) -> float:
     window = inputs.signals.heading[max(0, execute - round(WANDER_SECS / dt)) : execute + 1]
     if len(window) < 3:
         return float(inputs.signals.noise.get("heading", 0.0))
-    secs = len(window) * dt
-    return float(np.std(window)) * float(np.sqrt(min(1.0, HELM_CORRELATION_SECS / secs)))
+    secs, noise = len(window) * dt, inputs.signals.noise.get("heading", 0.0)
+    samples = max(1.0, secs / inputs.signals.interval("heading"))
+    wander = max(0.0, float(np.var(window)) - noise**2)
+    correlated = wander * min(1.0, HELM_CORRELATION_SECS / secs)
+    return float(np.sqrt(correlated + noise**2 / samples))
 
 
 def _velocity_changes(inputs: IndexInputs, values: Mapping[str, float]) -> list[dict[str, float]]:

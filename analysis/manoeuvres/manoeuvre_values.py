@@ -13,8 +13,8 @@ from .found_manoeuvre import FoundManoeuvre
 from .manoeuvre import ManoeuvreMotion
 from .sailed_manoeuvre import ManoeuvreKind
 from .spirals import spiral_curve, spiral_loop
-from .trial_signals import TrialSignals
-from .turning_circle import turning_circle
+from .trial_signals import TrialSignals, slope
+from .turning_circle import COURSE_SECS, turning_circle
 from .zigzag import zigzag_values
 
 CIRCLE_NAMES = {
@@ -103,6 +103,15 @@ def smoothed(signals: TrialSignals, half_secs: float) -> TrialSignals:
         yaw_rate=smooth(signals.yaw_rate, half_secs),
         positions=np.column_stack([smooth(column, track) for column in signals.positions.T]),
     )
+
+
+def with_sway(signals: TrialSignals) -> TrialSignals:
+    """Return the signals with the sway that their track shows, where none was measured."""
+    if signals.has("sway") or not np.isfinite(signals.positions).all() or len(signals) < 3:
+        return signals
+    velocity = [slope(column, signals.dt_secs, COURSE_SECS) for column in signals.positions.T]
+    across = velocity[1] * np.cos(signals.heading) - velocity[0] * np.sin(signals.heading)
+    return replace(signals, sway=across)
 
 
 def distance_travelled(signals: TrialSignals, first: float, last: float) -> float:
@@ -199,7 +208,8 @@ def pull_out_values(case: IndexCase) -> dict[str, float]:
 
 def spiral_values(case: IndexCase) -> dict[str, float]:
     """Compute height and width of the loop of a spiral."""
-    height, width = spiral_loop(spiral_curve(case.signals, case.found.levels))
+    points = spiral_curve(case.signals, case.found.levels)
+    height, width = spiral_loop(points - [case.found.approach_level, 0.0])
     return {"loop height": height, "loop width": width}
 
 
@@ -260,7 +270,7 @@ def index_case(
     half_secs
         As in `smoothed`.
     """
-    smooth = smoothed(signals, half_secs)
+    smooth = with_sway(smoothed(signals, half_secs))
     start = max(round(execute), round(1.0 / signals.dt_secs))  # at least a second of samples
     approach = approach_heading(signals.heading, min(start, len(signals) - 1), signals.dt_secs)
     return IndexCase(smooth, found, execute, approach, switch)

@@ -7,13 +7,14 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
-from .execute import REST_TOLERANCE, remove_spikes
+from .execute import MAX_SPIKE_SECS, remove_spikes
 from .trial_signals import noise_std
 
 MIN_HELD_SECS = 2.0
-MOVING_SECS = 1.0  # half the time over which a movement is looked for
-MIN_MOVEMENT = radians(0.6)  # within twice `MOVING_SECS`: less is a held rudder, or slow helm
-NOISE_MARGIN = 3.0  # standard deviations of the noise added to it
+MOVING_SECS, MAX_MOVING_SECS = 1.0, 5.0  # half the time over which a movement is looked for
+MIN_MOVING_RATE = radians(0.3)  # rad/s: a slower rudder is held, or is helm
+NOISE_MARGIN = 3.0  # standard deviations of the noise that are no movement
+MEDIAN_NOISE_GAIN = 1.25  # of the noise of a median over that of a mean
 HELM_LEVEL = radians(2.5)  # from neutral: within it the rudder keeps the course
 SAME_LEVEL, SAME_LEVEL_SHARE = radians(1.5), 0.08
 MAX_LEVEL_GAP_SECS = 5.0  # between two stretches at one level
@@ -37,7 +38,9 @@ class HeldLevel:
     level: float
 
 
-def held_levels(values: FloatArray, dt: float, min_movement: float) -> list[HeldLevel]:
+def held_levels(
+    values: FloatArray, dt: float, min_movement: float, moving_secs: float = MOVING_SECS
+) -> list[HeldLevel]:
     """Find the stretches of at least `MIN_HELD_SECS` in which a signal does not move.
 
     Parameters
@@ -47,7 +50,9 @@ def held_levels(values: FloatArray, dt: float, min_movement: float) -> list[Held
     dt
         Sample interval, s.
     min_movement
-        Change within twice `MOVING_SECS` that is a movement, in the unit of the values.
+        Change within twice `moving_secs` that is a movement, in the unit of the values.
+    moving_secs
+        Half the time over which a movement is looked for, s.
 
     Examples
     --------
@@ -56,7 +61,7 @@ def held_levels(values: FloatArray, dt: float, min_movement: float) -> list[Held
     >>> [(round(held.level), held.last - held.first > 15) for held in held_levels(steps, 1.0, 0.5)]
     [(0, True), (1, True)]
     """
-    k = max(1, round(MOVING_SECS / dt))
+    k = max(1, round(moving_secs / dt))
     padded = np.pad(values, k, mode="edge")
     moving = np.abs(padded[2 * k :] - padded[: -2 * k]) > min_movement
     edges = np.flatnonzero(np.diff(np.concatenate(([0], (~moving).astype(np.int8), [0]))))
@@ -69,10 +74,15 @@ def held_levels(values: FloatArray, dt: float, min_movement: float) -> list[Held
 
 
 def rudder_levels(rudder: FloatArray, dt: float) -> list[HeldLevel]:
-    """Find the levels at which a rudder is held, (n,) rad, whatever its noise."""
-    smooth = remove_spikes(rudder, dt)
-    margin = NOISE_MARGIN * min(noise_std(rudder), REST_TOLERANCE)
-    return held_levels(smooth, dt, MIN_MOVEMENT + margin)
+    """Find the levels at which a rudder is held, (n,) rad, whatever its noise.
+
+    The noisier the rudder, the longer is the time over which it must have moved.
+    """
+    samples = 1 + 2 * round(MAX_SPIKE_SECS / 2 / dt)
+    noise = noise_std(rudder) * MEDIAN_NOISE_GAIN / np.sqrt(samples)
+    secs = NOISE_MARGIN * np.sqrt(2.0) * noise / (2 * MIN_MOVING_RATE)
+    half_secs = float(np.clip(secs, MOVING_SECS, MAX_MOVING_SECS))
+    return held_levels(remove_spikes(rudder, dt), dt, 2 * half_secs * MIN_MOVING_RATE, half_secs)
 
 
 def neutral_rudder(levels: list[HeldLevel]) -> float:

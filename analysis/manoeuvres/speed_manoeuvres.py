@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from .execute import remove_spikes
 from .found_manoeuvre import FoundManoeuvre
@@ -11,12 +12,13 @@ from .rudder_levels import HeldLevel, held_levels
 from .sailed_manoeuvre import ManoeuvreKind
 from .trial_signals import TrialSignals, noise_std
 
-MIN_RPM_CHANGE = 0.08  # of the largest revolutions, within two seconds: they are changed
+MIN_RPM_CHANGE = 0.02  # of the largest revolutions, within two seconds: they are changed
 MIN_RPM_STEP = 0.15  # of the largest revolutions, from one level to the next
 STOP_RPM = 0.05  # of the largest revolutions: below it the propeller does not drive ahead
 MIN_STOP_SPEED = 1.0  # m/s, from which a ship can be stopped
 MIN_SPEED_GAIN = 1.15  # of an acceleration: speed at its end over that before
 MIN_STOP_SHARE = 0.5  # of the speed, that a stopping manoeuvre takes off at least
+MEAN_SECS = 5.0  # to either side, over which the speed is averaged, and beyond the stop
 SLOW_SHARE = 0.02  # of the speed at the execute: the ship is stopped
 
 
@@ -60,9 +62,10 @@ def _stop(
     initial = float(np.median(speed[max(0, execute - round(5 / signals.dt_secs)) : execute + 1]))
     later = [held for held in levels if held.first > execute and held.level > before.level / 3]
     end = later[0].first if later else len(signals)
-    stopped = np.flatnonzero(speed[execute:end] <= SLOW_SHARE * initial)
+    mean = uniform_filter1d(speed[execute:end], 1 + 2 * round(MEAN_SECS / signals.dt_secs))
+    stopped = np.flatnonzero(mean <= (0.0 if np.min(mean) <= 0 else SLOW_SHARE * initial))
     if len(stopped):
-        end = execute + int(stopped[0]) + 1
+        end = min(end, execute + int(stopped[0]) + 1 + round(MEAN_SECS / signals.dt_secs))
     if initial < MIN_STOP_SPEED or end - execute < 3:
         return None
     if float(np.min(speed[execute:end])) > MIN_STOP_SHARE * initial:

@@ -14,7 +14,7 @@ from shiplog.types import FloatArray
 from .found_manoeuvre import FoundManoeuvre
 from .rudder_levels import MIN_HELD_SECS, HeldLevel, held_levels
 from .sailed_manoeuvre import ManoeuvreKind
-from .trial_signals import TrialSignals, noise_std, slope
+from .trial_signals import TrialSignals, noise_std
 
 MIN_SPIRAL_LEVELS = 5
 MIN_SPIRAL_SECS = 30.0  # of each level
@@ -22,7 +22,8 @@ MAX_PAUSE_SECS = 40.0  # between two levels
 MIN_SPIRAL_STEP = radians(0.5)
 MIN_SIDE = radians(2.0)  # that the largest levels of both sides reach
 MIN_RATE_STEP, MIN_RATE_SIDE = radians(0.03), radians(0.1)  # of a reverse spiral, rad/s
-RATE_SMOOTHING_SECS = 5.0
+RATE_SMOOTHING_SECS = 8.0
+MIN_STEERING = radians(1.0)  # of the rudder within a level
 STEADY_SHARE = 0.4  # of a level's end, over which yaw rate and rudder are averaged
 
 
@@ -44,24 +45,23 @@ def find_direct_spirals(
         yield _spiral(ManoeuvreKind.DIRECT_SPIRAL, chain, neutral)
 
 
-def find_reverse_spirals(signals: TrialSignals, neutral: float) -> Iterator[FoundManoeuvre]:
+def find_reverse_spirals(rate: FloatArray, neutral: float, dt: float) -> Iterator[FoundManoeuvre]:
     """Find reverse spirals: the rudder is moved to hold one yaw rate after another.
 
     Parameters
     ----------
-    signals
-        Without NaN.
+    rate
+        (n,) yaw rate, smooth, rad/s.
     neutral
         The rudder angle that keeps a straight course, rad.
+    dt
+        Sample interval, s.
     """
-    dt = signals.dt_secs
-    rate = slope(signals.heading, dt, RATE_SMOOTHING_SECS)
     if not np.isfinite(rate).all() or np.ptp(rate) < 2 * MIN_RATE_SIDE:
         return
     steady = held_levels(rate, dt, MIN_RATE_STEP / 2 + 3 * noise_std(rate))
     for chain in _chains(_joined(steady, dt), dt, MIN_RATE_STEP, MIN_RATE_SIDE, 0.0):
-        if _is_steered(signals.rudder, chain):
-            yield _spiral(ManoeuvreKind.REVERSE_SPIRAL, chain, neutral)
+        yield _spiral(ManoeuvreKind.REVERSE_SPIRAL, chain, neutral)
 
 
 def _joined(levels: list[HeldLevel], dt: float) -> list[HeldLevel]:
@@ -110,18 +110,21 @@ def _is_spiral(levels: list[float], side: float) -> bool:
     return int(np.sum(steps[1:] != steps[:-1])) <= 2 and len({round(x, 3) for x in levels}) >= 5
 
 
-def _is_steered(rudder: FloatArray, chain: list[HeldLevel]) -> bool:
-    """Whether the rudder is moved to keep each rate, as in a reverse spiral."""
-    moved = [float(np.ptp(rudder[held.first : held.last + 1])) for held in chain]
-    return bool(np.median(moved) > radians(1.0))
+def is_steered(rudder: FloatArray, found: FoundManoeuvre) -> bool:
+    """Whether the rudder, (n,) rad, is moved to keep each rate, as in a reverse spiral."""
+    spans = found.levels[:, :2].astype(int)
+    return bool(np.median([np.ptp(rudder[a : b + 1]) for a, b in spans]) > MIN_STEERING)
 
 
 def _spiral(kind: ManoeuvreKind, chain: list[HeldLevel], neutral: float) -> FoundManoeuvre:
-    levels = np.array([(held.first, held.last, held.level) for held in chain])
-    first = chain[1] if abs(chain[0].level - neutral) < MIN_SPIRAL_STEP else chain[0]
-    return FoundManoeuvre(
-        kind, chain[0].first, chain[-1].last + 1, first.level - neutral, neutral, levels=levels
-    )
+    is_direct = kind is ManoeuvreKind.DIRECT_SPIRAL
+    straight, near = (neutral, MIN_SPIRAL_STEP) if is_direct else (0.0, MIN_RATE_STEP)
+    has_approach = abs(chain[0].level - straight) < near
+    execute = chain[0].last if has_approach else chain[0].first
+    sailed = chain[1:] if has_approach else chain
+    levels = np.array([(held.first, held.last, held.level) for held in sailed])
+    level = sailed[0].level - straight
+    return FoundManoeuvre(kind, execute, sailed[-1].last + 1, level, neutral, levels=levels)
 
 
 def spiral_curve(signals: TrialSignals, levels: FloatArray) -> FloatArray:

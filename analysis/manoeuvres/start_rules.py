@@ -9,11 +9,13 @@ from enum import StrEnum
 from math import radians
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shiplog.types import FloatArray
 
 from .execute import HELM_SECS
 from .found_manoeuvre import FoundManoeuvre
+from .sailed_manoeuvre import ManoeuvreKind
 from .trial_signals import TrialSignals
 
 RAMP_SHARES = (0.15, 0.75)  # of the way to the new angle, through which a line is laid
@@ -22,6 +24,12 @@ EVENT_SECS = (30.0, 10.0)  # before and after the rudder's movement: an event be
 STATED_SECS = (90.0, 10.0)  # the same of a stated time
 MIN_ORDER_CHANGE = radians(1.5)
 EXECUTE_WORD = "execute"
+HELM_LINE_SECS = 5.0  # before the movement, over which a line is laid through the helm
+ORDER_SECS = (20.0, 3.0)  # about the rudder's movement, in which its order is looked for
+BY_RUDDER = (
+    ManoeuvreKind.TURNING_CIRCLE, ManoeuvreKind.ZIGZAG, ManoeuvreKind.INITIAL_TURNING,
+    ManoeuvreKind.PULL_OUT,
+)  # fmt: skip
 
 
 class StartRule(StrEnum):
@@ -59,7 +67,6 @@ class RuleSettings:
     rule: StartRule = StartRule.ORDER
     moved_angle: float = radians(0.5)
     execute_secs: tuple[float, ...] = ()
-    order_delay_std: float = 0.25
 
 
 def find_executes(
@@ -84,14 +91,15 @@ def find_executes(
         The samples of the other rules, by their names.
     """
     dt = signals.dt_secs
-    at_order = _order_execute(signals, found, settings)
+    by_rudder = found.kind in BY_RUDDER
+    at_order = _order_execute(signals, found) if by_rudder else _other_execute(signals, found)
     rules: dict[StartRule, Execute] = {StartRule.ORDER: at_order}
-    started = ramp_start(signals.rudder, found.execute, found.movement, dt)
-    moved = moved_sample(signals.rudder, found, started, settings.moved_angle, dt)
-    spread = signals.interval("rudder") / np.sqrt(12.0)
-    if np.isfinite(moved):
-        name = f"rudder moved {np.degrees(settings.moved_angle):.1f}°"
-        rules[StartRule.MOVED] = Execute(moved, name, spread)
+    if by_rudder:
+        started, ramp_std = ramp_start(signals.rudder, found.execute, found.movement, dt)
+        moved = moved_sample(signals.rudder, found, started, settings.moved_angle, dt)
+        if np.isfinite(moved):
+            name = f"rudder moved {np.degrees(settings.moved_angle):.1f}°"
+            rules[StartRule.MOVED] = Execute(moved, name, ramp_std)
     at = at_order.sample * dt
     marked = [
         time
@@ -111,68 +119,114 @@ def find_executes(
     return chosen, others
 
 
-def _order_execute(signals: TrialSignals, found: FoundManoeuvre, settings: RuleSettings) -> Execute:
+def _order_execute(signals: TrialSignals, found: FoundManoeuvre) -> Execute:
     """Return the execute at the order, or else at the beginning of the rudder's movement."""
-    spread = signals.interval("rudder") / np.sqrt(12.0)
     if signals.has("rudder_order"):
         ordered = order_sample(signals.rudder_order, found, signals.dt_secs)
         if np.isfinite(ordered):
             interval = signals.interval("rudder_order") / np.sqrt(12.0)
             return Execute(ordered, "rudder order (channel)", interval)
-    started = ramp_start(signals.rudder, found.execute, found.movement, signals.dt_secs)
-    std = float(np.hypot(spread, settings.order_delay_std))
+    started, std = ramp_start(signals.rudder, found.execute, found.movement, signals.dt_secs)
     return Execute(started, "rudder order (beginning of the rudder's movement)", std)
 
 
+def _other_execute(signals: TrialSignals, found: FoundManoeuvre) -> Execute:
+    """Return the execute of a manoeuvre that no order of the rudder begins."""
+    if found.kind in (ManoeuvreKind.STOPPING, ManoeuvreKind.ACCELERATION):
+        side = -1.0 if found.kind is ManoeuvreKind.STOPPING else 1.0
+        started, std = ramp_start(signals.rpm, found.execute, side, signals.dt_secs)
+        return Execute(started, "beginning of the revolutions' change", std)
+    spiral = found.kind in (ManoeuvreKind.DIRECT_SPIRAL, ManoeuvreKind.REVERSE_SPIRAL)
+    rule = "end of the approach" if spiral else "beginning of the steady run"
+    return Execute(float(found.execute), rule, 0.0)
+
+
 def order_sample(order: FloatArray, found: FoundManoeuvre, dt: float) -> float:
-    """Return the last sample before the ordered angle changes; NaN where it does not."""
-    first = max(0, found.execute - round(20.0 / dt))
-    part = order[first : found.execute + round(10.0 / dt) + 1]
-    if len(part) < 2:
+    """Return where the ordered angle is half changed; NaN where it is not.
+
+    Between two samples of the order, the instant of the change is known to half their interval.
+    """
+    first = max(0, found.execute - round(ORDER_SECS[0] / dt))
+    part = found.movement * order[first : found.execute + round(ORDER_SECS[1] / dt) + 1]
+    if len(part) < 2 or part[-1] - np.median(part[: len(part) // 2]) < MIN_ORDER_CHANGE:
         return np.nan
-    change = np.abs(np.diff(part))
-    towards = found.movement * (part[1:] - part[0])
-    steps = np.flatnonzero((change > MIN_ORDER_CHANGE) & (towards > 0))
-    return float(first + steps[-1]) + 1.0 if len(steps) else np.nan
+    half = (part[-1] + float(np.median(part[: len(part) // 2]))) / 2
+    last_below = int(np.flatnonzero(part < half)[-1])
+    share = (half - part[last_below]) / (part[last_below + 1] - part[last_below])
+    return first + last_below + float(share)
 
 
-def ramp_start(rudder: FloatArray, leaves: int, side: float, dt: float) -> float:
-    """Find where the movement of a rudder begins, by a line through its ramp.
+def ramp_start(values: FloatArray, leaves: int, side: float, dt: float) -> tuple[float, float]:
+    """Find where the movement of a rudder, or of the revolutions, begins.
+
+    A line is laid through the ramp, and one through the helm before it; they meet at the
+    beginning.
 
     Parameters
     ----------
-    rudder
-        (n,) rad.
+    values
+        (n,) such as the rudder, rad.
     leaves
         A sample close to the beginning.
     side
-        1 for a movement to starboard, -1 to port.
+        1 for a movement up (to starboard), -1 down.
     dt
         Sample interval, s.
 
     Returns
     -------
-    float
-        Sample with its fraction, at which the line reaches the mean angle before the ramp.
+    sample
+        With its fraction.
+    std_secs
+        Standard uncertainty of that instant, s, from the scatter about both lines.
     """
-    window = max(1, round(HELM_SECS / dt))
-    helm = float(np.median(rudder[max(0, leaves - window) : leaves + 1]))
-    ahead = side * (rudder[leaves : leaves + round(MAX_RAMP_SECS / dt)] - helm)
-    if len(ahead) < 3:
-        return float(leaves)
-    reached = np.flatnonzero(ahead >= 0.9 * np.max(ahead))
-    top = int(reached[0])
+    window = max(2, round(HELM_LINE_SECS / dt))
+    since = max(0, leaves - window)
+    before = side * values[since : leaves + 1]
+    helm = float(np.median(before))
+    ahead = side * values[leaves : leaves + round(MAX_RAMP_SECS / dt)] - helm
+    if len(ahead) < 3 or np.max(ahead) <= 0:
+        return float(leaves), dt
+    top = int(np.argmax(ahead >= 0.9 * np.max(ahead)))
     target = float(np.median(ahead[top : top + window + 1]))
-    low, high = RAMP_SHARES
-    first = int(np.argmax(ahead > low * target))
-    last = int(np.argmax(ahead > high * target))
-    x, y = np.arange(first, last + 1), ahead[first : last + 1]
-    if last <= first:  # a step within one sample
-        previous = ahead[first - 1] if first else 0.0
-        return float(leaves + first - 1 + max(0.0, -previous)) if first else float(leaves)
+    first, last = (int(np.argmax(ahead > share * target)) for share in RAMP_SHARES)
+    if last - first < 2:  # a step: somewhere within two samples
+        return float(max(0, leaves + first - 1)), dt / np.sqrt(3.0)
+    ramp = _line(np.arange(leaves + first, leaves + last + 1), ahead[first : last + 1] + helm)
+    level = _line(np.arange(since, leaves + 1), before)
+    rise = ramp.slope - level.slope
+    met = (level.intercept - ramp.intercept) / rise if rise > 0 else np.inf
+    if not leaves + first - 2 * window <= met <= leaves + first:
+        return float(leaves), window * dt
+    std = float(np.hypot(ramp.std_at(met), level.std_at(met))) / rise
+    return max(0.0, float(met)), std * dt
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A straight line through samples, with the uncertainty of its values."""
+
+    slope: float
+    intercept: float
+    scatter: float
+    count: int
+    mean: float
+    square: float
+
+    def std_at(self, x: float) -> float:
+        """Return the standard uncertainty of the line's value at x."""
+        return self.scatter * float(np.sqrt(1 / self.count + (x - self.mean) ** 2 / self.square))
+
+
+def _line(x: NDArray[np.int64], y: FloatArray) -> _Line:
+    """Lay a line through k samples; through less than three, a level."""
+    if len(x) < 3:
+        return _Line(0.0, float(np.mean(y)), float(np.ptp(y)), len(x), float(x[-1]), 1.0)
     slope, intercept = np.polyfit(x, y, 1)
-    start = -intercept / slope if slope > 0 else 0.0
-    return float(max(0.0, leaves + np.clip(start, first - 2 * window, first)))
+    scatter = float(np.sqrt(np.sum((y - slope * x - intercept) ** 2) / (len(x) - 2)))
+    mean = float(np.mean(x))
+    square = float(np.sum((x - mean) ** 2))
+    return _Line(float(slope), float(intercept), scatter, len(x), mean, square)
 
 
 def moved_sample(

@@ -57,8 +57,8 @@ class TurningCircle:
     steady_speed
         Speed through the water over the same time, m/s.
     steady_diameter
-        Of a circle through the positions after 180°, m; from speed and yaw rate where the turn is
-        too short for it.
+        Of a circle through the positions of the last 180°, m; from speed and yaw rate where the
+        turn is too short for it.
     drift_angle
         Of the midship point in the steady turn, rad; positive where the bow points inwards.
     """
@@ -149,13 +149,14 @@ def turning_circle(
 
 
 def _steady_diameter(positions: FloatArray, turned: FloatArray, otherwise: float) -> float:
-    """Return the diameter of the circle through the positions after half a turn, m.
+    """Return the diameter of the circle through the positions of the last half turn, m.
 
     The least-squares circle in its algebraic form (Kåsa, "A circle fitting procedure and its error
     analysis", 1976), which is linear.
     """
-    late = np.flatnonzero((turned >= pi) & np.isfinite(positions).all(axis=1))
-    if not len(late) or turned[late[-1]] - pi < MIN_FITTED_ARC:
+    since = max(pi, float(np.max(turned)) - pi)  # the turn is steadiest at its end
+    late = np.flatnonzero((turned >= since) & np.isfinite(positions).all(axis=1))
+    if not len(late) or turned[late[-1]] - since < MIN_FITTED_ARC:
         return otherwise
     points = positions[late] - positions[late].mean(axis=0)
     matrix = np.column_stack((2 * points, np.ones(len(points))))

@@ -23,6 +23,7 @@ APPROACH_SECS = 60.0  # before an execute
 MIN_STRAIGHT_SECS = 15.0
 MAX_STRAIGHT_YAW = radians(6.0)  # range of the heading on a stretch that counts as straight
 MAX_MEAN_DRIFT = 0.004  # of the speed: sway of a ship that is steered straight
+BLOCK_SECS, MAX_BLOCK_YAW = 30.0, radians(10.0)  # of a log with a measured sway
 POSITION_DRIFT = 0.5  # m, slow error of positions over a stretch
 WIDE_CURRENT_STD = 1.5  # m/s, before any equation
 PAIR_ANGLE, FIRST_PAIR_ANGLE = 2 * pi, pi
@@ -116,6 +117,13 @@ def _straight_equations(
 ) -> Iterator[_Equation]:
     """Yield an equation for each approach and each straight run."""
     ends = [0]
+    if signals.has("sway"):  # then the velocity through the water is known in turns, too
+        block = round(BLOCK_SECS / signals.dt_secs)
+        for first in range(0, len(signals) - block + 1, block):
+            equation = _straight_equation(signals, first, first + block, max_yaw=MAX_BLOCK_YAW)
+            if equation is not None:
+                yield equation
+        return
     for each in found:
         if each.kind in (ManoeuvreKind.STRAIGHT, ManoeuvreKind.SPEED_RUN):
             span = each.execute, each.end
@@ -128,13 +136,18 @@ def _straight_equations(
             yield equation
 
 
-def _straight_equation(signals: TrialSignals, first: int, end: int) -> _Equation | None:
+def _straight_equation(
+    signals: TrialSignals, first: int, end: int, *, max_yaw: float = MAX_STRAIGHT_YAW
+) -> _Equation | None:
     dt, secs = signals.dt_secs, (end - 1 - first) * signals.dt_secs
     heading = signals.heading[first:end]
-    if secs < MIN_STRAIGHT_SECS or np.ptp(heading) > MAX_STRAIGHT_YAW:
+    if secs < MIN_STRAIGHT_SECS or np.ptp(heading) > max_yaw:
         return None
     time = np.arange(end - first) * dt
-    north, east = np.polyfit(time, signals.positions[first:end], 1)[0]
+    if np.ptp(heading) > MAX_STRAIGHT_YAW:  # a line through a bent track is not its chord
+        north, east = (signals.positions[end - 1] - signals.positions[first]) / secs
+    else:
+        north, east = np.polyfit(time, signals.positions[first:end], 1)[0]
     count = max(2.0, secs / signals.interval("positions"))
     position_noise = signals.noise.get("position", 0.0)
     std = float(np.hypot(position_noise * np.sqrt(12 / count), POSITION_DRIFT)) / secs

@@ -81,7 +81,6 @@ def analyse_trial(
         trial_options.start_rule,
         trial_options.moved_angle,
         trial_options.execute_secs,
-        trial_options.order_delay_std,
     )
     settings = AssessmentSettings(
         rules,

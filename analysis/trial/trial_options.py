@@ -31,9 +31,6 @@ class TrialOptions:
     current_std
         Assumed standard deviation of each component of a current that the log does not
         determine, m/s.
-    order_delay_std
-        Assumed standard deviation of the time from an order to the rudder's movement, s, where
-        the log has no orders.
     """
 
     start_rule: StartRule = StartRule.ORDER
@@ -45,7 +42,6 @@ class TrialOptions:
     compass_bias_std: float = radians(0.5)
     speed_scale_std: float = 0.02
     current_std: float = 0.25
-    order_delay_std: float = 0.25
 
 
 DEFAULT_TRIAL_OPTIONS = TrialOptions()

@@ -1,0 +1,1 @@
+"""Ships by published equations, independent of those of shiplog, and sea trials with them."""
