@@ -24,7 +24,7 @@ from .sailed_manoeuvre import (
 from .spirals import spiral_curve
 from .start_rules import RuleSettings, find_executes
 from .trial_index import TrialIndex
-from .trial_signals import TrialSignals, filled_signals, longest_gap
+from .trial_signals import SIGNAL_NAMES, TrialSignals, filled_signals, longest_gap
 from .water_velocity import AssumedErrors, VelocityErrors
 from .zigzag import FINE_SWITCH_STEP, SWITCH_STEP
 
@@ -48,7 +48,8 @@ SYMBOLS = {
 }  # fmt: skip
 UNITS = {
     "drift angle": "rad", "heading change": "rad", "loop width": "rad", "loop height": "rad/s",
-    "speed loss": "1", "revolutions": "rpm", "period": "s", "reach": "s", "transfer": "m",
+    "speed loss": "1", "power": "W",
+    "revolutions": "rpm", "period": "s", "reach": "s", "transfer": "m",
     "advance": "m", "lateral deviation": "m",
 }  # fmt: skip
 UNIT_WORDS = (
@@ -239,6 +240,8 @@ class _Part:
             reasons["track"] = "no position in the log"
         if not signals.has("speed"):
             reasons["speed"] = "no speed through the water in the log"
+        if not signals.has("power"):
+            reasons["power"] = "no power in the log"
         if not signals.has("rpm"):
             reasons["revolutions"] = "no revolutions in the log"
         return reasons
@@ -279,8 +282,7 @@ def _thinned(signals: TrialSignals, step: int) -> TrialSignals:
     """Return every `step`-th sample."""
     if step == 1:
         return signals
-    names = ("rudder", "heading", "yaw_rate", "speed", "sway", "positions", "rudder_order", "rpm")
-    arrays = {name: getattr(signals, name)[::step] for name in names}
+    arrays = {name: getattr(signals, name)[::step] for name in SIGNAL_NAMES}
     return replace(signals, dt_secs=signals.dt_secs * step, **arrays)
 
 

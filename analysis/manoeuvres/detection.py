@@ -33,6 +33,7 @@ PULL_OUT_HELM = radians(1.0)  # of the rudder held midships, noise aside
 FULL_TURN = radians(210.0)  # with less rudder than `HARD_RUDDER`, a shorter turn changes course
 HARD_RUDDER = radians(25.0)
 MAX_RETURN = radians(30.0)  # beyond twice the heading of a zig-zag's reversal, with no reversal
+MAX_RECOVERY_SECS = 150.0
 INITIAL_TURN = radians(10.0)
 INITIAL_TURN_RUDDER, RUDDER_TOLERANCE = radians(10.0), radians(0.9)
 MIN_MOVING_SPEED = 0.5  # m/s: a slower ship is stopped
@@ -89,7 +90,9 @@ def detect_manoeuvres(signals: TrialSignals) -> Detection:
         for each in find_reverse_spirals(rate, neutral, filled.dt_secs)
         if not _overlaps(each, found) and is_steered(filled.rudder, each)
     ]
-    found += find_straight_runs(filled, found)
+    straight = find_straight_runs(filled, found)
+    # between manoeuvres a straight run is an approach or a recovery
+    found += [run for run in straight if not found or run.kind is ManoeuvreKind.SPEED_RUN]
     return Detection(tuple(sorted(found, key=lambda each: each.execute)), neutral, tuple(rejected))
 
 
@@ -102,7 +105,7 @@ class _RudderScan:
 
     def __init__(self, signals: TrialSignals, levels: list[HeldLevel], neutral: float) -> None:
         self._signals, self._dt = signals, signals.dt_secs
-        self._neutral = neutral
+        self._neutral, self._recovery = neutral, -1
         passing = PASSING_SECS / self._dt
         self._levels = [
             held
@@ -125,8 +128,12 @@ class _RudderScan:
             if zigzag is not None:
                 yield zigzag
                 k += len(chain)
+                self._recovery = k
             else:
-                yield from self._single(k)
+                for each in self._single(k):
+                    yield each
+                    if isinstance(each, FoundManoeuvre):
+                        self._recovery = k + 1
                 k += 1
 
     def _is_over(self, held: HeldLevel) -> bool:
@@ -196,6 +203,9 @@ class _RudderScan:
             yield self._rejected(held, "the log begins with the rudder held over")
             return
         if not self._has_approach(k):
+            secs = (held.last - held.first) * self._dt
+            if k == self._recovery and secs < MAX_RECOVERY_SECS:
+                return  # the ship is steadied after a manoeuvre
             before = degrees(self._approach_level(k) - self._neutral)
             yield self._rejected(held, f"the rudder is at {before:.0f}° before it: no approach")
             return

@@ -27,7 +27,7 @@ NOISE, VELOCITY, START, APPROACH, GYRO = (
     "gyro bias",
 )  # fmt: skip
 GYRO_BIAS_STD = np.radians(0.005)  # rad/s, of a heading that is the integral of the yaw rate
-HELM_CORRELATION_SECS = 15.0  # of the heading under helm
+HELM_CORRELATION_SECS = 25.0  # of the heading under helm
 WANDER_SECS = 30.0
 SAMPLED = ("heading", "yaw_rate", "speed", "sway", "positions")
 

@@ -235,6 +235,7 @@ def straight_values(case: IndexCase) -> dict[str, float]:
     secs = (part.stop - 1 - part.start) * signals.dt_secs
     values["speed by track"] = float(length) / secs
     values["revolutions"] = float(np.mean(signals.rpm[part]))
+    values["power"] = float(np.mean(signals.power[part]))
     return values
 
 

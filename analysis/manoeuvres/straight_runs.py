@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import pairwise
 from math import pi, radians
 
 import numpy as np
@@ -45,9 +45,9 @@ def find_straight_runs(
     ]
     paired = {
         k
-        for (i, one), (j, other) in combinations(enumerate(runs), 2)
-        if is_double_run(signals, one, other)
-        for k in (i, j)
+        for i, (one, other) in enumerate(pairwise(runs))
+        if is_double_run(signals, one, other) and not _lies_between(one, other, others)
+        for k in (i, i + 1)
     }
     long_enough = MIN_STRAIGHT_SECS / signals.dt_secs
     return [
@@ -67,6 +67,13 @@ def is_double_run(signals: TrialSignals, one: FoundManoeuvre, other: FoundManoeu
         return True
     rpm = [_mean(signals.rpm, run) for run in (one, other)]
     return abs(rpm[0] - rpm[1]) <= SAME_RPM * max(map(abs, rpm))
+
+
+def _lies_between(
+    one: FoundManoeuvre, other: FoundManoeuvre, manoeuvres: Sequence[FoundManoeuvre]
+) -> bool:
+    """Whether a manoeuvre was sailed from the end of one run to the beginning of the other."""
+    return any(one.end <= each.execute < other.execute for each in manoeuvres)
 
 
 def _mean(values: FloatArray, run: FoundManoeuvre) -> float:

@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from math import pi
 
-DISPLAY = {"rad": ("°", 57.29577951308232), "rad/s": ("°/s", 57.29577951308232)}
+DISPLAY = {"rad": ("°", 180 / pi), "rad/s": ("°/s", 180 / pi), "W": ("kW", 1e-3)}
 
 
 class Verdict(StrEnum):
@@ -53,7 +54,7 @@ class TrialIndex:
     value
         In `unit`; the best estimate, with all corrections.
     unit
-        The SI unit: m, s, rad, rad/s, m/s, or 1.
+        The SI unit: m, s, rad, rad/s, m/s, W, or 1; rpm of revolutions.
     std
         Standard uncertainty, in `unit`; NaN where it cannot be estimated.
     low, high

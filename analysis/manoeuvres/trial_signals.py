@@ -33,6 +33,8 @@ class TrialSignals:
         (n, 2) north and east over the ground, m.
     rpm
         (n,) propeller revolutions, per minute.
+    power
+        (n,) delivered to the shaft, W.
     intervals
         Sampling interval of each channel, s, by its name.
     noise
@@ -50,6 +52,7 @@ class TrialSignals:
     positions: FloatArray
     rudder_order: FloatArray
     rpm: FloatArray
+    power: FloatArray
     intervals: Mapping[str, float] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     events: tuple[tuple[float, str], ...] = ()
@@ -77,7 +80,7 @@ class TrialSignals:
 
 
 SIGNAL_NAMES = (
-    "rudder", "heading", "yaw_rate", "speed", "sway", "positions", "rudder_order", "rpm",
+    "rudder", "heading", "yaw_rate", "speed", "sway", "positions", "rudder_order", "rpm", "power",
 )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.manoeuvres.assessment import STEERED, AssessmentSettings, assess
 from analysis.manoeuvres.detection import Detection, detect_manoeuvres
+from analysis.manoeuvres.double_runs import with_double_runs
 from analysis.manoeuvres.imo_criteria import RULES, CriterionRule, limit
 from analysis.manoeuvres.sailed_manoeuvre import NotComputed, SailedManoeuvre
 from analysis.manoeuvres.start_rules import RuleSettings
@@ -92,6 +93,7 @@ def analyse_trial(
     for number, found in enumerate(detection.manoeuvres, 1):
         manoeuvres.append(assess(record.signals, found, number, errors, settings))
         on_progress("compute the indices", number / len(detection.manoeuvres))
+    manoeuvres = with_double_runs(filled, detection.manoeuvres, manoeuvres)
     return TrialAnalysis(
         name=record.name,
         start_ns=record.start_ns,

@@ -18,7 +18,7 @@ from shiplog.vessel.vessel import Vessel, with_length
 from shiplog.vessel.vessel_parser import parse_vessel
 
 STEERING = ("rudder", "rudder_order", "heading", "yaw_rate")
-MOTION = ("speed", "sway", "rpm")
+MOTION = ("speed", "sway", "rpm", "power")
 WIND = ("wind_speed", "wind_direction")
 MIN_STEP_SECS, MAX_STEP_SECS = 0.1, 1.0
 MAX_SAMPLES = 250_000  # of the clock: a longer log has a coarser one

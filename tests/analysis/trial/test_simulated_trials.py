@@ -203,3 +203,20 @@ def test_a_stopped_ship_is_named() -> None:
     trial = analysed(as_log(sailed, replace(GOOD, speed=0.01), rng()), SEIUN_MARU)
     assert trial.manoeuvres == ()
     assert any("stopped" in each.reason for each in trial.not_computed)
+
+
+def test_the_mean_of_a_double_run_is_free_of_the_current() -> None:
+    def there_and_back(time: float, heading: float, yaw_rate: float, rudder: float) -> float:
+        return keeping(MARINER, 0.0 if time < 300.0 else pi)(time, heading, yaw_rate, rudder)
+
+    sailed = sail(MARINER, there_and_back, 1100.0)
+    log = as_log(sailed, GOOD, rng(), current=(0.6, 0.1))
+    at = log["rpm"]
+    power = replace(at, name="power", unit="W", values=5e6 + 0.0 * at.values)
+    trial = analysed(replace(log, channels=(*log.channels, power)), MARINER)
+    speed = trial.manoeuvres[-1].index("speed of the double run")
+    shaft = trial.manoeuvres[-1].index("power of the double run")
+    assert speed is not None
+    assert shaft is not None
+    assert speed.value == pytest.approx(MARINER.speed, rel=0.01)
+    assert shaft.value == pytest.approx(5e6)
