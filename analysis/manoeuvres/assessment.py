@@ -9,7 +9,6 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
-from .execute import SMOOTHING_SHARE
 from .found_manoeuvre import FoundManoeuvre
 from .imo_criteria import criterion_of, probability_below
 from .index_uncertainty import COVERAGE_FACTOR, IndexInputs, index_stds, index_values
@@ -31,6 +30,8 @@ from .zigzag import FINE_SWITCH_STEP, SWITCH_STEP
 MARGIN_SECS = 90.0  # of the approach, before the execute
 TAIL_SECS = 10.0
 MAX_PART_SAMPLES = 2400  # of a manoeuvre, from which its indices are computed
+# half widths of a heading's smoothing: of the shortest time from side to side, of a quarter turn
+ZIGZAG_SMOOTHING, CIRCLE_SMOOTHING = 1 / 10, 1 / 16
 OTHER_HALF_SECS = 5.0  # half width of the smoothing where nothing else determines it
 MAX_HALF_SECS = 30.0
 NOTED_GAP_SECS = 5.0
@@ -223,11 +224,11 @@ class _Part:
             ends = [*found.reversals, found.end]
             spans = np.diff(ends)
             shortest = min(float(np.min(spans)), 2.0 * (found.reversals[0] - found.execute))
-            return min(SMOOTHING_SHARE * shortest * dt, MAX_HALF_SECS)
+            return min(ZIGZAG_SMOOTHING * shortest * dt, MAX_HALF_SECS)
         turned = np.abs(self.filled.heading - self.filled.heading[found.execute])
         quarter = np.flatnonzero(turned[found.execute :] >= np.pi / 2)
         if found.kind is ManoeuvreKind.TURNING_CIRCLE and len(quarter):
-            return min(SMOOTHING_SHARE * float(quarter[0]) * dt, MAX_HALF_SECS)
+            return min(CIRCLE_SMOOTHING * float(quarter[0]) * dt, MAX_HALF_SECS)
         return OTHER_HALF_SECS
 
     def missing(self) -> dict[str, str]:

@@ -95,7 +95,7 @@ def find_executes(
     at_order = _order_execute(signals, found) if by_rudder else _other_execute(signals, found)
     rules: dict[StartRule, Execute] = {StartRule.ORDER: at_order}
     if by_rudder:
-        started, ramp_std = ramp_start(signals.rudder, found.execute, found.movement, dt)
+        started, ramp_std = _rudder_start(signals, found)
         moved = moved_sample(signals.rudder, found, started, settings.moved_angle, dt)
         if np.isfinite(moved):
             name = f"rudder moved {np.degrees(settings.moved_angle):.1f}°"
@@ -126,15 +126,22 @@ def _order_execute(signals: TrialSignals, found: FoundManoeuvre) -> Execute:
         if np.isfinite(ordered):
             interval = signals.interval("rudder_order") / np.sqrt(12.0)
             return Execute(ordered, "rudder order (channel)", interval)
-    started, std = ramp_start(signals.rudder, found.execute, found.movement, signals.dt_secs)
+    started, std = _rudder_start(signals, found)
     return Execute(started, "rudder order (beginning of the rudder's movement)", std)
+
+
+def _rudder_start(signals: TrialSignals, found: FoundManoeuvre) -> tuple[float, float]:
+    """Return where the rudder begins to move, and the uncertainty of the instant, s."""
+    noise = signals.noise.get("rudder", 0.0)
+    return ramp_start(signals.rudder, found.execute, found.movement, signals.dt_secs, noise)
 
 
 def _other_execute(signals: TrialSignals, found: FoundManoeuvre) -> Execute:
     """Return the execute of a manoeuvre that no order of the rudder begins."""
     if found.kind in (ManoeuvreKind.STOPPING, ManoeuvreKind.ACCELERATION):
         side = -1.0 if found.kind is ManoeuvreKind.STOPPING else 1.0
-        started, std = ramp_start(signals.rpm, found.execute, side, signals.dt_secs)
+        noise = signals.noise.get("rpm", 0.0)
+        started, std = ramp_start(signals.rpm, found.execute, side, signals.dt_secs, noise)
         return Execute(started, "beginning of the revolutions' change", std)
     spiral = found.kind in (ManoeuvreKind.DIRECT_SPIRAL, ManoeuvreKind.REVERSE_SPIRAL)
     rule = "end of the approach" if spiral else "beginning of the steady run"
@@ -156,7 +163,9 @@ def order_sample(order: FloatArray, found: FoundManoeuvre, dt: float) -> float:
     return first + last_below + float(share)
 
 
-def ramp_start(values: FloatArray, leaves: int, side: float, dt: float) -> tuple[float, float]:
+def ramp_start(
+    values: FloatArray, leaves: int, side: float, dt: float, noise: float = 0.0
+) -> tuple[float, float]:
     """Find where the movement of a rudder, or of the revolutions, begins.
 
     A line is laid through the ramp, and one through the helm before it; they meet at the
@@ -172,6 +181,9 @@ def ramp_start(values: FloatArray, leaves: int, side: float, dt: float) -> tuple
         1 for a movement up (to starboard), -1 down.
     dt
         Sample interval, s.
+    noise
+        Standard deviation of the noise, in the unit of the values: with few samples, the scatter
+        about a line may be smaller by chance.
 
     Returns
     -------
@@ -192,8 +204,9 @@ def ramp_start(values: FloatArray, leaves: int, side: float, dt: float) -> tuple
     first, last = (int(np.argmax(ahead > share * target)) for share in RAMP_SHARES)
     if last - first < 2:  # a step: somewhere within two samples
         return float(max(0, leaves + first - 1)), dt / np.sqrt(3.0)
-    ramp = _line(np.arange(leaves + first, leaves + last + 1), ahead[first : last + 1] + helm)
-    level = _line(np.arange(since, leaves + 1), before)
+    ramp_samples = np.arange(leaves + first, leaves + last + 1)
+    ramp = _line(ramp_samples, ahead[first : last + 1] + helm, noise)
+    level = _line(np.arange(since, leaves + 1), before, noise)
     rise = ramp.slope - level.slope
     met = (level.intercept - ramp.intercept) / rise if rise > 0 else np.inf
     if not leaves + first - 2 * window <= met <= leaves + first:
@@ -218,15 +231,16 @@ class _Line:
         return self.scatter * float(np.sqrt(1 / self.count + (x - self.mean) ** 2 / self.square))
 
 
-def _line(x: NDArray[np.int64], y: FloatArray) -> _Line:
+def _line(x: NDArray[np.int64], y: FloatArray, noise: float) -> _Line:
     """Lay a line through k samples; through less than three, a level."""
     if len(x) < 3:
-        return _Line(0.0, float(np.mean(y)), float(np.ptp(y)), len(x), float(x[-1]), 1.0)
+        scatter = max(float(np.ptp(y)), noise)
+        return _Line(0.0, float(np.mean(y)), scatter, len(x), float(x[-1]), 1.0)
     slope, intercept = np.polyfit(x, y, 1)
     scatter = float(np.sqrt(np.sum((y - slope * x - intercept) ** 2) / (len(x) - 2)))
     mean = float(np.mean(x))
     square = float(np.sum((x - mean) ** 2))
-    return _Line(float(slope), float(intercept), scatter, len(x), mean, square)
+    return _Line(float(slope), float(intercept), max(scatter, noise), len(x), mean, square)
 
 
 def moved_sample(
