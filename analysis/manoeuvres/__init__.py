@@ -1,6 +1,7 @@
-"""Manoeuvring indices of one run: turning circles and zig-zags.
+"""Manoeuvres of a trial: detection, indices with their uncertainty, and the limits of the norms.
 
-The folder recognises the manoeuvre by its rudder and heading and computes the indices of IMO
-MSC.137(76): advance, transfer, tactical diameter, overshoots, initial turning time, period. Arrays
-in, numbers out, SI. It imports nothing else of `analysis`, and no log or segment types.
+`detection` finds what was sailed in signals of any length, `assessment` computes the indices of one
+manoeuvre (IMO MSC.137(76), ITTC 7.5-04-02-01) with their intervals and verdicts; `indices` compares
+those of a measured and a simulated run. Arrays in, results out, SI. It imports nothing else of
+`analysis`, and no log or segment types.
 """

@@ -214,7 +214,7 @@ def _sampled_anew(signals: TrialSignals, rng: np.random.Generator) -> TrialSigna
 
 
 def _deviation(values: Mapping[str, float], draws: list[dict[str, float]]) -> dict[str, float]:
-    """Return the root mean square deviation of the draws from their own mean, and its excess."""
+    """Return the standard deviation of each index over the draws."""
     found = {}
     for name in values:
         drawn = np.array([each[name] for each in draws])

@@ -78,7 +78,7 @@ class ManoeuvreSeries:
     yaw_rate
         (n,) rad/s.
     speed
-        (n,) ahead through the water or, without a log, over the ground, m/s.
+        (n,) ahead through the water, m/s.
     drift
         (n,) drift angle, positive where the bow points into the turn to starboard, rad.
     rpm

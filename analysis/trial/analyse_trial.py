@@ -5,10 +5,12 @@ from math import nan
 
 import numpy as np
 
-from analysis.manoeuvres.assessment import STEERED, AssessmentSettings, assess
+from analysis.manoeuvres.assessment import AssessmentSettings, assess
 from analysis.manoeuvres.detection import Detection, detect_manoeuvres
 from analysis.manoeuvres.double_runs import with_double_runs
 from analysis.manoeuvres.imo_criteria import RULES, CriterionRule, limit
+from analysis.manoeuvres.manoeuvre_part import STEERED
+from analysis.manoeuvres.manoeuvre_values import mean_before
 from analysis.manoeuvres.sailed_manoeuvre import NotComputed, SailedManoeuvre
 from analysis.manoeuvres.start_rules import RuleSettings
 from analysis.manoeuvres.trial_index import TrialIndex
@@ -23,6 +25,7 @@ from .trial_options import DEFAULT_TRIAL_OPTIONS, TrialOptions
 from .trial_record import TrialRecord, read_trial
 
 CONDITION_PREFIX = "condition."
+GROUND_SPEED_SECS = 30.0  # of an approach, over which a speed over the ground is taken
 STOPPED_SPEED = 0.5  # m/s: a ship that is never faster does not move
 NOT_TESTED = {
     "advance": "no turning circle at 35° or the largest angle",
@@ -85,7 +88,6 @@ def analyse_trial(
     )
     settings = AssessmentSettings(
         rules,
-        assumed,
         (trial_options.antenna_forward, trial_options.antenna_starboard),
         {"length": conditions.length, "test_speed": conditions.test_speed},
     )
@@ -159,14 +161,16 @@ def _test_speed(
         return number, "stated in the log"
     steered = [each for each in detection.manoeuvres if each.kind in STEERED]
     used = steered or list(detection.manoeuvres)
-    if not used or not filled.has("speed"):
+    if used and filled.has("speed"):
+        speeds = [mean_before(filled.speed, each.execute, filled.dt_secs) for each in used]
+        return float(np.mean(speeds)), "mean of the approach speeds"
+    back = round(GROUND_SPEED_SECS / filled.dt_secs)
+    spans = [(each.execute - back, each.execute) for each in used if each.execute >= back > 0]
+    if not spans or not filled.has("positions"):
         return nan, ""
-    back = max(1, round(10.0 / filled.dt_secs))
-    speeds = [
-        float(np.mean(filled.speed[max(0, each.execute - back) : each.execute + 1]))
-        for each in used
-    ]
-    return float(np.mean(speeds)), "mean of the approach speeds"
+    legs = [filled.positions[last] - filled.positions[first] for first, last in spans]
+    ground = np.mean(np.hypot(*np.transpose(legs))) / (back * filled.dt_secs)
+    return float(ground), "mean of the approach speeds over the ground"
 
 
 def _criterion(

@@ -1,0 +1,77 @@
+"""What the figures of a manoeuvre show: time histories, track, and instants to be marked."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from shiplog.types import FloatArray
+
+from .manoeuvre_part import TAIL_SECS, ManoeuvrePart
+from .manoeuvre_values import IndexCase
+from .sailed_manoeuvre import ManoeuvreKind, ManoeuvreMark, ManoeuvreSeries
+from .trial_index import TrialIndex
+
+EXECUTED = (ManoeuvreKind.STOPPING, ManoeuvreKind.ACCELERATION)
+
+
+def manoeuvre_series(part: ManoeuvrePart, case: IndexCase) -> ManoeuvreSeries:
+    """Return the time histories for the figures."""
+    signals, measured = case.signals, part.filled
+    count = min(len(signals), part.found.end + round(TAIL_SECS / signals.dt_secs))
+    none = np.empty(0)
+
+    def shown(name: str) -> FloatArray:
+        values: FloatArray = getattr(measured, name)[:count]
+        return values if np.isfinite(values).sum() > 1 else none
+
+    track = np.empty((0, 2))
+    if measured.has("positions"):
+        samples = np.arange(len(signals))
+        start = [np.interp(case.execute, samples, column) for column in signals.positions.T]
+        made = (signals.positions[:count] - start) @ [1, 1j] * np.exp(-1j * case.approach)
+        track = np.column_stack((made.real, made.imag))
+    drift = (
+        -np.arctan2(signals.sway[:count], signals.speed[:count])
+        if signals.has("sway") and signals.has("speed")
+        else none
+    )
+    change = signals.heading[:count] - case.approach
+    return ManoeuvreSeries(
+        time_secs=(np.arange(count) - case.execute) * signals.dt_secs,
+        rudder=shown("rudder"),
+        rudder_order=shown("rudder_order"),
+        heading_change=change if np.isfinite(change).any() else none,
+        yaw_rate=shown("yaw_rate"),
+        speed=shown("speed"),
+        drift=drift,
+        rpm=shown("rpm"),
+        track=track,
+    )
+
+
+def manoeuvre_marks(
+    part: ManoeuvrePart, case: IndexCase, indices: tuple[TrialIndex, ...]
+) -> tuple[ManoeuvreMark, ...]:
+    """Return the instants that the figures mark."""
+    dt, found = case.signals.dt_secs, part.found
+    marks = [ManoeuvreMark("execute", 0.0)] if part.side or found.kind in EXECUTED else []
+    marks += [
+        ManoeuvreMark(f"execute {k}", (at - case.execute) * dt)
+        for k, at in enumerate(found.reversals, 2)
+    ]
+    marks += [
+        ManoeuvreMark(index.name.removeprefix("time to "), index.value)
+        for index in indices
+        if index.name.startswith("time to ") and index.name.endswith("°")
+    ]
+    if found.kind is ManoeuvreKind.ZIGZAG:
+        change = case.signals.heading - case.approach
+        edges = [*found.reversals, found.end]
+        for k, (start, stop) in enumerate(pairwise(edges), 1):
+            if any(index.name == f"overshoot {k}" for index in indices):
+                peak = start + int(np.argmax(np.abs(change[start:stop])))
+                marks.append(ManoeuvreMark(f"overshoot {k}", (peak - case.execute) * dt))
+    marks += [
+        ManoeuvreMark("stopped", index.value) for index in indices if index.name == "stopping time"
+    ]
+    return tuple(sorted(marks, key=lambda mark: mark.time_secs))
