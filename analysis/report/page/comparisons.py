@@ -29,6 +29,7 @@ from .value_text import NOT_KNOWN, half_width_text
 KNOT = UNITS["kn"][1]  # m/s
 DASHES: tuple[tuple[float, ...], ...] = ((), (6, 1.5), (2, 1.5), (6, 1.5, 1, 1.5))
 PANEL_INCHES = 1.05
+MAX_COLUMNS = 4  # of manoeuvres side by side on A4
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +42,14 @@ class ManoeuvreComparison:
         Of the section.
     figures
         Time histories and tracks, aligned at the execute.
-    table
-        The indices side by side.
+    tables
+        The indices side by side, of so many manoeuvres in each as A4 is wide.
     """
 
     anchor: str
     title: str
     figures: tuple[PageFigure, ...]
-    table: TextTable
+    tables: tuple[TextTable, ...]
 
 
 # (heading, title) of a panel, its values in the order of sides, and the factor to its unit
@@ -105,7 +106,9 @@ def _comparison(group: Sequence[ManoeuvrePlace], length: float, anchor: str) -> 
         _track_figure(group, length, f"{anchor}-tracks", title),
     )
     shown = tuple(figure for figure in figures if figure is not None)
-    return ManoeuvreComparison(anchor, title, shown, _index_table(group, title))
+    parts = [group[i : i + MAX_COLUMNS] for i in range(0, len(group), MAX_COLUMNS)]
+    tables = tuple(_index_table(part, title) for part in parts)
+    return ManoeuvreComparison(anchor, title, shown, tables)
 
 
 def _label(place: ManoeuvrePlace) -> str:
@@ -198,6 +201,7 @@ def _index_table(group: Sequence[ManoeuvrePlace], title: str) -> TextTable:
     names = dict.fromkeys(index.name for place in group for index in place.manoeuvre.indices)
     rows = [(name, *(_cell(place, name) for place in group)) for name in names]
     columns = ("index", *(f"{_label(place)}\n(log {place.log_number})" for place in group))
+    title += f", manoeuvres {', '.join(str(place.position) for place in group)}"
     remark = "Values with half the width of their 95 % interval."
     return TextTable(f"Indices side by side: {title}", columns, tuple(rows), (remark,))
 

@@ -21,7 +21,7 @@ WIDTH_INCHES = 7.0  # of a figure: the text's width on A4
 MARGINS_INCHES = (0.7, 0.6, 0.45, 0.3)  # left, right, below, above
 CHART_INCHES = WIDTH_INCHES - MARGINS_INCHES[0] - MARGINS_INCHES[1]  # width of the axes
 GAP_INCHES = 0.12  # between panels
-LABEL_SHARE = 0.085  # of the width of the axes, from them to their vertical labels
+LABEL_SHARE = 0.1  # of the width of the axes, from them to their vertical labels
 # a colour that no figure uses otherwise, and the variable of the page that takes its place
 INK, MUTED, GRID, PAPER = "#010101", "#010102", "#010103", "#010104"
 SERIES = ("#010111", "#010112", "#010113", "#010114", "#010115", "#010116")

@@ -26,16 +26,16 @@ def number_text(value: float, std: float, most: int = 6) -> str:
 
     Examples
     --------
-    >>> number_text(999.273, 8.1), number_text(15.114, float("nan")), number_text(0.0, 0.0)
-    ('999.3', '15.1', '0')
+    >>> number_text(999.273, 8.1), number_text(15.114, float("nan")), number_text(-1e-9, 0.1)
+    ('999.3', '15.1', '0.00')
     """
     if not isfinite(value):
         return NOT_KNOWN
     if isfinite(std) and std > 0:
-        return f"{value:.{min(decimals(std), most)}f}"
+        return f"{value:z.{min(decimals(std), most)}f}"
     if value == 0:
         return "0"
-    return f"{value:.{min(max(DIGITS - 1 - floor(log10(abs(value))), 0), most)}f}"
+    return f"{value:z.{min(max(DIGITS - 1 - floor(log10(abs(value))), 0), most)}f}"
 
 
 def index_text(index: TrialIndex, value: float) -> str:

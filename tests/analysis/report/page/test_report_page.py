@@ -128,6 +128,12 @@ def test_manoeuvres_to_both_sides_are_compared_with_port_mirrored() -> None:
     assert "Zig-zag 10°/10°" not in page().split('id="comparisons"')[1].split("<h2")[0]
 
 
+def test_many_manoeuvres_of_a_kind_stand_in_tables_that_fit_on_a_page() -> None:
+    many = report_page(trial_report(reported_log(*[circle() for _ in range(6)])))
+    titles = re.findall(r"<caption>(Indices side by side[^<]*)", many)
+    assert [title.partition("manoeuvres ")[2] for title in titles] == ["1, 2, 3, 4", "5, 6"]
+
+
 def test_what_could_not_be_computed_is_named_with_the_reason() -> None:
     assert "initial turning distance, track: the log has no positions" in page()
     assert "no channel &#39;yaw_rate&#39; in trial.mcap" in page()
