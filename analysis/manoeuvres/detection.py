@@ -162,7 +162,10 @@ class _RudderScan:
         for held in self._levels[k + 1 :]:
             before, first = chain[-1].level - self._neutral, chain[0].level - self._neutral
             now = held.level - self._neutral
-            like = abs(abs(now) - abs(first)) <= max(LIKE_ANGLES, LIKE_ANGLES_SHARE * abs(first))
+            # equal as ordered, or from neutral where the sensor's zero is wrong
+            ordered = abs(abs(held.level) - abs(chain[0].level))
+            tolerance = max(LIKE_ANGLES, LIKE_ANGLES_SHARE * abs(first))
+            like = min(abs(abs(now) - abs(first)), ordered) <= tolerance
             secs = (held.first - chain[-1].last) * self._dt
             longest = REVERSAL_SECS + abs(now - before) / SLOWEST_GEAR
             if before * now >= 0 or not like or secs > longest or not self._is_over(held):

@@ -115,6 +115,19 @@ def test_an_order_channel_gives_the_execute_with_a_slow_gear_and_noise(helm_deg:
         assert ("channel" in found.start_rule) is orders
 
 
+@pytest.mark.parametrize("zero_deg", [-2.0, 2.0])
+def test_a_wrong_zero_of_the_rudder_s_sensor_hides_no_zigzag(zero_deg: float) -> None:
+    sailed, _ = sailed_zigzag("seiun-maru", 10.0, -1.0, helm_deg=0.8)
+    log = as_log(sailed, GOOD, rng(6))
+    shifted = [
+        replace(each, values=each.values + radians(zero_deg)) if each.name == "rudder" else each
+        for each in log
+    ]
+    trial = analysed(replace(log, channels=tuple(shifted)), sailed.ship)
+    assert kinds(trial) == [ManoeuvreKind.ZIGZAG]
+    assert degrees(trial.manoeuvres[0].rudder) == pytest.approx(-10.0)
+
+
 def keeping(ship: TrialShip, course: float = 0.0, limit: float = 0.15) -> Callable[..., float]:
     def helmsman(_time: float, heading: float, yaw_rate: float, _rudder: float) -> float:
         keep = -0.5 * (heading - course) - 15.0 * yaw_rate
