@@ -82,6 +82,7 @@ def fork(work: Callable[[], int]) -> int:
     child = os.fork()
     if child:
         return child
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # which nohup ignores
     try:
         code = int(work())
         sys.stdout.flush()

@@ -94,6 +94,11 @@ COMMANDS = {  # a further verb is a further row
         "check changed.mcap", "changed.check.rrd", code=ExitCode.FAILURE
     ),
     "check --update": _command("check new.mcap --update", "new.ref.mcap"),
+    "report": _command(
+        "report trial.mcap -o out.html --json out.json", "out.html", "out.json"
+    ),
+    "view": _command("view trial.mcap -o out.rrd", "out.rrd"),
+    "convert to kml": _command("convert raw.mcap out.kml", "out.kml"),
     "layout": _command("layout bridge.csv -o out.toml", "out.toml"),
     "decode": _command("decode raw.mcap -o out.mcap", "out.mcap"),
     "recover": _command("recover cut.mcap -o out.mcap", "out.mcap", code=ExitCode.DATA_LOST),
