@@ -22,6 +22,7 @@ from shiplog.errors import LogError
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model, ship_model
 from shiplog.ships.paper import COEFFICIENT_UNITS, YAW_COEFFICIENTS, Coefficients, rudder_effect
+from shiplog.toml_output import toml_string
 from shiplog.vessel.model_section import PAPER_MODELS
 from shiplog.vessel.vessel import Vessel
 
@@ -151,7 +152,7 @@ def _head(ship: IdentifiedShip) -> Iterator[str]:
     logs = ", ".join(dict.fromkeys(segment.name for segment in segments))
     name = f"{vessel.name if vessel else 'ship'}, identified"
     yield f"# {ship.model.title}, identified from {logs}"
-    yield f"name = {_quoted(name)}"
+    yield f"name = {toml_string(name)}"
     if vessel is not None and vessel.length is not None:
         yield f"length = {vessel.length!r}"
     elif ship.model.dimensionless:
@@ -171,7 +172,7 @@ def _model_section(ship: IdentifiedShip) -> Iterator[str]:
     comment = _comments(ship.uncertainty, converged=ship.fit.minimum.converged)
     yield "\n# `shiplog record simulate` uses this model."
     yield "[model]"
-    yield f"name = {_quoted(ship.model.name)}"
+    yield f"name = {toml_string(ship.model.name)}"
     yield f"speed = {scale.speed!r}  # m/s; with length and rpm, the scale of the parameters"
     yield f"rpm = {scale.rpm!r}"
     for name, value in ship.parameters.items():
@@ -242,10 +243,3 @@ def _comments(
         return "fixed"
 
     return comment
-
-
-def _quoted(text: str) -> str:
-    """Return a TOML string; characters that cannot be printed become spaces."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    printable = (character if character.isprintable() else " " for character in escaped)
-    return f'"{"".join(printable)}"'

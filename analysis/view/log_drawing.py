@@ -8,8 +8,8 @@ from analysis.replay.track import RecordedTrack
 from shiplog.checks.channel_stats import ChannelStats, LogStats
 from shiplog.checks.data_quality import defect_warnings, unusable_causes
 from shiplog.checks.log_stats import compute_log_stats
-from shiplog.errors import LogError
 from shiplog.geodesy import LocalFrame
+from shiplog.mcap.trial_log import no_samples_error
 from shiplog.types import Channel, Event, EventLevel, FloatArray, Log
 
 from .channel_series import ChannelSeries, DrawnQuantity, channel_label, channels_by_quantity
@@ -87,8 +87,7 @@ def draw_log(log: Log, *, full: bool = False) -> LogDrawing:
     """
     stats = compute_log_stats(log, strict=True)
     if not any(channel.samples for channel in stats):
-        causes = "; ".join(log.warnings) or "record it again"
-        raise LogError(f"nothing to view, no samples of shiplog: {causes}: {log.name}")
+        raise no_samples_error("view", log.warnings, log.name)
     span = stats.span_ns[0], stats.duration_secs
     groups = channels_by_quantity(stats, DISPLAY_UNITS)
     drawn = {

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from shiplog.errors import LayoutError
-from shiplog.layouts.field_paths import parse_path
+from shiplog.layouts.field_paths import parse_path, path_name
 from shiplog.units import did_you_mean
 
 MAX_LISTED_ELEMENTS = 4  # of an array, in a list of paths
@@ -145,7 +145,8 @@ def _walk(value: Any, path: str, depth: int) -> Iterator[str]:  # noqa: ANN401
 def _parts(value: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
     """Yield the names and the values of what a value is made of."""
     if isinstance(value, Mapping):
-        yield from ((str(name), inner) for name, inner in value.items())
+        named = ((path_name(str(name)), inner) for name, inner in value.items())
+        yield from ((name, inner) for name, inner in named if name)
     elif is_dataclass(value):
         yield from ((each.name, getattr(value, each.name)) for each in fields(value))
     elif hasattr(value, "DESCRIPTOR"):

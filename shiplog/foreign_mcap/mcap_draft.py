@@ -13,6 +13,8 @@ from shiplog.mcap.decode import is_foreign
 from shiplog.mcap.mcap_file import open_mcap
 from shiplog.mcap.scan import scan
 from shiplog.mcap.schema import LOCATION_FIX
+from shiplog.printable import printable
+from shiplog.toml_output import toml_key, toml_string
 from shiplog.units import CATALOGUE, UNITS
 
 from .field_values import field_paths, optional_value
@@ -49,11 +51,11 @@ def draft_mcap_layout(path: Path) -> Draft:
             f"no topics of other programs, so that it needs no layout (`shiplog info`): {path}"
         )
     ready = ready_layouts()
-    lines = [f"# drafted from {_comment(path.name)}; check every unit and sense"]
+    lines = [f"# drafted from {printable(path.name)}; check every unit and sense"]
     remarks: list[str] = []
     for each in _drafted_topics(path, topics):
         topic, text = each.topic, ready.get(short_type(each.topic.type), "")
-        lines += ["", f"# ---- {_comment(topic.topic)}: {_comment(topic.type or 'no type')}"]
+        lines += ["", f"# ---- {printable(topic.topic)}: {printable(topic.type or 'no type')}"]
         if text and topic.messages and short_type(topic.type) != _NAMELESS_TYPE:
             lines += _adapted(text, each)
             remarks.append(f"{topic.topic}: sections of the type {topic.type}")
@@ -98,9 +100,9 @@ def _drafted_topics(path: Path, topics: Sequence[FileTopic]) -> list[_DraftedTop
         if source in taken:
             numbered = (f"{source}_{number}" for number in range(2, len(topics) + 2))
             source = next(name for name in numbered if name not in taken)
-        place = [f"topic = {_quoted(topic.topic)}"]
+        place = [f"topic = {toml_string(topic.topic)}"]
         if names.count(topic.topic) > 1 and topic.type:
-            place.append(f"type = {_quoted(topic.type)}")
+            place.append(f"type = {toml_string(topic.type)}")
         message, cause = _decoded(topic, samples.get(topic.record.id))
         drafted.append(_DraftedTopic(topic, source, tuple(place), message, cause))
     return drafted
@@ -142,13 +144,18 @@ def _decoded(topic: FileTopic, data: bytes | None) -> tuple[object, str]:
 
 def _adapted(text: str, drafted: _DraftedTopic) -> list[str]:
     """Return the sections of a well-known type for a topic, with its source."""
-    text = re.sub(r"^\[(\w+)\]", rf"[\1.{drafted.source}]", text, flags=re.MULTILINE)
+    text = re.sub(
+        r"^\[(\w+)\]",
+        lambda section: f"[{toml_key(section[1], drafted.source)}]",
+        text,
+        flags=re.MULTILINE,
+    )
     place = "\n".join(drafted.place)
     text = re.sub(r"^type = .*$", lambda _: place, text, flags=re.MULTILINE)
     frame = optional_value(drafted.message, "header.frame_id")
     lines = text.rstrip().split("\n")
     if isinstance(frame, str) and frame:
-        lines.insert(0, f"# frame of its messages: {_comment(frame)}")
+        lines.insert(0, f"# frame of its messages: {printable(frame)}")
         if re.search(r"(^|[_/])(ned|frd)([_/]|$)", frame.lower()):
             lines = [
                 re.sub(r'^axes = "enu"', 'axes = "ned"', re.sub("^sign = -1 ", "sign = 1  ", line))
@@ -162,7 +169,7 @@ def _sections_by_name(drafted: _DraftedTopic, remarks: list[str]) -> list[str]:
     topic, message = drafted.topic, drafted.message
     if message is None:
         remarks.append(f"{topic.topic}: {drafted.cause}")
-        return [f"# not read: {_comment(drafted.cause)}"]
+        return [f"# not read: {printable(drafted.cause)}"]
     stamps = (numeric_stamp(message), "timestamp_ns", "time", "t")
     paths = [p for p in field_paths(message) if not re.fullmatch(_STAMPS, p) and p not in stamps]
     words = {path: split_header(_name(path, topic.topic)) for path in paths}
@@ -181,7 +188,7 @@ def _sections_by_name(drafted: _DraftedTopic, remarks: list[str]) -> list[str]:
     rest = [path for path in paths if path not in found.values()][:MAX_LISTED_FIELDS]
     if rest:
         lines += ["", "# not recognised; a channel needs topic, field, unit, and often sign:"]
-        lines += [f"# {drafted.place[0]}, field = {_quoted(path)}" for path in rest]
+        lines += [f"# {drafted.place[0]}, field = {toml_string(path)}" for path in rest]
     remarks.append(
         f"{topic.topic}: recognised by name: {', '.join(found) or 'nothing'}"
         + ("; check every unit and sign" if found else "")
@@ -197,10 +204,10 @@ def _section(drafted: _DraftedTopic, role: str, path: str, stated: str) -> list[
     unit, assumed = (stated, "sign") if is_stated else (kind.unit, "unit, sign")
     return [
         "",
-        f"[{quantity}.{'_'.join(filter(None, (drafted.source, side)))}]",
+        f"[{toml_key(quantity, '_'.join(filter(None, (drafted.source, side))))}]",
         *drafted.place,
-        f"field = {_quoted(path)}",
-        f"unit = {_quoted(unit)}",
+        f"field = {toml_string(path)}",
+        f"unit = {toml_string(unit)}",
         f"sign = 1           # positive: {kind.positive}",
         f'assumed = "{assumed}"   # check, then remove this line',
     ]
@@ -209,9 +216,9 @@ def _section(drafted: _DraftedTopic, role: str, path: str, stated: str) -> list[
 def _position_section(drafted: _DraftedTopic, found: Mapping[str, str]) -> list[str]:
     return [
         "",
-        f"[position.{drafted.source}]",
+        f"[{toml_key('position', drafted.source)}]",
         *drafted.place,
-        *(f"{part} = {_quoted(found[part])}" for part in _POSITION),
+        *(f"{part} = {toml_string(found[part])}" for part in _POSITION),
         'unit = "deg"',
         'assumed = "unit"   # check, then remove this line',
     ]
@@ -219,16 +226,5 @@ def _position_section(drafted: _DraftedTopic, found: Mapping[str, str]) -> list[
 
 def _name(path: str, topic: str) -> str:
     """Return the name that states the quantity of a field: its own, or that of its topic."""
-    name = re.sub(r"(\[\d+\])+$", "", path).rpartition(".")[2]
+    name = re.sub(r"(\[\d+\])+$", "", path).rpartition(".")[2].strip('"')
     return name if name.lower() not in _NAMELESS else topic.rstrip("/").rpartition("/")[2]
-
-
-def _quoted(text: str) -> str:
-    """Return a text as a string of TOML."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
-
-
-def _comment(text: str) -> str:
-    """Return a text without line ends and other control characters, for a comment."""
-    return "".join(c if c.isprintable() else "?" for c in text)

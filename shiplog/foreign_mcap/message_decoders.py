@@ -47,9 +47,10 @@ def message_decoder(channel: records.Channel, schema: records.Schema | None) -> 
         from .ros2_messages import ros2_decoder  # noqa: PLC0415 - an optional dependency
 
         return _bounded(ros2_decoder(schema, name))
+    described = f"with a schema in {kind}" if kind else "without a schema"
     raise LogError(
-        f"the messages of {name} are encoded as {encoding or 'nothing'} with a schema in "
-        f"{kind or 'nothing'}; readable are json, protobuf, and cdr with ros2msg or ros2idl"
+        f"the messages of {name} have {f'the encoding {encoding}' if encoding else 'no encoding'} "
+        f"{described}; readable are json, protobuf, and cdr with ros2msg or ros2idl"
     )
 
 

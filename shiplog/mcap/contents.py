@@ -1,5 +1,6 @@
 """What the scan of an MCAP file collects: samples, raw packets and events by channel."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -221,6 +222,8 @@ class McapContents:
         The offsets of the MCAP chunks read so far, by their heads.
     data_blocks
         The number of MCAP chunks, and runs of messages outside of them, read so far.
+    not_of_schema
+        The numbers of messages that are not of their schema and were dropped, by topic and schema.
     clock_warnings
         Warnings about times of messages in the samples drained so far.
     mixed_times
@@ -267,6 +270,7 @@ class McapContents:
     is_whole: bool = True
     mcap_chunks_read: dict[bytes, int] = field(default_factory=dict)
     data_blocks: int = 0
+    not_of_schema: Counter[tuple[str, str]] = field(default_factory=Counter)
     clock_warnings: list[str] = field(default_factory=list)
     mixed_times: list[MixedTimes] = field(default_factory=list)
     pauses: Pauses = field(default_factory=Pauses)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
 from google.protobuf.message import DecodeError, Message
+from numpy.typing import NDArray
 
 from shiplog.types import Channel, Event, EventLevel, FloatArray
 from shiplog.units import GEOGRAPHIC
@@ -31,7 +32,7 @@ def encode_messages(channel: Channel) -> list[bytes]:
     return [row.tobytes() for row in rows]
 
 
-def decode_messages(schema: Schema, messages: list[bytes]) -> FloatArray:
+def decode_messages(schema: Schema, messages: list[bytes]) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Decode messages of any length, one by one.
 
     Parameters
@@ -45,28 +46,28 @@ def decode_messages(schema: Schema, messages: list[bytes]) -> FloatArray:
     -------
     values
         (n, k); NaN for a field that is absent.
-
-    Raises
-    ------
-    ValueError
-        A message is not of the schema.
+    is_decoded
+        (n,) whether each message is of the schema.
 
     Examples
     --------
-    >>> decode_messages(schema_for(()), [b""])
-    array([[nan]])
+    >>> decode_messages(schema_for(()), [b"", b"x"])
+    (array([[nan],
+           [nan]]), array([ True, False]))
     """
     message_type = _message_type(schema)
     values = np.full((len(messages), len(schema.fields)), np.nan)
+    is_decoded = np.ones(len(messages), bool)
     for row, data in enumerate(messages):
         try:
             message = message_type.FromString(data)
-        except DecodeError as error:
-            raise ValueError(f"message {row} is not {schema.name}") from error
+        except DecodeError:
+            is_decoded[row] = False
+            continue
         for column, name in enumerate(schema.fields):
             if schema.name == LOCATION_FIX or message.HasField(name):
                 values[row, column] = getattr(message, name)
-    return values
+    return values, is_decoded
 
 
 def encode_event(event: Event) -> bytes:

@@ -1,6 +1,8 @@
 """Conversion of a file's scanned contents to a `TrialLog`."""
 
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,6 @@ from mcap import records
 from shiplog.errors import LogError, UsageError
 from shiplog.types import (
     Channel,
-    FloatArray,
     TrialLog,
     concatenate_channels,
     is_sorted,
@@ -43,7 +44,7 @@ def build_trial_log(path: Path, contents: McapContents) -> TrialLog:
     Raises
     ------
     LogError
-        The format version is another one, a unit is unknown, or a message is not of its schema.
+        The format version is another one, or a unit is unknown.
     """
     version = contents.metadata.get("format_version", FORMAT_VERSION)
     if version != FORMAT_VERSION and not (contents.damage or contents.lost_mcap_chunks):
@@ -62,7 +63,7 @@ def build_trial_log(path: Path, contents: McapContents) -> TrialLog:
         contents.metadata,
         contents.vessel_toml,
         tuple(_warnings(contents)),
-        contents.truncated or contents.is_part_missing or is_any_lost(contents.damage),
+        contents.truncated or bool(contents.not_of_schema) or _is_part_lost(contents),
         tuple(contents.events),
     )
 
@@ -92,7 +93,7 @@ def channels_by_id(path: Path, contents: McapContents) -> dict[int, Channel]:
         schema = schema_of(record, contents.schemas)
         if schema is not None:
             described[channel_id] = record, schema
-            columns[channel_id] = _columns(path, record, schema, blocks.pop(channel_id, []))
+            columns[channel_id] = _columns(record, schema, blocks.pop(channel_id, []), contents)
     columns = _with_repaired_times(path, columns, contents)
     return {
         channel_id: _channel(path, *description, columns.pop(channel_id))
@@ -141,6 +142,22 @@ def concerns_kept(warning: str, *, with_topics: bool) -> bool:
     return warning.startswith("ignored ") and any(words in warning for words in kept)
 
 
+def no_samples_error(
+    action: str, warnings: Sequence[str], where: str | os.PathLike[str]
+) -> LogError:
+    """Return the error for a log without samples, with the reader's warnings.
+
+    Examples
+    --------
+    >>> str(no_samples_error("view", [], "trial.mcap"))
+    'nothing to view, no samples of shiplog: record it again: trial.mcap'
+    """
+    causes = "; ".join(warnings) or "record it again"
+    if any(FOREIGN_TOPICS in warning for warning in warnings):
+        causes += "; read them by a layout, which `shiplog layout` drafts"
+    return LogError(f"nothing to {action}, no samples of shiplog: {causes}: {where}")
+
+
 def _shift_at(
     position: int,
     as_recorded: Mapping[int, MessageColumns],
@@ -159,11 +176,16 @@ def _shift_at(
 
 
 def _warnings(contents: McapContents) -> list[str]:
-    is_lost = contents.is_part_missing or is_any_lost(contents.damage)
-    pauses = [] if is_lost else contents.pauses.warnings()  # else of the lost samples
+    # where a part is lost, the pauses are those of the lost samples
+    pauses = [] if _is_part_lost(contents) else contents.pauses.warnings()
     warnings = [
         *contents.part_warnings,
         *damage_warnings(contents.damage),
+        *(
+            f"{topic}: {count} messages are not {name} and were dropped; correct the program that "
+            "wrote them"
+            for (topic, name), count in contents.not_of_schema.items()
+        ),
         *contents.clock_warnings,
         *pauses,
     ]
@@ -184,10 +206,15 @@ def _warnings(contents: McapContents) -> list[str]:
         names = list(contents.foreign_records)
         more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
         warnings.append(
-            f"ignored {len(names)} {FOREIGN_RECORDS}, which a table does not keep: "
+            f"ignored {len(names)} {FOREIGN_RECORDS}, which only a copy in MCAP keeps: "
             f"{', '.join(names[:MAX_NAMES])}{more}"
         )
     return warnings
+
+
+def _is_part_lost(contents: McapContents) -> bool:
+    """Whether a part of the file is lost, up to its end."""
+    return contents.is_part_missing or is_any_lost(contents.damage)
 
 
 def _last_reception(time_ns: int | None) -> str:
@@ -231,36 +258,41 @@ def _name_and_source(record: records.Channel) -> tuple[str, str]:
 
 
 def _columns(
-    path: Path, record: records.Channel, schema: Schema, blocks: list[SampleBlock]
+    record: records.Channel, schema: Schema, blocks: Sequence[SampleBlock], contents: McapContents
 ) -> MessageColumns:
-    """Return the messages of a channel in the order of the file."""
+    """Return the messages of a channel in the order of the file; the contents count wrong ones."""
     name, source = _name_and_source(record)
     topic = f"/{name}/{source}"
     if not blocks:
         times = np.empty(0, np.int64)
         return MessageColumns(topic, times, times, times, np.empty((0, len(schema.fields))))
-    try:
-        values = [_values(schema, block) for block in blocks]
-    except ValueError as error:
-        raise LogError(
-            f"channel {name!r} has messages that are not {schema.name}; "
-            f"correct the program that wrote them: {path}"
-        ) from error
+    decoded = [_decoded(schema, block) for block in blocks]
+    counts = [sum(len(block.offsets) for block in each) for each in (blocks, decoded)]
+    if counts[0] > counts[1]:
+        contents.not_of_schema[record.topic, schema.name] += counts[0] - counts[1]
     return MessageColumns(
         topic,
-        np.concatenate([(block.number << 32) + block.offsets for block in blocks]),
-        np.concatenate([block.received for block in blocks]),
-        np.concatenate([block.measured for block in blocks]),
-        np.concatenate(values),
+        np.concatenate([(block.number << 32) + block.offsets for block in decoded]),
+        np.concatenate([block.received for block in decoded]),
+        np.concatenate([block.measured for block in decoded]),
+        np.concatenate([block.values for block in decoded]),
     )
 
 
-def _values(schema: Schema, block: SampleBlock) -> FloatArray:
+def _decoded(schema: Schema, block: SampleBlock) -> SampleBlock:
+    """Return a block with its values decoded, without the messages that are not of the schema."""
     if isinstance(block.values, np.ndarray):
-        return block.values
+        return block
     from .messages import decode_messages  # noqa: PLC0415 - protobuf takes long to import
 
-    return decode_messages(schema, block.values)
+    values, good = decode_messages(schema, block.values)
+    return replace(
+        block,
+        received=block.received[good],
+        measured=block.measured[good],
+        values=values[good],
+        offsets=block.offsets[good],
+    )
 
 
 def _si_scale(path: Path, name: str, unit: str) -> tuple[float, str]:

@@ -10,11 +10,11 @@ import numpy as np
 from shiplog.checks.consistency.consistency_check import COMPARED_CHANNELS, consistency_findings
 from shiplog.checks.consistency.findings import refuse_contradictions
 from shiplog.checks.data_quality import times_in_words
-from shiplog.errors import LogError, UsageError
+from shiplog.errors import UsageError
 from shiplog.mcap.clock_repair import refuse_mixed_times
 from shiplog.mcap.kept_records import KeptGroup, kept_groups
 from shiplog.mcap.raw_reader import raw_groups
-from shiplog.mcap.trial_log import concerns_kept
+from shiplog.mcap.trial_log import concerns_kept, no_samples_error
 from shiplog.mcap.writer import write
 from shiplog.screening import DerivedLog, plan_derivations, screen_values
 from shiplog.types import TrialLog, concatenate_channels
@@ -168,8 +168,7 @@ def _with_derived(log: TrialLog, names: Sequence[str]) -> tuple[TrialLog, list[s
 def _require_samples(log: TrialLog, source: Path) -> None:
     """Refuse a log without samples, with the reader's warnings, which list foreign topics."""
     if not any(len(channel) for channel in log):
-        causes = "; ".join(log.warnings) or "record it again"
-        raise LogError(f"nothing to convert, no samples of shiplog: {causes}: {source}")
+        raise no_samples_error("convert", log.warnings, source)
 
 
 def sorted_by_time(log: TrialLog) -> tuple[TrialLog, list[str]]:

@@ -9,6 +9,8 @@ from shiplog.errors import LayoutError
 from shiplog.layouts.header_words import named_unit, recognise, split_header
 from shiplog.layouts.layout import HEMISPHERES, Draft
 from shiplog.layouts.layout_parser import parse_layout
+from shiplog.printable import printable
+from shiplog.toml_output import toml_string
 from shiplog.units import CATALOGUE, UNITS
 
 from .draft_sample import read_sample, sample_numbers
@@ -45,7 +47,7 @@ def draft_layout(path: Path) -> Draft:
             f"no column of times among {', '.join(map(repr, columns))}; "
             f"write the layout by hand: {path}"
         )
-    lines = [f"# drafted from {path.name}; check every unit and sign"]
+    lines = [f"# drafted from {printable(path.name)}; check every unit and sign"]
     lines += [f"{key} = {_toml(value)}" for key, value in sample.keys.items()]
     lines += ["", "[time]", *(f"{key} = {_toml(value)}" for key, value in time.entries.items())]
     remarks = list(time.remarks)
@@ -111,8 +113,7 @@ def _toml(value: object) -> str:
         return str(value).lower()
     if isinstance(value, int):
         return str(value)
-    escaped = str(value).replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'
+    return toml_string(str(value))
 
 
 def _receivers(roles: dict[str, str]) -> dict[str, dict[str, str]]:

@@ -319,7 +319,7 @@ def test_damaged_messages_are_dropped_and_reported_as_lost(tmp_path: Path) -> No
         ("cdr", (IMU, "ros2msg", b"# x\n" * 300_000), "bytes long, at most"),
         ("protobuf", ("ship.Motion", "protobuf", b"\xff\xff"), "cannot be read"),
         ("protobuf", ("ship.Motion", "protobuf", b""), "is empty"),
-        ("cbor", None, "are encoded as cbor with a schema in nothing; readable are json"),
+        ("cbor", None, "have the encoding cbor without a schema; readable are json"),
         ("cdr", None, "readable are json, protobuf, and cdr"),
         ("json", None, "3 of 3 messages could not be decoded"),
         ("protobuf", protobuf_type()[0], "3 of 3 messages could not be decoded"),

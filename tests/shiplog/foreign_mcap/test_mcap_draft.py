@@ -123,12 +123,21 @@ def test_names_of_fields_state_quantities_units_and_sides(tmp_path: Path) -> Non
     assert "sign of rudder" in assumed
 
 
+def test_names_of_fields_may_have_points_and_brackets(tmp_path: Path) -> None:
+    row = {"imu.yaw_rate": 0.25, "a": {"set[1].speed_kn": 10.0}, "heading\ud800": 1.0, '"': 2.0}
+    values, _ = convert_by_draft(write_json(tmp_path / "bag.mcap", [row] * N))
+    assert values["/yaw_rate/data"][0] == 0.25
+    assert values["/speed/data"][0] == pytest.approx(10 * 1852 / 3600)
+    assert len(values) == 2
+
+
 def test_topics_with_odd_or_equal_names_and_two_types_are_drafted(tmp_path: Path) -> None:
     with (tmp_path / "bag.mcap").open("wb") as stream:
         writer = Writer(stream)
         writer.start()
-        odd = '/odd\n"]\x1b[31m'
-        for topic, name in (("/a/b", "T"), ("/a_b", "T"), ("/two", "A"), ("/two", "B"), (odd, "T")):
+        odd, hidden = '/odd\n"]\x1b[31m', "/hidden\U000e0001"
+        topics = [("/a/b", "T"), ("/a_b", "T"), ("/two", "A"), ("/two", "B"), (odd, "T")]
+        for topic, name in (*topics, ("/Kompaß", "T"), (hidden, "T")):
             schema = writer.register_schema(name, "jsonschema", b"{}")
             channel = writer.register_channel(topic, "json", schema)
             for i in range(N):
@@ -137,7 +146,8 @@ def test_topics_with_odd_or_equal_names_and_two_types_are_drafted(tmp_path: Path
         writer.finish()
     values, _ = convert_by_draft(tmp_path / "bag.mcap")
     assert [topic for topic in values if topic.startswith("/speed/")] == [
-        "/speed/a_b", "/speed/a_b_2", "/speed/two", "/speed/two_2", "/speed/odd_31m"
+        "/speed/a_b", "/speed/a_b_2", "/speed/two", "/speed/two_2", "/speed/odd_31m",
+        "/speed/Kompaß", "/speed/hidden",
     ]  # fmt: skip
     assert all(len(each) == N for each in values.values())
 

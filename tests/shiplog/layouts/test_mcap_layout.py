@@ -127,5 +127,6 @@ def test_a_missing_layout_is_an_error(tmp_path: Path) -> None:
 
 def test_a_path_has_names_and_numbers_of_elements() -> None:
     assert parse_path("a.b[2].c[0]") == ("a", "b", 2, "c", 0)
-    for wrong in ("", ".a", "a.", "a[", "a[-1]", "a[0", "[0]", "a b[1]x"):
+    assert parse_path('a."b.c[0]"[2]') == ("a", "b.c[0]", 2)
+    for wrong in ("", ".a", "a.", "a[", "a[-1]", "a[0", "[0]", "a b[1]x", 'a"', '"', '""'):
         assert parse_path(wrong) is None, wrong

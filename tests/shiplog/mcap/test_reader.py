@@ -360,10 +360,12 @@ def test_a_message_of_the_same_length_with_another_field_is_nan(path: Path) -> N
     np.testing.assert_array_equal(read(path)["yaw_rate"].values, [1.0, np.nan])
 
 
-def test_a_malformed_message_is_an_error(path: Path) -> None:
-    write_messages(path, [scalar(1.0), b"\x09\x00"])
-    with pytest.raises(LogError, match=r"'yaw_rate' has messages that are not shiplog\.Scalar"):
-        read(path)
+def test_malformed_messages_are_dropped_and_counted(path: Path) -> None:
+    write_messages(path, [scalar(1.0), b"\x09\x00", scalar(2.0), b"\xff"])
+    for log in (read(path), read(path, channels=["yaw_rate"])):
+        np.testing.assert_array_equal(log["yaw_rate"].values, [1.0, 2.0])
+        assert log.data_lost
+        assert "2 messages are not shiplog.Scalar and were dropped" in " ".join(log.warnings)
 
 
 def test_a_file_of_a_later_format_asks_for_a_newer_shiplog(path: Path) -> None:

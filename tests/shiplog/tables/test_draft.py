@@ -146,6 +146,12 @@ def test_an_assumed_date_order_is_a_warning_until_it_is_confirmed(tmp_path: Path
     assert not any("day and month" in w for w in log.warnings)
 
 
+def test_a_line_end_in_the_name_of_a_table_is_no_line_of_its_draft(tmp_path: Path) -> None:
+    path = tmp_path / "x\nsource = 'y'.csv"
+    path.write_text("Time,Heading\n2026-04-03T10:00:00Z,5\n2026-04-03T10:00:01Z,5\n")
+    assert "\nsource" not in draft_layout(path).text
+
+
 def test_the_verb_writes_a_layout_that_converts_the_table(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
