@@ -10,7 +10,7 @@ from shiplog.cli.console import print_warnings, progress
 from shiplog.cli.options import add_cut_options
 from shiplog.cli.paths import require_distinct, require_inputs, require_outputs, require_suffix
 from shiplog.cli.verb import ExitCode, Verb
-from shiplog.errors import UsageError
+from shiplog.errors import ShiplogError, UsageError
 from shiplog.mcap.part_names import log_stem
 
 from .shared_options import show_review
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from analysis.view.log_drawing import LogDrawing
     from shiplog.checks.log_content import LogInfo
     from shiplog.text_table import TextTable
+    from shiplog.types import Log
 
 
 def _configure_view(parser: argparse.ArgumentParser) -> None:
@@ -27,7 +28,13 @@ def _configure_view(parser: argparse.ArgumentParser) -> None:
         metavar="LOG",
         nargs="+",
         type=Path,
-        help="a log or a table; several are drawn over each other by elapsed time",
+        help="a log or a table; several are drawn over each other",
+    )
+    parser.add_argument(
+        "--align",
+        choices=("execute", "start"),
+        help="from what times count: the execute of each log's first manoeuvre (default of "
+        "several logs), or its start (default of one log)",
     )
     parser.add_argument(
         "--layout",
@@ -56,6 +63,7 @@ def _view(arguments: argparse.Namespace) -> ExitCode:
     from shiplog.checks.info import describe_log
     from shiplog.tables.any_log import open_any_log
 
+    align = arguments.align or ("execute" if len(arguments.log) > 1 else "start")
     drawings, infos = [], []
     with progress("analysis") as on_progress:
         for number, path in enumerate(arguments.log):
@@ -63,6 +71,8 @@ def _view(arguments: argparse.Namespace) -> ExitCode:
             log = open_any_log(path, arguments.layout, arguments.start, arguments.end)
             drawings.append(draw_log(log, full=arguments.full))
             infos.append(describe_log(log, drawings[-1].stats))
+            if align == "execute":
+                drawings[-1] = _aligned(log, drawings[-1])
         on_progress("review")
         warnings = _warnings(drawings)
         title = " and ".join(info.name for info in infos)
@@ -71,6 +81,21 @@ def _view(arguments: argparse.Namespace) -> ExitCode:
     print_warnings(warnings)
     show_review(output, view=arguments.output is None)
     return ExitCode.DATA_LOST if any(info.data_lost for info in infos) else ExitCode.OK
+
+
+def _aligned(log: "Log", drawing: "LogDrawing") -> "LogDrawing":
+    """Return a drawing aligned at the first execute, or as it is with a warning of the reason."""
+    from analysis.trial.analyse_trial import analyse_trial
+    from analysis.view.execute_alignment import aligned_at_execute, first_execute
+
+    try:
+        execute, reason = first_execute(analyse_trial(log)), "no manoeuvre was found"
+    except ShiplogError as error:
+        execute, reason = None, f"no manoeuvre could be looked for ({error})"
+    if execute is not None:
+        return aligned_at_execute(drawing, execute)
+    warning = f"{reason}; times and track count from the log's start"
+    return replace(drawing, warnings=(*drawing.warnings, warning))
 
 
 def _output(arguments: argparse.Namespace) -> Path:
@@ -109,7 +134,8 @@ VIEW = Verb(
     (
         "shiplog view trial.mcap",
         "shiplog view trial.mcap -o trial.view.rrd   (for a computer with a screen)",
-        "shiplog view zigzag_1.mcap zigzag_2.mcap   (over each other by elapsed time)",
+        "shiplog view zigzag_1.mcap zigzag_2.mcap   (over each other, from their executes)",
+        "shiplog view night.mcap day.mcap --align start   (from their starts)",
         "shiplog view bridge.csv --layout bridge.toml",
     ),
     # pyarrow imports pandas to recognise data frames

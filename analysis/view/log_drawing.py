@@ -21,6 +21,25 @@ MAX_GAPS = 200  # of a channel that are marked: the longest ones
 DISPLAY_UNITS = {"yaw_rate": "deg/min"}  # as rate of turn indicators show it
 
 
+@dataclass(frozen=True)
+class FirstExecute:
+    """The execute of a log's first manoeuvre, from which its drawing may count.
+
+    Attributes
+    ----------
+    manoeuvre
+        Its title, such as ``zig-zag 20°/20°, first to starboard``.
+    at_ns
+        The instant, ns since 1970-01-01 UTC.
+    approach_heading
+        The mean heading before it, rad; NaN where not known.
+    """
+
+    manoeuvre: str
+    at_ns: int
+    approach_heading: float
+
+
 @dataclass(frozen=True, eq=False)
 class LogDrawing:
     """What is drawn of one log.
@@ -30,7 +49,7 @@ class LogDrawing:
     name
         The name of the log.
     stats
-        The statistics of its channels; times of the series count from the start of their span.
+        The statistics of its channels.
     series
         The series of each quantity that has a value, a series for each source.
     gaps
@@ -43,6 +62,8 @@ class LogDrawing:
         The events of the log, and the longest gap of each channel as a warning.
     warnings
         Problems of the file and of its channels, each in a sentence.
+    execute
+        From which the times of the series count; None where they count from the log's start.
     """
 
     name: str
@@ -53,11 +74,12 @@ class LogDrawing:
     frame: LocalFrame | None
     events: tuple[Event, ...]
     warnings: tuple[str, ...]
+    execute: FirstExecute | None = None
 
     @property
-    def start_ns(self) -> int:
-        """The first instant of the log, ns since 1970-01-01 UTC."""
-        return self.stats.span_ns[0]
+    def zero_ns(self) -> int:
+        """The instant from which the times of the series count, ns since 1970-01-01 UTC."""
+        return self.stats.span_ns[0] if self.execute is None else self.execute.at_ns
 
 
 def draw_log(log: Log, *, full: bool = False) -> LogDrawing:

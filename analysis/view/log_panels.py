@@ -1,4 +1,4 @@
-"""The panels of logs that are viewed without a replay, one over the other by elapsed time."""
+"""The panels of logs that are viewed without a replay, one over the other by time."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,7 +19,9 @@ MAIN_PANELS = ("heading",), ("rudder",), ("yaw_rate",), ("speed", "speed_over_gr
 COLOURS = {"heading": BLUE, "yaw_rate": BLUE, "speed": ORANGE, "speed_over_ground": ORANGE,
            "rudder": GREEN, "rpm": GREEN}  # fmt: skip
 MAX_OVERLAID_TURN = 180.0  # deg: up to here the rudder can be read over the heading
-REFERENCE_SECS = 10.0  # at the start of a heading, whose median is its reference
+REFERENCE_SECS = (
+    10.0  # of a heading, at its start or before the execute: its median is the reference
+)
 MAX_MARKS = 50  # of people, drawn as vertical lines
 
 
@@ -27,13 +29,14 @@ def log_panels(drawings: Sequence[LogDrawing]) -> tuple[list[Panel], list[Panel]
     """Return the panels of the main quantities, and of all others.
 
     Where the ship turns by less than `MAX_OVERLAID_TURN`, as in a zig-zag, the rudder is drawn over
-    the heading, which counts from the one at the start. Several logs have a colour each. Gaps are
+    the heading, which counts from the one at the start, or before the execute where times count
+    from it. Several logs have a colour each. Gaps are
     red bars at the foot of a panel, marks of people vertical lines.
 
     Parameters
     ----------
     drawings
-        The logs; the times of each count from its own start.
+        The logs; the times of each count from its own start or execute.
     """
     quantities = list(dict.fromkeys(each for drawing in drawings for each in drawing.series))
     main = [[q for q in quantities if q.name in names and _is_usual(q)] for names in MAIN_PANELS]
@@ -43,6 +46,9 @@ def log_panels(drawings: Sequence[LogDrawing]) -> tuple[list[Panel], list[Panel]
     if headings and rudders and _turn(drawings, headings) < MAX_OVERLAID_TURN:
         panels.append(_rudder_over_heading(drawings, headings, rudders))
         main = main[2:]
+    elif headings and any(drawing.execute for drawing in drawings):
+        panels.append(_heading_from_execute(drawings, headings))
+        main = main[1:]
     panels += [_panel(drawings, group) for group in main if group]
     if len(drawings) > 1:  # the first legend serves all
         panels = [replace(panel, legend=panel is panels[0]) for panel in panels]
@@ -73,32 +79,66 @@ def _rudder_over_heading(
     headings: Sequence[DrawnQuantity],
     rudders: Sequence[DrawnQuantity],
 ) -> Panel:
-    """Return the panel of the rudder over the heading, which counts from the one at the start."""
-    relative, starts = [], []
+    """Return the panel of the rudder over the heading, which counts from its reference."""
+    relative, references = _relative_headings(drawings, headings)
+    panel = _panel(relative, [*headings, *rudders])
+    turned, steered = _values_text(relative, headings), _values_text(relative, rudders)
+    start = _reference_text(drawings, references)
+    return replace(panel, title=f"heading from {start}: {turned}; rudder: {steered} [deg]")
+
+
+def _heading_from_execute(
+    drawings: Sequence[LogDrawing], headings: Sequence[DrawnQuantity]
+) -> Panel:
+    """Return the panel of headings that count from those before the execute."""
+    relative, references = _relative_headings(drawings, headings)
+    start, turned = _reference_text(drawings, references), _values_text(relative, headings)
+    return replace(_panel(relative, headings), title=f"heading from {start}: {turned} [deg]")
+
+
+def _relative_headings(
+    drawings: Sequence[LogDrawing], headings: Sequence[DrawnQuantity]
+) -> tuple[list[LogDrawing], list[float]]:
+    """Return the drawings with headings that count from their references, and these, deg."""
+    relative, references = [], []
     for drawing in drawings:
         changed = dict(drawing.series)
         for quantity in headings:
             group = turned_together(changed.get(quantity, []), quantity.turn)
             if group:
-                starts.append(_heading_at_start(group[0]))
-                changed[quantity] = [_lowered(each, starts[-1]) for each in group]
+                references.append(_reference_heading(group[0], drawing))
+                changed[quantity] = [_lowered(each, references[-1]) for each in group]
         relative.append(replace(drawing, series=changed))
-    start = f"{round(starts[0], 1) % 360:.1f}°" if len(starts) == 1 else "that at the start"
-    panel = _panel(relative, [*headings, *rudders])
-    turned, steered = (
-        _range_text(
-            [each for drawing in relative for q in part for each in drawing.series.get(q, [])]
-        )
-        for part in (headings, rudders)
+    return relative, references
+
+
+def _values_text(drawings: Sequence[LogDrawing], quantities: Sequence[DrawnQuantity]) -> str:
+    return _range_text(
+        [each for drawing in drawings for q in quantities for each in drawing.series.get(q, [])]
     )
-    return replace(panel, title=f"heading from {start}: {turned}; rudder: {steered} [deg]")
 
 
-def _heading_at_start(series: Series) -> float:
-    """Return the median of a heading at its start, deg."""
+def _reference_text(drawings: Sequence[LogDrawing], references: Sequence[float]) -> str:
+    """Return the reference of a heading, or of those of several logs, in words."""
+    if len(references) == 1:
+        return f"{round(references[0], 1) % 360:.1f}°"
+    if all(drawing.execute for drawing in drawings):
+        return "that before the execute"
+    mixed = any(drawing.execute for drawing in drawings)
+    return "that before the execute or at the start" if mixed else "that at the start"
+
+
+def _reference_heading(series: Series, drawing: LogDrawing) -> float:
+    """Return the median of a heading at its start, or before the execute, deg."""
     values = series.lines[0].values
-    times = series.time_secs[np.isfinite(values)]
-    return float(np.median(values[np.isfinite(values)][times <= times[0] + REFERENCE_SECS]))
+    known = np.isfinite(values)
+    times, values = series.time_secs[known], values[known]
+    first = times[0]
+    if drawing.execute is not None:
+        before = times[times <= 0]
+        first = max(first, before[-1] - REFERENCE_SECS) if len(before) else first
+        times, values = times[: max(1, len(before))], values[: max(1, len(before))]
+    return float(np.median(values[(times >= first) & (times <= first + REFERENCE_SECS)]))
 
 
 def _lowered(series: Series, by: float) -> Series:
@@ -160,7 +200,7 @@ def _marked(
         drawing.gaps.get(each, np.zeros((0, 2))) for drawing in drawings for each in quantities
     ])  # fmt: skip
     marks = [
-        (event.time_ns - drawing.start_ns) * 1e-9
+        (event.time_ns - drawing.zero_ns) * 1e-9
         for drawing in drawings
         for event in drawing.events
         if event.source == OPERATOR

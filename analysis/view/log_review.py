@@ -14,6 +14,7 @@ from shiplog.geodesy import GeographicPositions, LocalPositions
 from shiplog.printable import printable
 from shiplog.types import FloatArray
 
+from .execute_alignment import track_from_execute
 from .log_drawing import LogDrawing
 from .log_panels import log_panels
 from .panels import Panel
@@ -39,7 +40,7 @@ LEGEND = """
 
 - **red bar** at the foot of a panel: a gap; the line is interrupted there
 - **grey vertical line**: a mark of a person; its text is in the list of events
-- time counts from the start of each log; values that cannot be used are not drawn
+- values that cannot be used are not drawn
 """
 FIRST_SHARE = 1.4  # of the height of other panels: the first one
 OTHERS_NAME = "other channels"
@@ -51,7 +52,7 @@ MAP_NAME = "map (tiles from the internet)"
 def write_log_review(
     drawings: Sequence[LogDrawing], path: str | os.PathLike[str], text: str
 ) -> None:
-    """Write the review of one log, or of several over each other by elapsed time.
+    """Write the review of one log, or of several over each other from their starts or executes.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ def write_log_review(
     recording, main_log = _recording(drawings), drawings[0]
     main, others = log_panels(drawings)
     charts, maps = _charts(drawings), list(map(_geographic_track, drawings))
-    starts = [each.start_ns if len(drawings) == 1 else None for each in drawings]
+    starts = [each.zero_ns if len(drawings) == 1 else None for each in drawings]
     events = main_log.events if len(drawings) == 1 else ()
     blueprint = _blueprint(
         main,
@@ -83,8 +84,8 @@ def write_log_review(
         rr.send_blueprint(blueprint, recording=recording)
         recording.send_recording_name(printable(" ".join(each.name for each in drawings)))
         if len(drawings) == 1:
-            rr.send_recording_start_time_nanos(main_log.start_ns, recording=recording)
-        send_text(recording, "summary", text + LEGEND)
+            rr.send_recording_start_time_nanos(main_log.stats.span_ns[0], recording=recording)
+        send_text(recording, "summary", text + LEGEND + _times_text(drawings))
         _send_panels(recording, (*main, *others), starts[0])
         for number, (chart, positions) in enumerate(zip(charts, maps, strict=True)):
             colours = _colours(number, len(drawings))
@@ -93,15 +94,32 @@ def write_log_review(
             if positions is not None:
                 send_map_track(recording, f"map/{number}", positions, colours[0])
         if events:
-            send_events(recording, "events", events, main_log.start_ns)
+            send_events(recording, "events", events, main_log.zero_ns)
         recording.flush()
+
+
+def _times_text(drawings: Sequence[LogDrawing]) -> str:
+    """Return from what the times of each log count, as items of the legend."""
+    items = [
+        f"- time of {each.name} counts from the execute of its {each.execute.manoeuvre}, "
+        f"{(each.zero_ns - each.stats.span_ns[0]) * 1e-9:.1f} s after its start\n"
+        for each in drawings
+        if each.execute is not None
+    ]
+    if len(items) == len(drawings):
+        return "".join(items)
+    return (
+        "".join(items)
+        + "- time counts from the start of each "
+        + ("other log\n" if items else "log\n")
+    )
 
 
 def _recording(drawings: Sequence[LogDrawing]) -> rr.RecordingStream:
     """Return a stream whose names depend only on the logs; a layout belongs to one of them."""
     names = " ".join(drawing.name for drawing in drawings)
     counts = [(each.topic, each.samples) for drawing in drawings for each in drawing.stats]
-    identity = (names, [drawing.stats.span_ns for drawing in drawings], counts)
+    identity = (names, [(each.stats.span_ns, each.zero_ns) for each in drawings], counts)
     return rr.RecordingStream(
         re.sub(r"[^A-Za-z0-9_-]+", "-", f"shiplog view {names}"),
         recording_id=sha256(repr(identity).encode()).hexdigest()[:32],
@@ -120,24 +138,25 @@ def _charts(drawings: Sequence[LogDrawing]) -> list[TrackChart | None]:
     widest = max(known, key=lambda chart: float((chart.bounds[1] - chart.bounds[0]).max()))
     foot = np.array([low[0], high[1]]) + 0.05 * (high - low) * [1, -1]
     scale = widest.scale - widest.scale[0] + foot
-    return [
-        chart and replace(chart, bounds=(low, high), scale=scale, scale_label=widest.scale_label)
-        for chart in charts
-    ]
+    title = " or ".join(dict.fromkeys(chart.title for chart in known))
+    shared = {"bounds": (low, high), "scale": scale, "scale_label": widest.scale_label}
+    return [chart and replace(chart, title=title, **shared) for chart in charts]
 
 
 def _chart(drawing: LogDrawing) -> TrackChart | None:
     """Return the chart of a log's track; None where it has no positions."""
     if drawing.track is None:
         return None
-    north, east = (line.values for line in drawing.track.lines)
-    return make_chart(
-        "track from its start, north up",
-        np.column_stack((north, east)),
-        drawing.track.time_secs,
-        _heading_along(drawing),
-        None,
-    )
+    heading = _heading_along(drawing)
+    if drawing.execute is not None:
+        up = 0.0 if heading is None else drawing.execute.approach_heading
+        title = f"track from the execute, {'north' if heading is None else 'approach heading'} up"
+        positions = track_from_execute(drawing.track, up)
+        heading = None if heading is None else heading - up
+    else:
+        title = "track from its start, north up"
+        positions = np.column_stack([line.values for line in drawing.track.lines])
+    return make_chart(title, positions, drawing.track.time_secs, heading, None)
 
 
 def _heading_along(drawing: LogDrawing) -> FloatArray | None:

@@ -61,6 +61,28 @@ def test_several_logs_are_drawn_over_each_other(folder: Path) -> None:
     assert "## 2 logs" in page
 
 
+def test_several_logs_count_from_their_executes_unless_one_has_none(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = str(SAMPLE_DATA / "pseudo_random.mcap")
+    assert main(["view", LOG, other, "-o", "two.rrd"]) == ExitCode.OK
+    warnings = [line for line in capsys.readouterr().err.splitlines() if "no manoeuvre" in line]
+    assert len(warnings) == 1
+    assert warnings[0].startswith("warning: pseudo_random.mcap: no manoeuvre")
+    (page,) = static_components(folder / "two.rrd", "TextDocument:text")["/summary"]
+    assert "time of zigzag_20_20.mcap counts from the execute of its zig-zag 20°/20°" in page
+
+
+def test_logs_count_from_their_starts_where_that_is_asked_for(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["view", LOG, LOG, "--to", "20", "--align", "start", "-o", "two.rrd"]
+    assert main(arguments) == ExitCode.OK
+    assert "no manoeuvre" not in capsys.readouterr().err
+    (page,) = static_components(folder / "two.rrd", "TextDocument:text")["/summary"]
+    assert "time counts from the start of each log" in page
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
