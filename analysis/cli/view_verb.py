@@ -86,10 +86,10 @@ def _view(arguments: argparse.Namespace) -> ExitCode:
 def _aligned(log: "Log", drawing: "LogDrawing") -> "LogDrawing":
     """Return a drawing aligned at the first execute, or as it is with a warning of the reason."""
     from analysis.trial.analyse_trial import analyse_trial
-    from analysis.view.execute_alignment import aligned_at_execute, first_execute
+    from analysis.view.execute_alignment import aligned_at_execute, trial_first_execute
 
     try:
-        execute, reason = first_execute(analyse_trial(log)), "no manoeuvre was found"
+        execute, reason = trial_first_execute(analyse_trial(log)), "no manoeuvre was found"
     except ShiplogError as error:
         execute, reason = None, f"no manoeuvre could be looked for ({error})"
     if execute is not None:

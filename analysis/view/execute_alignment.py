@@ -14,7 +14,7 @@ from .series import Series
 WITHOUT_ORDER = (ManoeuvreKind.SPEED_RUN, ManoeuvreKind.STRAIGHT)
 
 
-def first_execute(trial: TrialAnalysis) -> FirstExecute | None:
+def trial_first_execute(trial: TrialAnalysis) -> FirstExecute | None:
     """Return the execute of the first manoeuvre; None where only straight runs were sailed.
 
     Parameters

@@ -11,7 +11,11 @@ from rrd_content import static_components, view_titles
 import shiplog
 from analysis import TrialAnalysis, analyse_trial
 from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreKind
-from analysis.view.execute_alignment import aligned_at_execute, first_execute, track_from_execute
+from analysis.view.execute_alignment import (
+    aligned_at_execute,
+    track_from_execute,
+    trial_first_execute,
+)
 from analysis.view.log_drawing import FirstExecute, LogDrawing, draw_log
 from analysis.view.log_panels import log_panels
 from analysis.view.log_review import write_log_review
@@ -30,7 +34,7 @@ def drawing() -> LogDrawing:
 
 @pytest.fixture(scope="module")
 def execute(trial: TrialAnalysis) -> FirstExecute:
-    found = first_execute(trial)
+    found = trial_first_execute(trial)
     assert found is not None
     return found
 
@@ -44,8 +48,8 @@ def test_the_execute_is_the_instant_at_which_the_rudder_was_ordered(
 
 def test_a_straight_run_has_no_execute(trial: TrialAnalysis) -> None:
     straight = replace(trial.manoeuvres[0], kind=ManoeuvreKind.STRAIGHT)
-    assert first_execute(replace(trial, manoeuvres=(straight,))) is None
-    assert first_execute(replace(trial, manoeuvres=(straight, *trial.manoeuvres))) is not None
+    assert trial_first_execute(replace(trial, manoeuvres=(straight,))) is None
+    assert trial_first_execute(replace(trial, manoeuvres=(straight, *trial.manoeuvres))) is not None
 
 
 def test_times_count_from_the_execute(drawing: LogDrawing, execute: FirstExecute) -> None:
