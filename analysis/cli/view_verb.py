@@ -138,6 +138,4 @@ VIEW = Verb(
         "shiplog view night.mcap day.mcap --align start   (from their starts)",
         "shiplog view bridge.csv --layout bridge.toml",
     ),
-    # pyarrow imports pandas to recognise data frames
-    unneeded=("pandas",),
 )
