@@ -22,6 +22,7 @@ from shiplog.text_table import TextTable
 from .terminal import encodable
 
 MIN_NAME_WIDTH = 12  # characters of a shortened cell in the first column
+MAX_NAME_LINES = 2  # of a cell in the first column that is wrapped
 MIN_PROSE_WIDTH = 30  # characters of a column that is wrapped
 EDGES, GAP = 4, 3  # of a printed table, in characters
 FIRST_ESTIMATE_SECS = 2.0  # of work, before the remaining time is estimated
@@ -98,9 +99,9 @@ def _remaining(elapsed_secs: float, share: float | None) -> str:
 def print_tables(tables: Sequence[TextTable], *, to_stderr: bool = False) -> None:
     """Print tables and their remarks, in the width of the console.
 
-    No word and no number is broken: headings wrap between words, long names in the first column
-    are shortened in the middle as far as they stay distinct, and a table that is still too wide is
-    printed in parts. Sentences in the last column wrap between words.
+    No number is broken: headings and cells of the first column wrap between words, long words in
+    that column are shortened in the middle as far as the cells stay distinct, and a table that is
+    still too wide is printed in parts. Sentences in the last column wrap between words.
     """
     from rich.box import SIMPLE
     from rich.console import Console
@@ -155,7 +156,7 @@ def _fitted(
         used += GAP + sizes[i]
     for part in parts:
         headings = [_wrapped(columns[i], sizes[i]) for i in part]
-        cells = [[shortened(row[i], sizes[i]) if i == 0 else row[i] for i in part] for row in rows]
+        cells = [[_name(row[i], sizes[i]) if i == 0 else row[i] for i in part] for row in rows]
         yield [headings, *cells]
 
 
@@ -169,12 +170,25 @@ def _sizes(
 
 
 def _distinct_width(names: Sequence[str]) -> int:
-    """Return the least width at which names can be shortened without two that look alike."""
+    """Return the least width at which names stay distinct and need at most `MAX_NAME_LINES`."""
     distinct = len(set(names))
     width = MIN_NAME_WIDTH
-    while len({shortened(name, width) for name in names}) < distinct:
+    while True:
+        cells = {_name(name, width) for name in names}
+        if len(cells) == distinct and all(cell.count("\n") < MAX_NAME_LINES for cell in cells):
+            return width
         width += 1
-    return width
+
+
+def _name(text: str, size: int) -> str:
+    """Wrap a cell of the first column between words, and shorten the words that are too long."""
+    if len(text) <= size:
+        return text
+    indent = text[: len(text) - len(text.lstrip())]
+    lines = textwrap.wrap(
+        text, size, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    )
+    return "\n".join(shortened(line, size) for line in lines)
 
 
 def _total(sizes: Sequence[int]) -> int:

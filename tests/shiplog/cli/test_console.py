@@ -67,6 +67,23 @@ def test_two_different_names_never_look_alike(
     assert all(shown.count(name) == len(shown) // len(names) for name in shown)
 
 
+def test_words_of_the_first_column_wrap_and_stay_whole(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = (
+        "10/10 zig-zag, first overshoot",
+        "10/10 zig-zag, second overshoot",
+        "  time of the day",
+    )
+    columns = ("criterion", *(f"column{i}" for i in range(len(NUMBERS))))
+    table = TextTable("Verdict", columns, tuple((name, *NUMBERS) for name in names))
+    lines = printed(table, 74, capsys, monkeypatch)
+    assert all(len(line) <= 74 for line in lines)
+    cells = "\n".join(re.split(r" {3,}", line[2:])[0].rstrip() for line in lines)
+    assert "10/10 zig-zag,\nsecond overshoot" in cells
+    assert "…" not in "".join(lines)
+
+
 def test_sentences_of_the_last_column_wrap_between_words_beside_whole_cells(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
