@@ -41,7 +41,7 @@ def _configure_report(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--antenna",
         metavar="FORWARD,STARBOARD",
-        help="place of the position's antenna from the midship point, m, such as -45,2.5",
+        help="place of the position's antenna from the midship point, m, such as --antenna=-45,2.5",
     )
     parser.add_argument(
         "--test-speed", type=float, metavar="M/S", help="V of the norm (default: the log's)"

@@ -267,7 +267,7 @@ def _index_row(index: ManoeuvreIndex) -> tuple[str, ...]:
     unit = index.unit
     cells = [_in_display_unit(v, unit, 4) for v in (index.measured, index.simulated)]
     cells.append(_in_display_unit(index.error, unit))
-    relative = "" if unit == "rad" else f"{100 * index.error / index.measured:+.1f}"
+    relative = "" if unit == "rad" else f"{100 * index.error / index.measured:+z.1f}"
     name = f"{index.name} [{_display_unit(unit)}]"
     return (name, *cells, relative if isfinite(index.error) else "")
 

@@ -1,6 +1,6 @@
 """Numbers of a report as texts: units people use, and the digits that their uncertainty allows."""
 
-from math import floor, isfinite, log10, nan
+from math import ceil, floor, isfinite, log10, nan
 
 from analysis.manoeuvres.trial_index import TrialIndex
 from analysis.report.display import decimals
@@ -50,21 +50,29 @@ def value_text(index: TrialIndex) -> str:
 
 
 def interval_text(index: TrialIndex) -> str:
-    """Write the 95 % interval of an index; a dash where it is not known."""
+    """Write the 95 % interval of an index; a dash where it is not known.
+
+    One that is narrower than its last decimal is rounded outwards, so that it has a width.
+    """
     if not (isfinite(index.low) and isfinite(index.high)):
         return NOT_KNOWN
     factor, most = index.display_factor, _most_decimals(index.display_unit)
-    low, high = (
-        number_text(each * factor, index.std * factor, most) for each in (index.low, index.high)
-    )
+    ends, std = (index.low * factor, index.high * factor), index.std * factor
+    low, high = (number_text(end, std, most) for end in ends)
+    if low == high and ends[0] < ends[1]:
+        scale = 10.0**most
+        outer = (floor(ends[0] * scale) / scale, ceil(ends[1] * scale) / scale)
+        low, high = (number_text(end, std, most) for end in outer)
     return with_unit(f"{low} to {high}", index.display_unit)
 
 
 def half_width_text(index: TrialIndex) -> str:
-    """Write an index with half the width of its 95 % interval."""
+    """Write an index with half the width of its 95 % interval, at least its last decimal."""
     factor, most = index.display_factor, _most_decimals(index.display_unit)
     std = index.std * factor
     half = (index.high - index.low) / 2 * factor
+    if half > 0:
+        half = max(half, 10.0**-most)
     text = number_text(index.value * factor, std, most)
     if isfinite(half):
         text += f" ± {number_text(half, std, most)}"
