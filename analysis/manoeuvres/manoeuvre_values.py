@@ -13,7 +13,7 @@ from .found_manoeuvre import FoundManoeuvre
 from .manoeuvre import ManoeuvreMotion
 from .sailed_manoeuvre import ManoeuvreKind
 from .spirals import spiral_curve, spiral_loop
-from .trial_signals import TrialSignals, slope
+from .trial_signals import TrialSignals, chord_ends, slope
 from .turning_circle import COURSE_SECS, turning_circle
 from .zigzag import zigzag_values
 
@@ -110,7 +110,10 @@ def with_sway(signals: TrialSignals) -> TrialSignals:
     if signals.has("sway") or not np.isfinite(signals.positions).all() or len(signals) < 3:
         return signals
     velocity = [slope(column, signals.dt_secs, COURSE_SECS) for column in signals.positions.T]
-    across = velocity[1] * np.cos(signals.heading) - velocity[0] * np.sin(signals.heading)
+    chords = chord_ends(len(signals), signals.dt_secs, COURSE_SECS)
+    # of the instant of the velocity, which at the ends of the log is the centre of a shorter chord
+    heading = np.interp(np.mean(chords, axis=0), np.arange(len(signals)), signals.heading)
+    across = velocity[1] * np.cos(heading) - velocity[0] * np.sin(heading)
     return replace(signals, sway=across)
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shiplog.types import FloatArray
 
@@ -153,13 +154,23 @@ def filled_signals(signals: TrialSignals) -> TrialSignals:
 
 def slope(values: FloatArray, dt: float, half_secs: float) -> FloatArray:
     """Return the central difference quotient over `half_secs` to either side, (n,) per s."""
-    k = max(1, min(round(half_secs / dt), (len(values) - 1) // 2))
     if len(values) < 3:
         return np.zeros(len(values))
-    ahead = np.minimum(np.arange(len(values)) + k, len(values) - 1)
-    behind = np.maximum(np.arange(len(values)) - k, 0)
+    behind, ahead = chord_ends(len(values), dt, half_secs)
     rates: FloatArray = (values[ahead] - values[behind]) / ((ahead - behind) * dt)
     return rates
+
+
+def chord_ends(
+    count: int, dt: float, half_secs: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the samples `half_secs` before and after each of at least three, (n,) both.
+
+    At the ends of the signals the chord between them is shorter, and its centre is another sample.
+    """
+    k = max(1, min(round(half_secs / dt), (count - 1) // 2))
+    samples = np.arange(count)
+    return np.maximum(samples - k, 0), np.minimum(samples + k, count - 1)
 
 
 def longest_gap(values: FloatArray, dt: float) -> float:
