@@ -12,7 +12,7 @@ from analysis.manoeuvres.imo_criteria import RULES, CriterionRule, limit
 from analysis.manoeuvres.manoeuvre_part import STEERED
 from analysis.manoeuvres.manoeuvre_values import mean_before
 from analysis.manoeuvres.sailed_manoeuvre import NotComputed, SailedManoeuvre
-from analysis.manoeuvres.start_rules import RuleSettings
+from analysis.manoeuvres.start_rules import STATED_SECS, RuleSettings
 from analysis.manoeuvres.trial_index import TrialIndex
 from analysis.manoeuvres.trial_signals import TrialSignals, filled_signals
 from analysis.manoeuvres.water_velocity import AssumedErrors, VelocityErrors, velocity_errors
@@ -104,9 +104,28 @@ def analyse_trial(
         start_rule=str(trial_options.start_rule),
         manoeuvres=tuple(manoeuvres),
         criteria=tuple(_criterion(rule, manoeuvres, conditions) for rule in RULES),
-        not_computed=(*detection.rejected, *_reasons(record.signals, detection, conditions)),
+        not_computed=(
+            *detection.rejected,
+            *_reasons(record.signals, detection, conditions),
+            *_unused_executes(manoeuvres, trial_options, filled.dt_secs),
+        ),
         warnings=record.warnings,
     )
+
+
+def _unused_executes(
+    manoeuvres: Sequence[SailedManoeuvre], options: TrialOptions, dt: float
+) -> list[NotComputed]:
+    """Name the stated executes from which no manoeuvre counts."""
+    reason = (
+        f"no manoeuvre's rudder begins to move from {STATED_SECS[1]:g} s before to "
+        f"{STATED_SECS[0]:g} s after it"
+    )
+    return [
+        NotComputed(f"the stated execute at {stated:g} s", reason)
+        for stated in options.execute_secs
+        if not any(abs(each.execute_secs - stated) < dt for each in manoeuvres)
+    ]
 
 
 def _conditions(

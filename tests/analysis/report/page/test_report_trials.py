@@ -30,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def output(folder: Path) -> dict[str, object]:
     """Run the verb on a turning circle of a ship of a stated length; return its JSON."""
-    arguments = ["report", str(CIRCLE), "--length", "200", "--execute", "10"]
+    arguments = ["report", str(CIRCLE), "--length", "200", "--execute", "10,300"]
     outputs = ["-o", f"{folder}/r.html", "--json", f"{folder}/r.json"]
     assert main([*arguments, *outputs]) == 0
     return json.loads((folder / "r.json").read_text("utf-8"))  # type: ignore[no-any-return]
@@ -51,8 +51,10 @@ def test_the_verb_writes_the_page_and_the_numbers(folder: Path, output: dict[str
     page = (folder / "r.html").read_text("utf-8")
     assert f"{advance['value']:.0f} m" in page
     assert "Filter residuals" in page
-    assert "times stated, s from the start of the log: 10" in page
-    assert f"shiplog report {CIRCLE} --length=200.0 --execute=10" in page
+    assert "the stated execute at 300 s" in page  # from which no manoeuvre counts
+    assert "the stated execute at 10 s" not in page
+    assert "times stated, s from the start of the log: 10, 300" in page
+    assert f"shiplog report {CIRCLE} --length=200.0 --execute=10,300" in page
     assert len(page.encode()) < 400_000
 
 
