@@ -67,5 +67,5 @@ def test_the_commands_run_as_written_and_only_shiplog_writes_to_stderr(
         assert foreign_lines(err) == [], command
         for option in re.findall(r"(?:-o|--json) (\S+)", command):
             assert Path(option).stat().st_size > 0, command
-    assert set(verbs) == {"replay", "convert", "record", "identify", "check"}
+    assert set(verbs) == {"replay", "report", "convert", "record", "identify", "check"}
     assert len(verbs) >= 12

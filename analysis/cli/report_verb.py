@@ -82,7 +82,7 @@ def _report(arguments: argparse.Namespace) -> ExitCode:
 
     if arguments.pdf:
         find_browser()  # before the work
-    with progress("analysis", lines=len(arguments.log) > 1) as on_progress:
+    with progress("analysis", lines=arguments.model is not None) as on_progress:
         report = report_trials(
             [ReportPart(path, arguments.start, arguments.end) for path in arguments.log],
             options,

@@ -3,7 +3,8 @@
 import re
 
 OURS = re.compile(
-    "(shiplog|warning|review|vessel file|skipped[^:]*|updated|replay and reference, overlaid): "
+    "(shiplog|warning|review|report|vessel file|skipped[^:]*|updated|"
+    "replay and reference, overlaid): "
 )
 
 
