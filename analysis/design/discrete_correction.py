@@ -101,9 +101,15 @@ def matched_correction(A: FloatArray, C: FloatArray, L: FloatArray, dt: float) -
 
 
 def sampled_poles(F: FloatArray, C: FloatArray, M: FloatArray, dt: float) -> ComplexArray:
-    """Return the poles (n,) of (I - M C) F as continuous ones, 1/s, the slowest last."""
-    values = np.linalg.eigvals((np.eye(len(F)) - M @ C) @ F).astype(complex)
-    with np.errstate(divide="ignore"):
-        poles: ComplexArray = np.log(values) / dt
+    """Return the poles (n,) of (I - M C) F as continuous ones, 1/s, the slowest last.
+
+    A pole at z = 0, of an error that vanishes at each sample, is -inf: an observer of reduced order
+    has as many as outputs.
+    """
+    transition = (np.eye(len(F)) - M @ C) @ F
+    values = np.linalg.eigvals(transition).astype(complex)
+    vanishing = np.abs(values) <= np.finfo(float).eps * np.linalg.norm(F)
+    poles: ComplexArray = np.full(len(values), -np.inf, dtype=complex)
+    poles[~vanishing] = np.log(values[~vanishing]) / dt
     order = np.lexsort((poles.imag, poles.real))
     return np.asarray(poles[order])

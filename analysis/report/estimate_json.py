@@ -3,6 +3,8 @@
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from analysis.design.discrete_correction import sampled_poles
 from analysis.linear.estimate import EstimateFindings
 from shiplog import __version__
@@ -84,6 +86,6 @@ def _estimator(findings: EstimateFindings) -> dict[str, Any]:
         sampled = sampled_poles(model.step.F, model.C, design.correction, model.dt)
         found |= {
             "correction": design.correction.tolist(),
-            "sampled_poles": poles_as_pairs(sampled),
+            "sampled_poles": poles_as_pairs(sampled[np.isfinite(sampled)]),
         }
     return found

@@ -68,11 +68,14 @@ def _design_tables(findings: EstimateFindings) -> Iterator[TextTable]:
         return
     C, F = plan.model.C, plan.model.step.F
     sampled = np.sort_complex(sampled_poles(F, C, design.correction, plan.clock.dt_secs))
-    remark = f"Poles of the sampled estimator: {', '.join(map(_complex, sampled))} 1/s."
+    finite = sampled[np.isfinite(sampled)]
+    remark = f"Poles of the sampled estimator: {', '.join(map(_complex, finite))} 1/s"
+    if len(finite) < len(sampled):
+        remark += f"; {len(sampled) - len(finite)} more at z = 0, whose errors vanish at each sample"
     table = _gain_table(
         "Correction M at each sample", plan.states, system.plant.sensors, design.correction
     )
-    yield TextTable(table.title, table.columns, table.rows, (remark,))
+    yield TextTable(table.title, table.columns, table.rows, (f"{remark}.",))
 
 
 def _spectrum_tables(findings: EstimateFindings) -> Iterator[TextTable]:

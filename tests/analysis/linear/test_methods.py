@@ -230,6 +230,12 @@ def test_reduced_order_is_the_observer_z_of_the_paper() -> None:
     assert found["x2"] == pytest.approx(y, abs=1e-15)
 
 
+def test_a_state_that_is_replaced_by_its_measurement_has_no_finite_sampled_pole() -> None:
+    F, C, M = np.diag([0.9, 0.8]), np.array([[1.0, 0.0]]), np.array([[1.0], [0.0]])
+    poles = sampled_poles(F, C, M, 0.5)
+    assert poles.tolist() == [complex(-np.inf, 0.0), pytest.approx(np.log(0.8) / 0.5)]
+
+
 def test_matched_correction_is_exact_for_one_output_and_close_for_two() -> None:
     A, L = np.array([[0.0, 1.0], [-0.1, -0.05]]), np.array([[0.3], [0.1]])
     C = np.array([[1.0, 0.0]])
