@@ -64,15 +64,17 @@ class Accuracy:
 def motion(
     A: FloatArray, B: FloatArray, u: FloatArray, noise_std: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
-    """Simulate x' = A x + B u + w, u (n, r) being held and w white of intensity noise_std²."""
+    """Simulate x' = A x + B u + w, u (n, r) linear between samples, w white of noise_std²."""
     n, h = len(A), DT_SECS / SUBSTEPS
     whole = expm(np.block([[A, B], [np.zeros((B.shape[1], n + B.shape[1]))]]) * h)
     F, G = whole[:n, :n], whole[:n, n:]
     states, x = np.empty((len(u), n)), np.zeros(n)
+    changes = np.diff(u, axis=0, append=u[-1:])
     for k in range(len(u)):
         states[k] = x
-        for _ in range(SUBSTEPS):
-            x = F @ x + G @ u[k] + noise_std * np.sqrt(h) * rng.standard_normal(n)
+        for share in (np.arange(SUBSTEPS) + 0.5) / SUBSTEPS:
+            middle = u[k] + share * changes[k]
+            x = F @ x + G @ middle + noise_std * np.sqrt(h) * rng.standard_normal(n)
     return states
 
 

@@ -33,7 +33,8 @@ def test_estimates_are_more_accurate_than_the_sensors_and_their_bands_hold(name:
     found = estimate(simulated.log, load_system(SYSTEMS / f"{name}.toml"))
     accuracies = list(example().accuracies(simulated, found))
     assert all(each.error < 0.7 * each.sensor for each in accuracies if each.sensor > 0)
-    assert all(each.within > 0.8 for each in accuracies)
+    assert all(each.within > 0.9 for each in accuracies)
+    assert all(each.consistent and each.white for each in found.findings.residuals)
     if found.findings.costs is not None:
         assert found.findings.costs.predicted.total < found.findings.costs.recorded.total
 
