@@ -31,6 +31,7 @@ SECONDS = {
 }  # fmt: skip
 COURSE, HELM_DEG, HELM_PERIOD = 3.0, (0.0, 1.5), (30.0, 60.0)
 CURRENT_STD, COMPASS_STD, LOG_STD = 0.4, radians(0.5), 0.02
+DEFLECTION_STD = radians(0.25)
 SEED = 1
 HEAD = """# The intervals of manoeuvring indices, tried on independent ships
 
@@ -41,9 +42,10 @@ Printed by `python examples/trial_intervals.py --trials {trials} > docs/trial_in
 equations and not by a model of shiplog. Half of them turn to port first; helm in the approach has
 an amplitude of 0 to 1.5°; the current has a standard deviation of {current} m/s in each component.
 Good sensors: 2 Hz, heading and rudder 0.1°, log 0.05 m/s, position 1 m. Poor ones: 1 Hz, 0.3°,
-0.15 m/s, 3 m. Compass and log have constant errors of 0.5° and 2 % (standard deviations), which the
-analysis assumes. The true index is that of the noise-free motion through the water, from the
-instant of the order and the course steered.
+0.15 m/s, 3 m. Compass and log have constant errors of 0.5° and 2 % (standard deviations), and the
+compass deflects by 0.25° (standard deviation) within 10 s of the order, as the analysis assumes.
+The true index is that of the noise-free motion through the water, from the instant of the order and
+the course steered.
 """
 
 
@@ -113,6 +115,8 @@ def try_intervals(kind: str, trials: int) -> tuple[dict[str, Score], int]:
             GOOD if number // 6 % 2 else POOR,
             compass_bias=rng.normal(0, COMPASS_STD),
             speed_scale=rng.normal(0, LOG_STD),
+            compass_deflection=rng.normal(0, DEFLECTION_STD),
+            deflected_at=steering.execute,
         )
         current = (rng.normal(0, CURRENT_STD), rng.normal(0, CURRENT_STD))
         log = as_log(trial, sensors, rng, current)

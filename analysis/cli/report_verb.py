@@ -2,7 +2,8 @@
 
 import argparse
 import shlex
-from math import isfinite, nan
+from dataclasses import replace
+from math import isfinite, nan, radians
 from typing import TYPE_CHECKING
 
 from shiplog.cli.console import print_line, print_tables, print_warnings, progress, write_json
@@ -18,9 +19,10 @@ if TYPE_CHECKING:
 
 DEFAULT_PAGE = "report.html"
 MAX_TEST_SPEED = 50.0  # m/s
+MAX_COMPASS_ERROR_DEG = 10.0
 VALUES = (  # the options with one value, by their names in the parsed arguments
     "vessel", "length", "sensor_delay", "start", "end",
-    "start_rule", "execute", "antenna", "test_speed", "model",
+    "start_rule", "execute", "antenna", "test_speed", "compass_error", "model",
 )  # fmt: skip
 
 
@@ -45,6 +47,13 @@ def _configure_report(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--test-speed", type=float, metavar="M/S", help="V of the norm (default: the log's)"
+    )
+    parser.add_argument(
+        "--compass-error",
+        type=float,
+        metavar="DEG",
+        help="standard uncertainty of the compass in a change of heading, ° (default: 0.25, of "
+        "IMO A.821(19), 4.1.2)",
     )
     parser.add_argument(
         "--model",
@@ -122,13 +131,19 @@ def _trial_options(arguments: argparse.Namespace) -> "TrialOptions":
         raise UsageError(
             f"--test-speed takes m/s between 0 and {MAX_TEST_SPEED:g}, not {arguments.test_speed:g}"
         )
-    return TrialOptions(
+    error_deg = arguments.compass_error
+    if error_deg is not None and not 0 <= error_deg <= MAX_COMPASS_ERROR_DEG:
+        raise UsageError(
+            f"--compass-error takes degrees from 0 to {MAX_COMPASS_ERROR_DEG:g}, not {error_deg:g}"
+        )
+    options = TrialOptions(
         StartRule(rule),
         execute_secs=executes,
         antenna_forward=antenna[0],
         antenna_starboard=antenna[1],
         test_speed=arguments.test_speed,
     )
+    return options if error_deg is None else replace(options, compass_change_std=radians(error_deg))
 
 
 def _numbers(text: str | None, option: str, example: str) -> tuple[float, ...]:

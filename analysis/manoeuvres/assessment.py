@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import nan
+from math import nan, radians
 
 import numpy as np
 
@@ -31,12 +31,15 @@ class AssessmentSettings:
         The start rule.
     antenna
         Place of the antenna ahead and to starboard of the midship point, m.
+    compass_change_std
+        Assumed standard deviation of the compass's error in a change of heading, rad.
     ship
         ``length``, m, and ``test_speed``, m/s; NaN where unknown.
     """
 
     rules: RuleSettings = field(default_factory=RuleSettings)
     antenna: tuple[float, float] = (0.0, 0.0)
+    compass_change_std: float = radians(0.25)
     ship: Mapping[str, float] = field(default_factory=lambda: {"length": nan, "test_speed": nan})
 
 
@@ -71,7 +74,7 @@ def assess(
         part.half_secs,
         errors,
         settings.antenna,
-        signals.has("heading"),
+        settings.compass_change_std if signals.has("heading") else None,
     )
     case, missing = inputs.case(), part.missing()
     indices: tuple[TrialIndex, ...] = ()

@@ -22,9 +22,9 @@ from .water_velocity import VelocityErrors, corrected_signals
 DRAWS = 40  # of the noise and the sampling instants
 SEED = 1
 COVERAGE_FACTOR = 1.959963984540054  # of 95 %, normal distribution
-NOISE, VELOCITY, START, APPROACH, GYRO = (
+NOISE, VELOCITY, START, APPROACH, COMPASS, GYRO = (
     "sensor noise and sampling", "current, log and compass", "start rule", "approach heading",
-    "gyro bias",
+    "slow error of the compass", "gyro bias",
 )  # fmt: skip
 GYRO_BIAS_STD = np.radians(0.005)  # rad/s, of a heading that is the integral of the yaw rate
 HELM_CORRELATION_SECS = 25.0  # of the heading under helm
@@ -52,8 +52,9 @@ class IndexInputs:
         Current and systematic errors.
     antenna
         Place of the antenna ahead and to starboard of the midship point, m.
-    has_compass
-        Whether the heading was measured; else it is the integral of the yaw rate.
+    compass_change_std
+        Assumed standard deviation of the compass's error in a change of heading, rad; None where
+        the heading is the integral of the yaw rate.
     """
 
     signals: TrialSignals
@@ -63,7 +64,7 @@ class IndexInputs:
     half_secs: float
     errors: VelocityErrors
     antenna: tuple[float, float]
-    has_compass: bool
+    compass_change_std: float | None
 
     def case(
         self,
@@ -105,11 +106,14 @@ def index_stds(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, di
     changes: dict[str, list[dict[str, float]]] = {
         NOISE: [_deviation(values, _draws(inputs))],
         START: [_start_change(inputs, values)],
-        APPROACH: [_approach_change(inputs, values)],
+        APPROACH: [_heading_change(inputs, values, approach_std(inputs))],
         VELOCITY: _velocity_changes(inputs, values),
     }
-    if not inputs.has_compass:
+    if inputs.compass_change_std is None:
         changes[GYRO] = [_gyro_change(inputs, values)]
+    else:
+        std = float(np.hypot(inputs.compass_change_std, inputs.signals.heading_step / np.sqrt(6.0)))
+        changes[COMPASS] = [_heading_change(inputs, values, std)]
     return {
         name: {
             source: float(np.sqrt(sum(change.get(name, 0.0) ** 2 for change in each)))
@@ -141,8 +145,11 @@ def _start_change(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str,
     )
 
 
-def _approach_change(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, float]:
-    base, std = inputs.case(), approach_std(inputs)
+def _heading_change(
+    inputs: IndexInputs, values: Mapping[str, float], std: float
+) -> dict[str, float]:
+    """Return the changes of the indices where all changes of heading have an error, rad."""
+    base = inputs.case()
     return _difference(values, lambda sign: replace(base, approach=base.approach + sign * std))
 
 

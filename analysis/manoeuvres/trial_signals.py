@@ -40,6 +40,8 @@ class TrialSignals:
         Sampling interval of each channel, s, by its name.
     noise
         Standard deviation of the white noise of one sample, by the name of the channel, SI.
+    heading_step
+        Step in which the heading was recorded, rad; 0 where it is not known.
     events
         Marked events: time from the first instant, s, and text.
     """
@@ -56,6 +58,7 @@ class TrialSignals:
     power: FloatArray
     intervals: Mapping[str, float] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
+    heading_step: float = 0.0
     events: tuple[tuple[float, str], ...] = ()
 
     def __len__(self) -> int:
@@ -116,10 +119,31 @@ def noise_std(values: FloatArray) -> float:
     if len(known) < MIN_NOISE_SAMPLES:
         return 0.0
     size = float(np.median(np.abs(np.diff(known, 3)))) * MAD_TO_STD / NOISE_DIFFERENCE_GAIN
-    steps = np.abs(np.diff(known))
-    moving = steps[steps > 1e-12 * max(1.0, float(np.max(np.abs(known))))]
-    quantum = float(np.min(moving)) if len(moving) else 0.0
-    return float(max(size, quantum / np.sqrt(12.0)))
+    return float(max(size, printed_step(known) / np.sqrt(12.0)))
+
+
+def printed_step(values: FloatArray) -> float:
+    """Return the step in which a channel was recorded: its smallest change between samples.
+
+    Parameters
+    ----------
+    values
+        (n,) samples without NaN.
+
+    Returns
+    -------
+    float
+        In the unit of the values; 0 where they do not change.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> round(printed_step(np.array([10.0, 10.0, 10.5, 11.5])), 6)
+    0.5
+    """
+    steps = np.abs(np.diff(values))
+    moving = steps[steps > 1e-12 * max(1.0, float(np.max(np.abs(values), initial=0.0)))]
+    return float(np.min(moving)) if len(moving) else 0.0
 
 
 def interpolated(values: FloatArray) -> FloatArray:

@@ -89,6 +89,7 @@ def analyse_trial(
     settings = AssessmentSettings(
         rules,
         (trial_options.antenna_forward, trial_options.antenna_starboard),
+        trial_options.compass_change_std,
         {"length": conditions.length, "test_speed": conditions.test_speed},
     )
     manoeuvres = []

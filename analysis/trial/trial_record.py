@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.manoeuvres.trial_signals import TrialSignals, noise_std
+from analysis.manoeuvres.trial_signals import TrialSignals, noise_std, printed_step
 from analysis.replay.position_fixes import PositionFixes
 from analysis.replay.reading_options import ReadingOptions
 from shiplog.checks.channel_stats import LogStats
@@ -89,7 +89,7 @@ def read_trial(log: Log, options: ReadingOptions, on_progress: ProgressCallback)
     clock = with_steering_gear(
         _clock(stats, log.name), vessel.rudder_rate if vessel else Vessel("", None).rudder_rate
     )
-    values, fixes, noise = _read(screened, clock, stats, on_progress)
+    values, fixes, noise, heading_step = _read(screened, clock, stats, on_progress)
     count = len(values)
     absent = np.full(count, np.nan)
     north_east = fixes.at_samples([values])[0]
@@ -112,6 +112,7 @@ def read_trial(log: Log, options: ReadingOptions, on_progress: ProgressCallback)
             positions=np.full((count, 2), np.nan) if north_east is None else north_east,
             intervals=intervals,
             noise=noise,
+            heading_step=heading_step,
             events=events,
             **used,
         ),
@@ -148,8 +149,8 @@ def _clock(stats: LogStats, name: str) -> Clock:
 
 def _read(
     log: ScreenedLog, clock: Clock, stats: LogStats, on_progress: ProgressCallback
-) -> tuple[Signals, PositionFixes, dict[str, float]]:
-    """Resample the scalar channels, and gather the fixes and samples to estimate noise from."""
+) -> tuple[Signals, PositionFixes, dict[str, float], float]:
+    """Resample the scalar channels; return them, the fixes, noise, and the heading's step."""
     fixes = PositionFixes(stats.get("position"))
     raw: dict[str, list[FloatArray]] = {name: [] for name in clock.channels}
 
@@ -169,17 +170,15 @@ def _read(
     for signals in resample_chunks(chunks(), clock):
         parts.append(signals)
         on_progress("read the log", (signals.first + len(signals)) / clock.count)
-    noise = {
-        name: noise_std(
-            np.unwrap(np.concatenate(kept)) if name == "heading" else np.concatenate(kept)
-        )
-        for name, kept in raw.items()
-        if kept
-    }
+    samples = {name: np.concatenate(kept) for name, kept in raw.items() if kept}
+    if "heading" in samples:
+        samples["heading"] = np.unwrap(samples["heading"])
+    noise = {name: noise_std(each) for name, each in samples.items()}
     _, north_east = fixes.north_east()
     if len(north_east):
         noise["position"] = max(noise_std(column) for column in north_east.T)
-    return concatenate_signals(parts), fixes, noise
+    heading_step = printed_step(samples.get("heading", np.empty(0)))
+    return concatenate_signals(parts), fixes, noise, heading_step
 
 
 def _mean(values: Signals, name: str) -> float:

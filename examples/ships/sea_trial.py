@@ -170,8 +170,11 @@ class Sensors:
     compass_bias: float = 0.0
     speed_scale: float = 0.0
     gyro_bias: float = 0.0
+    compass_deflection: float = 0.0  # from `deflected_at`, s, within `DEFLECTION_SECS`
+    deflected_at: float = 0.0
 
 
+DEFLECTION_SECS = 10.0
 GOOD = Sensors()
 POOR = Sensors(1.0, radians(0.3), radians(0.05), 0.15, radians(0.3), 3.0)
 
@@ -193,7 +196,9 @@ def as_log(
     def sampled(values: NDArray[np.float64], std: float) -> NDArray[np.float64]:
         return np.interp(at, trial.time, values) + rng.normal(0.0, std, len(at))
 
-    heading = sampled(trial.heading + sensors.compass_bias, sensors.heading) % (2 * pi)
+    share = np.clip((trial.time - sensors.deflected_at) / DEFLECTION_SECS, 0.0, 1.0)
+    shown = trial.heading + sensors.compass_bias + sensors.compass_deflection * share
+    heading = sampled(shown, sensors.heading) % (2 * pi)
     columns = {
         "yaw_rate": ("rad/s", sampled(trial.yaw_rate + sensors.gyro_bias, sensors.yaw_rate)),
         "speed": ("m/s", sampled(trial.speed * (1 + sensors.speed_scale), sensors.speed)),

@@ -145,6 +145,8 @@ def test_a_report_can_be_pickled_and_gives_the_same_page(poor: tuple[TrialReport
         (["--execute", "soon"], "--execute takes numbers"),
         (["--antenna", "3"], "--antenna takes two numbers"),
         (["--test-speed", "-1"], "--test-speed takes m/s"),
+        (["--compass-error", "-1"], "--compass-error takes degrees"),
+        (["--compass-error", "nan"], "--compass-error takes degrees"),
         (["--length", "0"], "length"),
     ],
 )
