@@ -97,7 +97,7 @@ def test_no_choice_of_eigenvectors_has_less_noise_at_the_same_poles(seed: int) -
     starts = np.random.default_rng(0).standard_normal((3, 8))
     least = min(minimize(logarithm, start, method="BFGS").fun for start in starts)
     ours = float(np.log(stds(A, C, placed(seed, 4, 2).gain)).sum())
-    assert ours == pytest.approx(least, abs=5e-3)
+    assert ours <= least + 5e-3  # a search may end above: its minimum is local
 
 
 @pytest.mark.parametrize(
