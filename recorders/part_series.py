@@ -47,6 +47,11 @@ class PartSeries:
                 self._first_ns = min(self._first_ns, int(times.min()))
                 self._last_ns = max(self._last_ns, int(times.max()))
 
+    @property
+    def span_secs(self) -> float:
+        """How long the part lasts by the times of reception in it, s."""
+        return max(self._last_ns - self._first_ns, 0) * 1e-9
+
     def end(self, following: str) -> dict[str, str]:
         """Return the metadata of the end; `following` is the next part's name, empty for none."""
         content = f"{self._messages} messages"

@@ -36,7 +36,7 @@ def _recover(arguments: argparse.Namespace) -> ExitCode:
     print_line(
         f"also {recovery.attachments} attachments and {recovery.metadata_records} metadata records"
     )
-    warnings = damage_warnings(recovery.damage)
+    warnings = [*recovery.part_warnings, *damage_warnings(recovery.damage)]
     if not recovery.is_finished:
         warnings.append(
             "the file was not finished (the recorder was stopped or killed)"

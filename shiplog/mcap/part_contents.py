@@ -36,6 +36,7 @@ class PartContents:
             selected=whole.selected,
             keep_undescribed=whole.keep_undescribed,
             keeps=whole.keeps,
+            keep_records=whole.keep_records,
             latest_ns=whole.latest_ns,
         )
 
@@ -52,6 +53,8 @@ class PartContents:
         for own_id, kept in own.take_kept().items():
             moved_kept = [replace(k, number=k.number + self._first_block) for k in kept]
             whole.kept.setdefault(self._channel_ids[own_id], []).extend(moved_kept)
+        whole.records += own.records
+        own.records = []
         for event in own.event_messages:
             position = event.position + (self._first_block << 32)
             whole.event_messages.append(replace(event, position=position))

@@ -145,6 +145,12 @@ def test_a_rotation_by_time_is_due_after_its_minutes() -> None:
     assert rotation.is_due(120.0, 0)
 
 
+def test_a_rotation_by_time_follows_the_times_of_what_is_received(tmp_path: Path) -> None:
+    recording = record(Sensor(), tmp_path / "a.mcap", rotation=Rotation(minutes=1.5 / 60))
+    assert [file.name for file in recording.files] == ["a.001.mcap", "a.002.mcap"]
+    assert [len(read(file)["yaw_rate"]) for file in recording.files] == [20, 10]
+
+
 def test_a_log_that_is_not_to_be_replaced_is_refused_before_anything_is_recorded(
     tmp_path: Path,
 ) -> None:

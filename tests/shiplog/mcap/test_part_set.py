@@ -1,10 +1,13 @@
 """Logs of several files: divided recordings, and the hourly files of other recorders."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap import records
+from mcap.reader import make_reader
 
 from recorders.record import Rotation, record
 from recorders.source import Recordable
@@ -12,6 +15,8 @@ from shiplog import Channel, LogError, LogWriter, TrialLog, UsageError, open_log
 from shiplog.checks.info import read_log_info
 from shiplog.mcap.part_names import part_files
 from shiplog.mcap.raw_reader import read_raw
+from shiplog.mcap.recover import recover
+from shiplog.tables.convert import convert
 from shiplog.types import Event, RawPackets
 
 START = 1_700_000_000 * 10**9
@@ -139,6 +144,44 @@ def test_a_missing_last_part_is_noticed(divided: Path) -> None:
     log = read(divided)
     assert log.data_lost
     assert f"the recording goes on in {last.name}, which is missing" in log.warnings[0]
+
+
+def test_recovery_makes_one_file_of_all_parts(divided: Path) -> None:
+    good = divided.with_name("good.mcap")
+    recovery = recover(divided, good)
+    assert recovery.lost_messages == {}
+    assert not recovery.is_lost
+    _require_equal(read(good), replace(read(divided), name="good.mcap"))
+    assert recovery.attachments == 1  # each part has the vessel file
+
+
+def test_recovery_without_a_part_states_that_it_is_lost(divided: Path) -> None:
+    divided.with_name("trial.002.mcap").unlink()
+    recovery = recover(divided, divided.with_name("good.mcap"))
+    assert recovery.is_lost
+    assert recovery.lost_messages is None
+    assert "part 2 of the recording is missing" in recovery.part_warnings[0]
+
+
+def test_copies_of_hourly_files_keep_their_attachments_and_their_different_channels(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "day").mkdir()
+    for hour, names in enumerate((("yaw_rate", "speed"), ("speed", "yaw_rate"))):
+        at = START + hour * 5 * 10**9 + np.arange(50) * 10**8
+        photo = records.Attachment(0, at[0].item(), f"{hour}.jpg", "image/jpeg", b"\xff")
+        with LogWriter(tmp_path / "day" / f"{hour}.mcap", vessel_toml="# a vessel") as log:
+            log.write(*(_channel(name, at, np.full(50, float(len(name)))) for name in names))
+            log.write_records([photo], [])
+    convert(tmp_path / "day", tmp_path / "copy.mcap")
+    assert recover(tmp_path / "day", tmp_path / "good.mcap").lost_messages == {}
+    for path in (tmp_path / "copy.mcap", tmp_path / "good.mcap"):
+        log = read(path)
+        np.testing.assert_array_equal(log["yaw_rate"].values, np.full(100, 8.0))
+        np.testing.assert_array_equal(log["speed"].values, np.full(100, 5.0))
+        with path.open("rb") as stream:
+            attached = {each.name for each in make_reader(stream).iter_attachments()}
+        assert attached == {"0.jpg", "1.jpg", "vessel.toml"}
 
 
 def test_the_remainder_of_a_killed_recorder_is_the_last_part(divided: Path) -> None:
