@@ -281,13 +281,12 @@ class _RecordedPart:
             end = _End.INTERRUPTED
         except ShiplogError as error:
             if self._has_data:
-                message = f"{error}; the {writer.samples} samples until then are in {self._part}"
+                message = f"{error}; at least {self.samples} samples until then are in {self._part}"
                 raise ShiplogError(message) from error
             self._delete()
             raise
         if self._part != self._final:
             self._rename()
-        self.samples = writer.samples
         return end
 
     def _following_name(self) -> str:
@@ -349,6 +348,7 @@ class _RecordedPart:
                 writer.flush()
                 disk.check()
                 size = self._part.stat().st_size  # fails, too, where the file was deleted
+            self.samples = writer.samples
             self.topics.update(item.topic for item in chunk if isinstance(item, Channel))
             if self._series:
                 self._series.add(chunk)

@@ -32,10 +32,14 @@ def require_outputs(*paths: StrPath | None) -> None:
 
 
 def require_distinct(outputs: Sequence[StrPath | None], inputs: Sequence[StrPath | None]) -> None:
-    """Refuse to write over an input or over another output; devices may be shared."""
+    """Refuse to write over an input, a part of one, or another output; devices may be shared."""
+    from shiplog.mcap.part_names import part_files
+
     written = [Path(path).resolve() for path in outputs if path and str(path) != "-"]
     written = [path for path in written if not is_device(path)]
-    read = [Path(path).resolve() for path in inputs if path]
+    read = {
+        file.resolve() for path in inputs if path for file in (Path(path), *part_files(Path(path)))
+    }
     for path in written:
         if written.count(path) > 1 or path in read:
             raise UsageError(f"the same file is named twice; name another for the output: {path}")

@@ -13,6 +13,7 @@ from shiplog.checks.data_quality import times_in_words
 from shiplog.errors import UsageError
 from shiplog.mcap.clock_repair import refuse_mixed_times
 from shiplog.mcap.kept_records import KeptGroup, kept_groups
+from shiplog.mcap.part_names import part_files
 from shiplog.mcap.raw_reader import raw_groups
 from shiplog.mcap.trial_log import concerns_kept, no_samples_error
 from shiplog.mcap.writer import write
@@ -123,8 +124,8 @@ def _check_target(source: Path, target: Path, shape: CsvShape | None) -> None:
         )
     if shape is not None and suffix != ".csv":
         raise UsageError(f"only a .csv file has a shape and units to choose; omit them: {target}")
-    if source.resolve() == target.resolve():
-        raise UsageError(f"source and target are the same file; name another target: {target}")
+    if target.resolve() in {file.resolve() for file in (source, *part_files(source))}:
+        raise UsageError(f"the target is the source or a part of it; name another target: {target}")
 
 
 def _kept_within(

@@ -30,6 +30,9 @@ def test_an_output_over_an_input_or_another_output_is_rejected(tmp_path: Path) -
     for outputs in ([log], [review, review]):
         with pytest.raises(UsageError, match="named twice"):
             require_distinct(outputs, [log])
+    (tmp_path / "a.001.mcap").touch()
+    with pytest.raises(UsageError, match="named twice"):
+        require_distinct([tmp_path / "a.001.mcap"], [log])  # a part of it
     require_distinct([review, None, "-", "-", "/dev/null", "/dev/null"], [log, None])
 
 

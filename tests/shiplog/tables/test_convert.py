@@ -75,7 +75,7 @@ def test_a_target_of_unknown_suffix_is_an_error_that_lists_the_others(tmp_path: 
 def test_source_and_target_must_differ(tmp_path: Path) -> None:
     write(trial(), tmp_path / "a.mcap")
     (tmp_path / "sub").mkdir()
-    with pytest.raises(UsageError, match="the same file"):
+    with pytest.raises(UsageError, match="the target is the source"):
         convert(tmp_path / "a.mcap", tmp_path / "sub" / ".." / "a.mcap")
     assert len(read(tmp_path / "a.mcap").channels) == 4
 
