@@ -106,7 +106,7 @@ def test_what_a_table_or_a_layout_does_not_keep_is_named(tmp_path: Path) -> None
     _, warnings = convert(source, tmp_path / "table.csv")
     texts = " ".join(warnings)
     assert "topics of other programs: /odd" in texts
-    assert "a table does not keep: attachment 'photo.jpg', metadata 'rosbag2'" in texts
+    assert "only a copy in MCAP keeps: attachment 'photo.jpg', metadata 'rosbag2'" in texts
     layout = tmp_path / "layout.toml"
     layout.write_text("[rpm]\ntopic = '/odd'\ntype = 'A'\nfield = 'x'\nunit = 'rpm'\n")
     with (tmp_path / "bag.mcap").open("wb") as stream:
