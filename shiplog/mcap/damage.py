@@ -77,16 +77,19 @@ def damage_warnings(damage: Sequence[Damage]) -> list[str]:
 
 
 def lost_messages_text(messages: int, topics: Iterable[str], span_ns: tuple[int, int]) -> str:
-    """Return in words what was lost; of an unknown number of messages, 0, without it.
+    """Return in words what was lost; of an unknown number, 0, or span, of zeros, without it.
 
     Examples
     --------
     >>> lost_messages_text(20, ["/rudder/gauge"], (0, 1))[:29]
     'lost 20 messages of /rudder/g'
+    >>> lost_messages_text(0, [], (0, 0))
+    'lost the samples'
     """
     number = f"{messages} messages" if messages else "the samples"
     of_topics = f" of {', '.join(topics)}" if topics else ""
-    return f"lost {number}{of_topics} received {span_text(span_ns)}"
+    received = f" received {span_text(span_ns)}" if any(span_ns) else ""
+    return f"lost {number}{of_topics}{received}"
 
 
 def gap_damage(start: int, end: int, summary: McapSummary | None) -> Damage:
