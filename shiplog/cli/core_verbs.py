@@ -162,7 +162,8 @@ def _convert(arguments: argparse.Namespace) -> ExitCode:
         )
     print_warnings(warnings)
     samples = sum(len(channel) for channel in log.channels)
-    print_line(f"{arguments.target}: {samples} samples of {len(log.channels)} channels")
+    channels = "1 channel" if len(log.channels) == 1 else f"{len(log.channels)} channels"
+    print_line(f"{arguments.target}: {samples} samples of {channels}")
     return ExitCode.DATA_LOST if log.data_lost else ExitCode.OK
 
 
@@ -194,7 +195,10 @@ CONVERT = Verb(
 
 def _configure_layout(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "table", metavar="FILE", type=Path, help="a foreign table with a header, or an MCAP file"
+        "table",
+        metavar="FILE",
+        type=Path,
+        help="a foreign table with a header, or an MCAP or ULog file of another program",
     )
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="layout file to write")
 

@@ -170,4 +170,4 @@ def test_the_verbs_draft_and_convert(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert main(["convert", str(bag), str(tmp_path / "o.mcap"), "--layout", str(layout)]) == 0
     output = capsys.readouterr()
     assert "recognised by name: speed" in output.err
-    assert "20 samples of 1 channels" in output.out
+    assert "20 samples of 1 channel\n" in output.out
