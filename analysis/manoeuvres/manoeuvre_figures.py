@@ -7,9 +7,10 @@ import numpy as np
 from shiplog.types import FloatArray
 
 from .manoeuvre_part import TAIL_SECS, ManoeuvrePart
-from .manoeuvre_values import IndexCase
+from .manoeuvre_values import MAX_TRACK_SMOOTHING_SECS, IndexCase
 from .sailed_manoeuvre import ManoeuvreKind, ManoeuvreMark, ManoeuvreSeries
 from .trial_index import TrialIndex
+from .turning_circle import COURSE_SECS
 
 EXECUTED = (ManoeuvreKind.STOPPING, ManoeuvreKind.ACCELERATION)
 
@@ -30,11 +31,11 @@ def manoeuvre_series(part: ManoeuvrePart, case: IndexCase) -> ManoeuvreSeries:
         start = [np.interp(case.execute, samples, column) for column in signals.positions.T]
         made = (signals.positions[:count] - start) @ [1, 1j] * np.exp(-1j * case.approach)
         track = np.column_stack((made.real, made.imag))
-    drift = (
-        -np.arctan2(signals.sway[:count], signals.speed[:count])
-        if signals.has("sway") and signals.has("speed")
-        else none
-    )
+    drift: FloatArray = none
+    if signals.has("sway") and signals.has("speed"):
+        drift = -np.arctan2(signals.sway[:count], signals.speed[:count])
+        if not measured.has("sway"):
+            drift = _within_fixes(drift, part)
     change = signals.heading[:count] - case.approach
     return ManoeuvreSeries(
         time_secs=(np.arange(count) - case.execute) * signals.dt_secs,
@@ -47,6 +48,19 @@ def manoeuvre_series(part: ManoeuvrePart, case: IndexCase) -> ManoeuvreSeries:
         rpm=shown("rpm"),
         track=track,
     )
+
+
+def _within_fixes(drift: FloatArray, part: ManoeuvrePart) -> FloatArray:
+    """Return a drift angle from differentiated positions, NaN where these were not on both sides.
+
+    At the ends of the track its slope, and the smoothing of track and heading, are one-sided, which
+    shows as a jump.
+    """
+    fixes = np.flatnonzero(np.isfinite(part.measured.positions[:, 0])) * part.measured.dt_secs
+    margin = max(COURSE_SECS + min(part.half_secs / 2, MAX_TRACK_SMOOTHING_SECS), part.half_secs)
+    time = np.arange(len(drift)) * part.filled.dt_secs
+    inside = (time >= fixes[0] + margin) & (time <= fixes[-1] - margin)
+    return np.where(inside, drift, np.nan)
 
 
 def manoeuvre_marks(

@@ -5,7 +5,14 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from math import pi
 
-DISPLAY = {"rad": ("°", 180 / pi), "rad/s": ("°/s", 180 / pi), "W": ("kW", 1e-3)}
+from shiplog.units import UNITS
+
+DISPLAY = {
+    "rad": ("°", 180 / pi),
+    "rad/s": ("°/s", 180 / pi),
+    "W": ("kW", 1e-3),
+    "m/s": ("kn", 1 / UNITS["kn"][1]),
+}
 
 
 class Verdict(StrEnum):

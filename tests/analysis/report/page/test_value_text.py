@@ -5,7 +5,7 @@ from math import radians
 import pytest
 
 from analysis.manoeuvres.trial_index import TrialIndex
-from analysis.report.page.value_text import half_width_text, interval_text
+from analysis.report.page.value_text import half_width_text, interval_text, value_text
 
 
 def overshoot(value_deg: float, std_deg: float) -> TrialIndex:
@@ -29,3 +29,12 @@ def test_a_narrow_interval_is_rounded_outwards(
     index = overshoot(16.3457, std_deg)
     assert interval_text(index) == interval
     assert half_width_text(index) == half_width
+
+
+def test_a_speed_is_written_in_knots() -> None:
+    speed = 10 * 1852 / 3600  # m/s
+    index = TrialIndex("speed at 90°", "V90", speed, "m/s", 0.1, speed - 0.2, speed + 0.2)
+    assert value_text(index) == "10.00 kn"
+    assert interval_text(index) == "9.61 to 10.39 kn"
+    assert half_width_text(index) == "10.00 ± 0.39 kn"
+    assert index.value == pytest.approx(5.144, abs=1e-3)
