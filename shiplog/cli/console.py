@@ -123,7 +123,7 @@ def print_tables(tables: Sequence[TextTable], *, to_stderr: bool = False) -> Non
             shown = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE)
             for i, heading in enumerate(part[0]):
                 shown.add_column(
-                    heading, justify="left" if i == 0 else "right", no_wrap=i > 0, overflow="fold"
+                    heading, justify="left" if i == 0 else "right", no_wrap=True, overflow="fold"
                 )
             prose = fixed if number == 0 else len(headings)  # where it begins in this part
             for heading in headings[prose:]:

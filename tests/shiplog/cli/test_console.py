@@ -84,6 +84,17 @@ def test_words_of_the_first_column_wrap_and_stay_whole(
     assert "…" not in "".join(lines)
 
 
+def test_a_wrapped_cell_keeps_its_lines_beside_sentences(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    subject = "manoeuvre 1: time to 270°, time to 360°, speed at 270°, speed at 360°"
+    reason = "the heading changes by 251° with the rudder held"
+    table = TextTable("Not computed", ("subject", "reason"), ((subject, reason),), has_prose=True)
+    lines = printed(table, 80, capsys, monkeypatch)
+    assert any(line.startswith("  speed at 270°, speed at 360°   ") for line in lines)
+    assert all(len(line) <= 80 for line in lines)
+
+
 def test_sentences_of_the_last_column_wrap_between_words_beside_whole_cells(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
