@@ -4,7 +4,7 @@ import json
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import ExitStack, contextmanager, redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shiplog.errors import LayoutError, LogError, UsageError
+from shiplog.errors import LayoutError, LogError, ShiplogError, UsageError
 from shiplog.layouts.field_paths import parse_path
 
 if TYPE_CHECKING:
@@ -64,24 +64,27 @@ def ulog_as_mcap(path: Path) -> Iterator[UlogCopy]:
         The package pyulog is not installed.
     LogError
         The file cannot be read, is not ULog, or has no messages.
+    ShiplogError
+        The temporary file cannot be written.
 
     References
     ----------
     ULog file format, docs.px4.io, "ULog File Format".
     """
-    from mcap.writer import Writer  # noqa: PLC0415 - of no other log
-
     ulog, notes = _read(path)
     start_ns, warnings = _boot_time(ulog, path)
     warnings += _damage(ulog, notes, path)
-    with tempfile.TemporaryDirectory(prefix="shiplog-") as folder:
-        copy = Path(folder) / path.name
-        with copy.open("wb") as stream:
-            writer = Writer(stream)
-            writer.start(library="shiplog")
-            for dataset in ulog.data_list:
-                _write_topic(writer, dataset, start_ns)
-            writer.finish()  # type: ignore[no-untyped-call]
+    with ExitStack() as stack:
+        try:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="shiplog-"))
+            copy = Path(folder) / path.name
+            _write_copy(copy, ulog, start_ns)
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise ShiplogError(
+                f"cannot write a temporary copy: {reason}; make room for it, or set TMPDIR to "
+                f"another folder: {path}"
+            ) from error
         lost = bool(ulog.file_corruption or ulog.dropouts)
         try:
             yield UlogCopy(copy, tuple(warnings), lost)
@@ -140,6 +143,18 @@ def _damage(ulog: Any, notes: str, path: Path) -> list[str]:  # noqa: ANN401 - u
             "s in all; use a faster card or log fewer topics"
         )
     return warnings
+
+
+def _write_copy(copy: Path, ulog: Any, start_ns: int) -> None:  # noqa: ANN401 - untyped library
+    """Write the topics of a ULog file to an MCAP file."""
+    from mcap.writer import Writer  # noqa: PLC0415 - of no other log
+
+    with copy.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(library="shiplog")
+        for dataset in ulog.data_list:
+            _write_topic(writer, dataset, start_ns)
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 def _write_topic(writer: "Writer", dataset: Any, start_ns: int) -> None:  # noqa: ANN401

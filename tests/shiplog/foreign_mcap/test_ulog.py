@@ -10,7 +10,7 @@ from ulog_files import write_ulog
 import shiplog
 from shiplog.cli.main import main
 from shiplog.cli.verb import ExitCode
-from shiplog.errors import LogError
+from shiplog.errors import LogError, ShiplogError
 from shiplog.foreign_mcap.ulog import ulog_as_mcap
 
 pytest.importorskip("pyulog")
@@ -123,6 +123,15 @@ def test_a_missing_layout_and_an_empty_file_are_refused_with_the_remedy(
     assert "no topic '/attitude'" in err
     assert err.rstrip().endswith(": flight.ulg")
     assert not Path("a.mcap").exists()
+
+
+def test_without_a_place_for_the_temporary_copy_the_remedy_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    flight = write_ulog(tmp_path / "flight.ulg", TOPICS)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "none"))
+    with pytest.raises(ShiplogError, match=r"cannot write a temporary copy.*TMPDIR"):
+        ulog_as_mcap(flight).__enter__()
 
 
 def test_a_file_that_is_cut_off_is_read_to_the_cut() -> None:
