@@ -124,7 +124,7 @@ def stated_poles(axis: LinearAxis, settings: FilterSettings) -> ComplexArray:
     """Return the poles (k,), 1/s, that the settings state, or else those of the Kalman filter.
 
     `settings.yaw_decay` states a double pole of w and w', `settings.surge_decay` that of v. The
-    poles of a wave are its own, moved left by `WAVE_DECAY` of its frequency.
+    poles of a wave are its own, with a decay rate larger by `WAVE_DECAY` of its frequency.
     """
     decay = settings.yaw_decay if len(axis.A) > 1 else settings.surge_decay
     if decay is None:

@@ -55,7 +55,7 @@ def rates(
     return np.stack((w_dot, turning, c.f * w**2 + c.g * v**2 + c.h * n), axis=-1)
 
 
-def told_of(
+def estimates_of(
     c: Coefficients, x: np.ndarray, delta: np.ndarray, n: np.ndarray, dt: float
 ) -> np.ndarray:
     """w, w', w'', v, v', (n, 5), of w, w', v, (n, 3); the inputs stand still after the last."""
@@ -123,7 +123,7 @@ def five_states(
     rate = abs(c.a) + 1e-3
     P = np.diag([dw, rate * dw, rate**2 * dw, dv, 1e-2 * dv]) ** 2
     path = sailed(c, np.array([stats.first[0], 0.0, stats.first[1]]), delta, n, dt)
-    return LinearRun(told_of(c, path, delta, n, dt), F, Q, P, np.eye(5)[[0, 3]], r)
+    return LinearRun(estimates_of(c, path, delta, n, dt), F, Q, P, np.eye(5)[[0, 3]], r)
 
 
 def pushes(c: Coefficients, noise: NoiseModel, stats: SignalStats) -> np.ndarray:

@@ -8,6 +8,7 @@ import pytest
 from filter_runs import (
     SMOOTHABLE,
     disturbed,
+    estimates_of,
     five_states,
     measured_as,
     pushes,
@@ -16,7 +17,6 @@ from filter_runs import (
     steered,
     straight,
     three_states,
-    told_of,
 )
 from gaussian import band, draws, normalised_squared
 
@@ -61,7 +61,7 @@ def seen_of(count: int) -> np.ndarray:
     return seen
 
 
-def usual_of(c: Coefficients, inputs: np.ndarray, dt: float, **known: float) -> SignalStats:
+def stats_of(c: Coefficients, inputs: np.ndarray, dt: float, **known: float) -> SignalStats:
     result = signal_stats(signals_of(seen_of(len(inputs)), *inputs.T, dt), c)
     return replace(result, first=FIRST, std=SPREAD, **known)
 
@@ -69,7 +69,7 @@ def usual_of(c: Coefficients, inputs: np.ndarray, dt: float, **known: float) -> 
 def linear(c: Coefficients, settings: FilterSettings, noise: NoiseModel) -> Pair:
     """Runs drawn from the filter's own model; without the wave's states."""
     inputs = np.column_stack(steered(COUNT, DT))
-    stats = usual_of(c, inputs, DT)
+    stats = stats_of(c, inputs, DT)
     if settings.chosen == "pseudo-input":
         run = five_states(c, noise, stats, *inputs.T)
     else:
@@ -83,7 +83,7 @@ def nonlinear(c: Coefficients, settings: FilterSettings, noise: NoiseModel) -> P
     """Runs of the nonlinear ship, disturbed by a random yaw moment and surge force."""
     dt, count, ahead, turning = 0.1, 1000, 7.0, 4e-3
     inputs = np.column_stack(steered(count, dt))
-    stats = usual_of(c, inputs, dt, median_speed=ahead, yaw_rate_rms=turning)
+    stats = stats_of(c, inputs, dt, median_speed=ahead, yaw_rate_rms=turning)
     rng = np.random.default_rng(3)
     rate = (abs(c.a) + 1e-3) * (SPREAD[0] + 1e-9)
     first = draws(rng, np.diag([SPREAD[0], rate, SPREAD[1]]) ** 2, SEEDS)
@@ -111,7 +111,7 @@ def judged(
         signals = signals_of(measured * seen_of(len(measured)), *inputs.T, stats.dt_secs)
         filtering = deepcopy(new)
         _, trace, smoothed = smoothed_run(filtering, signals)
-        expected = true if own == 5 else told_of(c, true[:, :3], *inputs.T, stats.dt_secs)
+        expected = true if own == 5 else estimates_of(c, true[:, :3], *inputs.T, stats.dt_secs)
         ways = (trace.states, trace.covariances), smoothed
         for kept, (x, P) in zip(result, ways, strict=True):
             outputs, *_ = filtering.to_estimates(signals, last_inputs(signals), x, P)
@@ -144,12 +144,12 @@ def ensembles(request: pytest.FixtureRequest, vessel: Vessel) -> Pair:
 
 
 @pytest.mark.parametrize("ensembles", CASES, indirect=True)
-def test_a_filters_errors_are_as_large_as_they_are_said_to_be(ensembles: Pair) -> None:
+def test_a_filters_errors_are_as_large_as_their_covariances_state(ensembles: Pair) -> None:
     of_all(ensembles[0])
 
 
 @pytest.mark.parametrize("ensembles", WITH_SMOOTHER, indirect=True)
-def test_a_smoothers_errors_are_as_large_as_they_are_said_to_be(ensembles: Pair) -> None:
+def test_a_smoothers_errors_are_as_large_as_their_covariances_state(ensembles: Pair) -> None:
     of_all(ensembles[1])
 
 

@@ -166,7 +166,7 @@ def test_in_chunks_a_filter_says_the_same_to_the_last_bit(
 
 
 @of_each
-def test_a_trace_is_kept_without_changing_what_is_said(
+def test_a_trace_is_kept_without_changing_the_estimates(
     vessel: Vessel, log: TrialLog, kind: str, wave: Wave | None
 ) -> None:
     signals = resample(log, channels=NAMES)

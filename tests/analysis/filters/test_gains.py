@@ -102,7 +102,7 @@ def test_a_wave_is_seen_in_the_measurement_alone(vessel: Vessel) -> None:
 @WAVES
 @pytest.mark.parametrize("kind", ["steady-state", "quality", "per-tick"])
 @pytest.mark.parametrize("dt", [0.1, 1.0])
-def test_the_poles_of_i_minus_k_c_f_are_those_told(
+def test_the_poles_of_i_minus_k_c_f_are_those_returned(
     vessel: Vessel, kind: str, dt: float, wave: Wave | None
 ) -> None:
     settings = FilterSettings(kind=kind, damping=0.1, yaw_decay=0.08, surge_decay=0.03)

@@ -8,13 +8,13 @@ import pytest
 from filter_runs import (
     FILTERS,
     SMOOTHABLE,
+    estimates_of,
     five_states,
     sailed,
     signals_of,
     smoothed_run,
     straight,
     three_states,
-    told_of,
 )
 from gaussian import LinearRun, apart
 from hypothesis import given, settings
@@ -120,7 +120,7 @@ def test_with_everything_missing_a_filter_is_the_ships_own_motion(kind: str, run
     filtering = make_filter(run.c, run.noise(kind), stats, FilterSettings(kind=kind))
     estimates = filtering.step(nothing, last_inputs(nothing))
     path = sailed(run.c, start, run.delta, run.n, run.dt)
-    expected = told_of(run.c, path, run.delta, run.n, run.dt)
+    expected = estimates_of(run.c, path, run.delta, run.n, run.dt)
     assert np.isnan(estimates.innovations).all()
     for result, true in zip(estimates.states[:-1].T, expected[:-1].T, strict=True):
         assert result == pytest.approx(true, abs=1e-7 * np.abs(true).max())

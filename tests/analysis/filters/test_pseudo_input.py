@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from filter_runs import (
     PATTERNS,
+    estimates_of,
     five_states,
     measured_as,
     sailed,
     signals_of,
     steered,
     straight,
-    told_of,
 )
 from gaussian import apart
 
@@ -180,7 +180,7 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_is_a_
     noise = NoiseModel(np.array([1e-4, 0.1]), np.array([1e-2, 1e-3]))
     filtering = make_filter(c, noise, stats, STATED)
     estimates, trace = filtering.trace(signals, last_inputs(signals))
-    expected = told_of(c, sailed(c, start, delta, n, dt), delta, n, dt)
+    expected = estimates_of(c, sailed(c, start, delta, n, dt), delta, n, dt)
     for result, true in zip(estimates.states[:-1].T, expected[:-1].T, strict=True):
         assert result == pytest.approx(true, abs=1e-8 * np.abs(true).max())
     run = five_states(straight(c), noise, stats, delta[:1], n[:1])

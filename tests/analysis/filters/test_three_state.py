@@ -5,6 +5,7 @@ import pytest
 from filter_runs import (
     PATTERNS,
     designed_gain,
+    estimates_of,
     measured_as,
     pushes,
     rates,
@@ -13,7 +14,6 @@ from filter_runs import (
     steered,
     straight,
     three_states,
-    told_of,
 )
 from gaussian import apart
 from scipy.integrate import solve_ivp
@@ -58,7 +58,7 @@ def helm(count: int, dt: float) -> tuple[np.ndarray, np.ndarray]:
     return delta, n + 20 * np.sin(np.arange(count) * dt / 15)
 
 
-def usual_of(c: Coefficients, signals: Signals, **known: object) -> SignalStats:
+def stats_of(c: Coefficients, signals: Signals, **known: object) -> SignalStats:
     """Of signals that need not have been measured."""
     there = dict(signals.values)
     there |= {"yaw_rate": np.full(len(signals), 2e-3), "speed": np.full(len(signals), 7.0)}
@@ -167,11 +167,11 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_grows
     delta, n = helm(count, dt)
     signals = signals_of(np.full((count, 2), np.nan), delta, n, dt)
     start = np.array([2e-3, 0.0, 7.0])
-    stats = usual_of(c, signals, first=start[[0, 2]], yaw_rate_rms=4e-3, median_speed=6.0)
+    stats = stats_of(c, signals, first=start[[0, 2]], yaw_rate_rms=4e-3, median_speed=6.0)
     filtering = make_filter(c, NOISE, stats, FilterSettings(kind=kind))
     estimates, trace = filtering.trace(signals, last_inputs(signals))
     path = sailed(c, start, delta, n, dt)
-    expected = told_of(c, path, delta, n, dt)
+    expected = estimates_of(c, path, delta, n, dt)
     for result, true in zip(estimates.states.T, expected.T, strict=True):
         assert result == pytest.approx(true, abs=1e-9 * np.abs(true).max())
     P, Q = trace.covariances[0], pushes(c, NOISE, stats)
@@ -186,7 +186,7 @@ def test_with_nothing_measured_at_all_it_is_the_ships_motion_and_the_doubt_grows
 def test_every_gain_begins_as_unsure_as_the_signals_vary(vessel: Vessel) -> None:
     c = vessel.coefficients
     signals = signals_of(np.full((4, 2), np.nan), *helm(4, 0.1), 0.1)
-    stats = usual_of(c, signals, first=np.array([2e-3, 8.0]))
+    stats = stats_of(c, signals, first=np.array([2e-3, 8.0]))
     for kind in KINDS:
         filtering = make_filter(c, NOISE, stats, FilterSettings(kind=kind))
         estimates = filtering.step(signals, last_inputs(signals))
@@ -200,7 +200,7 @@ def test_what_is_no_state_is_the_slope_of_what_is_one(vessel: Vessel, kind: str)
     c, dt, count = vessel.coefficients, 0.1, 300
     delta, n = np.linspace(-0.2, 0.3, count), np.linspace(60.0, 90.0, count)
     signals = signals_of(np.full((count, 2), np.nan), delta, n, dt)
-    stats = usual_of(c, signals, first=np.array([2e-3, 7.0]))
+    stats = stats_of(c, signals, first=np.array([2e-3, 7.0]))
     filtering = make_filter(c, NOISE, stats, FilterSettings(kind=kind))
     states = filtering.step(signals, last_inputs(signals)).states
     for derivative, of in ((2, 1), (4, 3)):
@@ -222,7 +222,7 @@ def test_what_is_no_state_is_as_unsure_as_the_states_it_follows_from(
     ship_row(c, x, root @ root.T, u, np.zeros((2, 3)), row)
     helm = np.array([delta, delta + delta_dot * dt]), np.full(2, n)
     close = np.testing.assert_allclose
-    close(row[:5], told_of(c, np.array([x, x]), *helm, dt)[0], rtol=1e-12)
+    close(row[:5], estimates_of(c, np.array([x, x]), *helm, dt)[0], rtol=1e-12)
     cloud = x + rng.standard_normal((200_000, 3)) @ root.T
     w, w_dot, v = cloud.T
     _, turning, driving = rates(c, cloud, delta, delta_dot, n).T
@@ -230,8 +230,8 @@ def test_what_is_no_state_is_as_unsure_as_the_states_it_follows_from(
     close(np.sqrt(row[5:]), drawn_stds, rtol=0.01)
     slopes = [
         (
-            told_of(c, np.array([x + h] * 2), *helm, dt)
-            - told_of(c, np.array([x - h] * 2), *helm, dt)
+            estimates_of(c, np.array([x + h] * 2), *helm, dt)
+            - estimates_of(c, np.array([x - h] * 2), *helm, dt)
         )[0]
         for h in np.diag(1e-4 * UNITS)
     ]

@@ -6,11 +6,11 @@ import pytest
 from filter_runs import (
     FILTERS,
     disturbed,
+    estimates_of,
     five_states,
     signals_of,
     straight,
     three_states,
-    told_of,
 )
 
 from analysis.filters.factory import filter_states, make_filter
@@ -139,7 +139,7 @@ def test_a_ratio_that_a_run_was_drawn_with_is_found_again(
     path = disturbed(c, first[None], inputs, dt, np.zeros((1, count, 3)))[0]
     if kind == "pseudo-input":
         run = replace(
-            five_states(c, noise, stats, *inputs[:1].T), mean=told_of(c, path, *inputs.T, dt)
+            five_states(c, noise, stats, *inputs[:1].T), mean=estimates_of(c, path, *inputs.T, dt)
         )
     else:
         run = replace(three_states(c, noise, stats, *inputs[:1].T), mean=path)
@@ -198,7 +198,7 @@ def waved(signals: Signals, std: float) -> Signals:
     return replace(signals, values=values)
 
 
-def test_a_wave_is_told_of_where_it_is_asked_for_and_stands_out(
+def test_a_wave_is_reported_where_it_is_asked_for_and_stands_out(
     signals: Signals, vessel: Vessel
 ) -> None:
     c = vessel.coefficients
@@ -211,7 +211,7 @@ def test_a_wave_is_told_of_where_it_is_asked_for_and_stands_out(
     assert wave.std == pytest.approx(5e-4, rel=0.25)
 
 
-def test_a_wave_that_is_stated_is_told_of_as_stated(signals: Signals, vessel: Vessel) -> None:
+def test_a_wave_that_is_stated_is_reported_as_stated(signals: Signals, vessel: Vessel) -> None:
     given = {"wave_frequency": 0.7, "wave_damping": 0.2, "wave_std": 1e-5}
     noise = noise_from_log(
         signals, vessel.coefficients, kind="extended", process_ratio=RATIO, wave=True, **given
@@ -221,7 +221,7 @@ def test_a_wave_that_is_stated_is_told_of_as_stated(signals: Signals, vessel: Ve
     assert result == pytest.approx((0.7, 0.2, 1e-5))
 
 
-def test_with_its_wave_told_of_a_log_takes_less_process_noise(
+def test_with_its_wave_stated_a_log_takes_less_process_noise(
     signals: Signals, vessel: Vessel
 ) -> None:
     """A filter that must follow the waves follows the sensor's noise, too."""

@@ -274,7 +274,7 @@ def test_a_wave_stated_altogether_needs_no_measurements() -> None:
 # ---- whether there is one
 
 
-def test_a_place_of_any_width_exceeds_what_is_needed_as_seldom_as_is_said() -> None:
+def test_a_place_of_any_width_exceeds_what_is_needed_as_seldom_as_stated() -> None:
     """Chernoff's bound: the mean of m exponentials, 2 m (x - 1 - ln x) > t."""
     x = np.linspace(1, 20, 2000)[1:]
     for m in (1, 2, 5, 20, 100):
@@ -453,11 +453,11 @@ def fast_means(spectrum: Spectrum, covariances: list[FloatArray]) -> list[FloatA
     ],
     ids=["none", "NaN", "too few", "zero", "constant", "too few and constant"],
 )
-def test_of_too_little_nothing_is_told(residual: FloatArray) -> None:
+def test_of_too_little_no_wave_is_estimated(residual: FloatArray) -> None:
     assert fit_wave(residual, 0.1, 1.0) is None
 
 
-def test_a_sensor_too_slow_for_any_wave_tells_nothing() -> None:
+def test_no_wave_is_estimated_from_a_sensor_too_slow_for_any() -> None:
     white = np.random.default_rng(0).standard_normal(1000)
     assert fit_wave(white, 12.0, 1.0) is None
     assert fit_wave(white, 1.0, 1.0, lowest=3.0) is None
