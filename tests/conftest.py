@@ -1,5 +1,6 @@
 import gc
 import os
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -20,6 +21,9 @@ from shiplog import TrialLog, Vessel, load_vessel, read
 from shiplog.cli.main import RARE_COLLECTION
 from shiplog.compiled import is_compiled
 
+# nohup and scripts in the background ignore these, and so would all processes of the tests
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # as in the processes of the verbs: collecting tests and compiling loops make little garbage
 gc.set_threshold(RARE_COLLECTION)
 

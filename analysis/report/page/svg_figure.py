@@ -133,11 +133,12 @@ def page_figure(figure: Figure, anchor: str, caption: str, description: str) -> 
         Its content in words, for those who cannot see it.
     """
     text = StringIO()
-    with mpl.rc_context({"svg.hashsalt": anchor}):  # ids that are the same in each run
+    with mpl.rc_context({"svg.hashsalt": anchor}):  # else the ids are random
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->|<style.*?</style>", "", svg, flags=re.DOTALL)
+    svg = _with_numbered_ids(svg)
     svg = re.sub(r'(\bid="|url\(#|xlink:href="#)', rf"\g<1>{anchor}-", svg)
     svg = re.sub(r' (?:d|x|y|transform|points)="[^"]*"', _rounded, svg)
     for colour, variable in VARIABLES.items():
@@ -145,6 +146,14 @@ def page_figure(figure: Figure, anchor: str, caption: str, description: str) -> 
     head = _head(svg, anchor, caption, description)
     body = svg[svg.index(">") + 1 :]
     return PageFigure(anchor, caption, Markup(head + re.sub(r"\s*\n\s*", "\n", body)))  # noqa: S704 - matplotlib escapes its texts
+
+
+def _with_numbered_ids(svg: str) -> str:
+    """Number the ids that are hashes of coordinates, whose last bits differ from run to run."""
+    numbers: dict[str, str] = {}
+    for hashed in re.findall(r'(?:\bid="|#)([A-Za-z]\w*[0-9a-f]{10})\b', svg):
+        numbers.setdefault(hashed, f"{hashed[0]}{len(numbers) + 1}")
+    return re.sub(r"\b[A-Za-z]\w*[0-9a-f]{10}\b", lambda id_: numbers.get(id_[0], id_[0]), svg)
 
 
 def _rounded(attribute: re.Match[str]) -> str:
