@@ -90,7 +90,7 @@ class ManoeuvrePart:
         return "starboard" if self.found.level > 0 else "port"
 
     def _switch(self) -> tuple[float, str]:
-        """Return the nominal switch heading of a zig-zag, and a note where it is in doubt."""
+        """Return the nominal switch heading of a zig-zag, and a note where it is uncertain."""
         if self.found.kind is not ManoeuvreKind.ZIGZAG:
             return nan, ""
         heading, execute = self.filled.heading, round(self.execute.sample)

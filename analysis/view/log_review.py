@@ -95,7 +95,6 @@ def write_log_review(
                 send_map_track(recording, f"map/{number}", positions, colours[0])
         if events:
             send_events(recording, "events", events, main_log.zero_ns)
-        recording.flush()
 
 
 def _times_text(drawings: Sequence[LogDrawing]) -> str:
