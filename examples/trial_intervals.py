@@ -29,6 +29,7 @@ KINDS = {
 SECONDS = {
     "mariner": (1100.0, 500.0), "kvlcc2": (1400.0, 900.0), "seiun-maru": (450.0, 400.0),
 }  # fmt: skip
+SAILED = [ship for ship in SHIPS if ship.name in SECONDS]
 COURSE, HELM_DEG, HELM_PERIOD = 3.0, (0.0, 1.5), (30.0, 60.0)
 CURRENT_STD, COMPASS_STD, LOG_STD = 0.4, radians(0.5), 0.02
 DEFLECTION_STD = radians(0.25)
@@ -104,7 +105,7 @@ def try_intervals(kind: str, trials: int) -> tuple[dict[str, Score], int]:
     found = 0
     rudder, switch = KINDS[kind]
     for number in range(trials):
-        ship = SHIPS[number % len(SHIPS)]
+        ship = SAILED[number % len(SAILED)]
         side = 1 if number // 3 % 2 else -1
         steering = Steering(
             ship, 120.0 + round(rng.uniform(0, 30)), side * radians(rudder),

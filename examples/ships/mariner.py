@@ -40,9 +40,7 @@ def lateral(c: dict[str, float], u: float, v: float, r: float, d: float) -> floa
     )  # fmt: skip
 
 
-def rates(
-    motion: tuple[float, float, float], rudder: float, _rpm: float
-) -> tuple[float, float, float]:
+def rates(motion: tuple[float, ...], rudder: float, _rpm: float) -> tuple[float, ...]:
     """Return the rates of speed ahead, sway (m/s²) and yaw rate (rad/s²); rudder in rad."""
     speed = hypot(motion[0], motion[1])
     u, v, r = (motion[0] - SPEED) / speed, motion[1] / speed, motion[2] * LENGTH / speed

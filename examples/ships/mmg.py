@@ -40,9 +40,7 @@ class MmgShip:
     rpm: float
     rudder_rate_deg: float
 
-    def rates(
-        self, motion: tuple[float, float, float], rudder: float, rpm: float
-    ) -> tuple[float, float, float]:
+    def rates(self, motion: tuple[float, ...], rudder: float, rpm: float) -> tuple[float, ...]:
         """Return the rates of speed ahead, sway (m/s²) and yaw rate (rad/s²) of midship."""
         u, v, r = motion
         speed = max(hypot(u, v), 0.05)
@@ -104,7 +102,7 @@ class MmgShip:
         )
 
     def _accelerations(
-        self, motion: tuple[float, float, float], x: float, y: float, n: float
+        self, motion: tuple[float, ...], x: float, y: float, n: float
     ) -> tuple[float, float, float]:
         u, v, r = motion
         unit = 0.5 * DENSITY * self.length**2 * self.draught

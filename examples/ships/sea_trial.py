@@ -12,18 +12,23 @@ from numpy.typing import NDArray
 
 from shiplog import Channel, TrialLog
 
-from . import mariner
+from . import container_ship, esso_tanker, mariner
 from .mmg import KVLCC2, SEIUN_MARU, MmgShip
 
 STEP = 0.25  # s, of the integration and of the true motion
 START_NS = 1_767_225_600 * 10**9
-Rates = Callable[[tuple[float, float, float], float, float], tuple[float, float, float]]
+Motion = tuple[float, ...]  # speed ahead, sway, yaw rate, and further states a ship may have
+Rates = Callable[[Motion, float, float], Motion]
 Helmsman = Callable[[float, float, float, float], float]  # time, heading, yaw rate, rudder
 
 
 @dataclass(frozen=True)
 class TrialShip:
-    """A ship that can be sailed: its equations, and what its helmsman needs to know."""
+    """A ship that can be sailed: its equations, and what its helmsman needs to know.
+
+    `further` are the initial values of the states after the yaw rate, on a straight course; `shaft`
+    is the place in the motion of the revolutions of a shaft with dynamics, None without them.
+    """
 
     name: str
     length: float
@@ -32,6 +37,8 @@ class TrialShip:
     rudder_rate: float
     neutral: float
     rates: Rates
+    further: Motion = ()
+    shaft: int | None = None
 
 
 def _mmg(name: str, ship: MmgShip) -> TrialShip:
@@ -46,6 +53,15 @@ SHIPS = (
     ),
     _mmg("kvlcc2", KVLCC2),
     _mmg("seiun-maru", SEIUN_MARU),
+    TrialShip(
+        "container", container_ship.LENGTH, container_ship.SPEED, container_ship.RPM,
+        radians(container_ship.RUDDER_RATE_DEG), 0.0, container_ship.rates,
+        further=(0.0, 0.0, container_ship.RPM), shaft=5,
+    ),
+    TrialShip(
+        "tanker", esso_tanker.LENGTH, esso_tanker.SPEED, esso_tanker.RPM,
+        radians(esso_tanker.RUDDER_RATE_DEG), radians(0.5), esso_tanker.rates,
+    ),
 )  # fmt: skip
 
 
@@ -77,14 +93,15 @@ def sail(
     """Sail a ship for a time, s, from a straight course, by the orders of a helmsman."""
     count = round(duration / STEP) + 1
     rows = np.empty((count, 9))
-    motion = (ship.speed if speed is None else speed, 0.0, 0.0)
+    motion: Motion = (ship.speed if speed is None else speed, 0.0, 0.0, *ship.further)
     heading, north, east = course, 0.0, 0.0
     rudder = ship.neutral
     for k in range(count):
         time = k * STEP
         rpm = ship.rpm if revolutions is None else revolutions(time)
         order = helmsman(time, heading, motion[2], rudder)
-        rows[k] = (*motion, heading, rudder, order, rpm, north, east)
+        turned = rpm if ship.shaft is None else motion[ship.shaft]
+        rows[k] = (*motion[:3], heading, rudder, order, turned, north, east)
         moved = max(-1.0, min(1.0, (order - rudder) / (ship.rudder_rate * STEP)))
         rudder += moved * ship.rudder_rate * STEP
         before, heading_before = motion, heading
@@ -98,24 +115,18 @@ def sail(
     return SailedTrial(ship, np.arange(count) * STEP, *columns[:3], *columns[3:7], columns[7:].T)
 
 
-def _advanced(
-    rates: Rates, motion: tuple[float, float, float], rudder: float, rpm: float
-) -> tuple[float, float, float]:
+def _advanced(rates: Rates, motion: Motion, rudder: float, rpm: float) -> Motion:
     """Return the motion after `STEP`, by the classical Runge-Kutta method."""
 
-    def moved(slope: tuple[float, float, float], share: float) -> tuple[float, float, float]:
-        return (
-            motion[0] + share * STEP * slope[0],
-            motion[1] + share * STEP * slope[1],
-            motion[2] + share * STEP * slope[2],
-        )
+    def moved(slope: Motion, share: float) -> Motion:
+        return tuple(m + share * STEP * s for m, s in zip(motion, slope, strict=True))
 
     k1 = rates(motion, rudder, rpm)
     k2 = rates(moved(k1, 0.5), rudder, rpm)
     k3 = rates(moved(k2, 0.5), rudder, rpm)
     k4 = rates(moved(k3, 1.0), rudder, rpm)
-    mean = tuple((a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
-    return moved((mean[0], mean[1], mean[2]), 1.0)
+    slopes = zip(k1, k2, k3, k4, strict=True)
+    return moved(tuple((a + 2 * b + 2 * c + d) / 6 for a, b, c, d in slopes), 1.0)
 
 
 @dataclass
@@ -159,7 +170,10 @@ class Steering:
 
 @dataclass(frozen=True)
 class Sensors:
-    """Errors of the sensors: standard deviations of white noise, biases, and sampling."""
+    """Errors of the sensors: standard deviations of white noise, biases, and sampling.
+
+    `sway` is the noise of a log with two axes; None for one that measures the speed ahead alone.
+    """
 
     interval: float = 0.5
     heading: float = radians(0.1)
@@ -167,6 +181,7 @@ class Sensors:
     speed: float = 0.05
     rudder: float = radians(0.1)
     position: float = 1.0
+    sway: float | None = None
     compass_bias: float = 0.0
     speed_scale: float = 0.0
     gyro_bias: float = 0.0
@@ -209,6 +224,8 @@ def as_log(
     if orders:
         before = np.searchsorted(trial.time, at, side="right") - 1
         columns["rudder_order"] = ("rad", trial.order[before])
+    if sensors.sway is not None:
+        columns["sway"] = ("m/s", sampled(trial.sway, sensors.sway))
     fixes = np.column_stack([sampled(column, sensors.position) for column in ground.T])
     times = START_NS + np.round(at * 1e9).astype(np.int64)
     channels = [

@@ -15,8 +15,8 @@ from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreKind
 from analysis.replay.reading_options import ReadingOptions
 from shiplog import TrialLog
 
-NAMES = [ship.name for ship in SHIPS]
-MARINER, KVLCC2, SEIUN_MARU = SHIPS
+MARINER, KVLCC2, SEIUN_MARU = SHIPS[:3]
+NAMES = [MARINER.name, KVLCC2.name, SEIUN_MARU.name]
 
 
 def analysed(log: TrialLog, ship: TrialShip) -> TrialAnalysis:
