@@ -10,12 +10,11 @@ quality whose compass and log have errors of the sizes that the analysis assumes
 import argparse
 from collections import defaultdict
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from math import radians, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from ships.sea_trial import GOOD, POOR, SHIPS, STEP, SailedTrial, Steering, as_log, sail
+from ships.true_indices import circle_indices, zigzag_indices
 
 from analysis import analyse_trial
 from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreKind
@@ -61,41 +60,15 @@ class Score:
     errors: list[float] = field(default_factory=list)  # in standard uncertainties
 
 
-def crossing(values: NDArray[np.float64], level: float) -> float:
-    """Return the sample at which values first reach a level; NaN where they do not."""
-    k = int(np.argmax(values >= level))
-    if k == 0:
-        return np.nan
-    return k - 1 + float((level - values[k - 1]) / (values[k] - values[k - 1]))
-
-
 def true_values(trial: SailedTrial, steering: Steering) -> dict[str, float]:
     """Compute the indices of the true motion."""
-    side, first = float(np.sign(steering.angle)), round(steering.execute / STEP)
-    change = (side * (trial.heading - steering.course))[first:]
-    made = ((trial.track - trial.track[first]) @ [1, 1j] * np.exp(-1j * steering.course))[first:]
-    speed, grid = np.hypot(trial.speed, trial.sway)[first:], np.arange(len(change))
-    travelled = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(made)))))
-    ten = crossing(change, radians(10.0) if steering.switch is None else steering.switch)
-    values = {
-        "initial turning time": ten * STEP,
-        "initial turning distance": float(np.interp(ten, grid, travelled)),
-    }
-    if steering.switch is not None:
-        edges = [round(time / STEP) - first for time in steering.executes] + [len(change)]
-        for number, (start, stop) in enumerate(pairwise(edges), 1):
-            beyond = (1 if number % 2 else -1) * change[start:stop]
-            values[f"overshoot {number}"] = float(np.max(beyond)) - steering.switch
-        values["reach"] = (edges[0] + crossing(-change[edges[0] :], 0.0)) * STEP
-        return values
-    at = {angle: crossing(change, radians(angle)) for angle in (90, 180, 270, 360)}
-    for angle, k in at.items():
-        values[f"time to {angle}°"] = k * STEP
-        values[f"speed at {angle}°"] = float(np.interp(k, grid, speed))
-    values["advance"] = float(np.interp(at[90], grid, made.real))
-    values["transfer"] = side * float(np.interp(at[90], grid, made.imag))
-    values["tactical diameter"] = side * float(np.interp(at[180], grid, made.imag))
-    return values
+    turn = trial.turn(steering)
+    if steering.switch is None:
+        values = circle_indices(turn)
+        return {name: value for name, value in values.items() if "steady" not in name}
+    first = round(steering.execute / STEP)
+    executes = [round(time / STEP) - first for time in steering.executes]
+    return zigzag_indices(turn, steering.switch, executes)
 
 
 def try_intervals(kind: str, trials: int) -> tuple[dict[str, Score], int]:

@@ -14,6 +14,7 @@ from shiplog import Channel, TrialLog
 
 from . import container_ship, esso_tanker, mariner
 from .mmg import KVLCC2, SEIUN_MARU, MmgShip
+from .true_indices import Turn, turn_from_execute
 
 STEP = 0.25  # s, of the integration and of the true motion
 START_NS = 1_767_225_600 * 10**9
@@ -79,6 +80,18 @@ class SailedTrial:
     order: NDArray[np.float64]
     rpm: NDArray[np.float64]
     track: NDArray[np.float64]  # (n, 2) north and east through the water
+
+    def turn(self, steering: "Steering") -> Turn:
+        """Return the motion from the execute of the manoeuvre on."""
+        return turn_from_execute(
+            STEP,
+            round(steering.execute / STEP),
+            float(np.sign(steering.angle)),
+            steering.course,
+            self.heading,
+            np.column_stack((self.speed, self.sway, self.yaw_rate)),
+            self.track,
+        )
 
 
 def sail(

@@ -1,17 +1,17 @@
 """Trials of independent ships, sailed once per process, and their true indices."""
 
 from functools import cache
-from itertools import pairwise
 from math import radians
 
-import numpy as np
 from ships.sea_trial import SHIPS, STEP, SailedTrial, Steering, TrialShip, sail
+from ships.true_indices import circle_indices, zigzag_indices
 
 SECONDS = {
     "circle": {"mariner": 900.0, "kvlcc2": 1200.0, "seiun-maru": 420.0},
     "zigzag": {"mariner": 400.0, "kvlcc2": 700.0, "seiun-maru": 320.0},
 }
 EXECUTE_SECS = 90.0
+CIRCLE_INDICES = ("time to 90°", "advance", "transfer", "time to 180°", "tactical diameter")
 
 
 @cache
@@ -43,32 +43,10 @@ def _sailed(
 
 
 def true_indices(trial: SailedTrial, steering: Steering) -> dict[str, float]:
-    """Compute the indices of the true motion, from the order and the course steered.
-
-    Written apart from the analysis: by the norm's definitions, on noise-free samples.
-    """
-    side, first = float(np.sign(steering.angle)), round(steering.execute / STEP)
-    change = side * (trial.heading - steering.course)
-    made = (trial.track @ [1, 1j] - trial.track[first] @ [1, 1j]) * np.exp(-1j * steering.course)
-    grid = np.arange(len(change))
-    values: dict[str, float] = {}
+    """Compute the indices of the true motion, from the order and the course steered."""
+    turn, first = trial.turn(steering), round(steering.execute / STEP)
     if steering.switch is None:
-        for angle in (90, 180):
-            k = _crossing(change, np.radians(angle), first)
-            values[f"time to {angle}°"] = (k - first) * STEP
-            across = side * float(np.interp(k, grid, made.imag))
-            if angle == 90:
-                values |= {"advance": float(np.interp(k, grid, made.real)), "transfer": across}
-            else:
-                values["tactical diameter"] = across
-        return values
-    edges = [round(time / STEP) for time in steering.executes] + [len(change)]
-    for number, (start, stop) in enumerate(pairwise(edges), 1):
-        beyond = (1 if number % 2 else -1) * change[start:stop]
-        values[f"overshoot {number}"] = float(np.max(beyond)) - steering.switch
-    return values
-
-
-def _crossing(values: np.ndarray, level: float, first: int) -> float:
-    k = first + int(np.argmax(values[first:] >= level))
-    return k - 1 + (level - values[k - 1]) / (values[k] - values[k - 1])
+        return {name: circle_indices(turn)[name] for name in CIRCLE_INDICES}
+    executes = [round(time / STEP) - first for time in steering.executes]
+    values = zigzag_indices(turn, steering.switch, executes)
+    return {name: value for name, value in values.items() if name.startswith("overshoot")}
