@@ -2,7 +2,8 @@
 
 The theme `distortions` is not of times: it replays one trial distorted in 200 ways, identifies some
 of them, and counts the wrong results that are not reported; and it replays undistorted trials in
-many conditions with fifty seeds and counts their warnings.
+many conditions with fifty seeds and counts their warnings. Nor is `prediction`: it identifies
+reference ships from simulated zig-zags, predicts circles and zig-zags, and reports the errors.
 
 Each line times shiplog and a straightforward peer in turn, several rounds, and reports the median
 of the ratios: times differ between machines and moments, ratios within one run hardly do. Before,
@@ -23,18 +24,20 @@ from .bench import Bench
 from .distortion_matrix import measure_distortions
 from .logs import day_of_trial, write_repeated
 from .measure import Comparison, ComparisonResult, compare_with_peer, machine
+from .prediction import ONE_SEED_STUDY, SHORT_STUDY, measure_study
 from .report import BenchmarkReport, print_report, report_as_markdown
 from .stages import our_stages
 
 THEMES = (
     "files", "filter", "windows", "info", "start-up", "replay", "states", "ranking", "stages",
-    "growth", "distortions",
+    "growth", "distortions", "prediction",
 )  # fmt: skip
+UNTIMED_THEMES = {"distortions", "prediction"}
 MIN_JUDGED_HOURS = 24.0  # in shorter logs fixed costs count too much for the limits
 EPILOG = """\
-The defaults take from half an hour to an hour on two cores, most of it for the peers. --growth
-1,24,240,720 takes ten minutes more, and 5 GB in the folder of temporary files, which TMPDIR names;
-logs too long for the disk are skipped. --full-peer takes some hours.
+The defaults take an hour or more on two cores, most of it for the peers and the predictions.
+--growth 1,24,240,720 takes ten minutes more, and 5 GB in the folder of temporary files, which
+TMPDIR names; logs too long for the disk are skipped. --full-peer takes some hours.
 """
 
 
@@ -110,7 +113,9 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> BenchmarkReport:
     report = BenchmarkReport(machine(), sizes.hours, sizes.rounds, [])
     if "distortions" in arguments.only:
         report.distortions = measure_distortions(*((5, 1) if arguments.short else ()))
-    if set(arguments.only) == {"distortions"}:
+    if "prediction" in arguments.only:
+        report.prediction = measure_study(SHORT_STUDY if arguments.short else ONE_SEED_STUDY)
+    if set(arguments.only) <= UNTIMED_THEMES:
         return report
     log = day_of_trial(sizes.hours)
     path = write_repeated(log, sizes.hours, folder / "day.mcap")

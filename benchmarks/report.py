@@ -10,6 +10,9 @@ from rich.table import Table
 
 from .distortion_matrix import OUTCOMES, SILENT, MatrixResults
 from .measure import ComparisonResult
+from .prediction_results import PredictionStudy, study_as_plain
+from .prediction_tables import setting_table, summary_table
+from .reference_trials import SETTINGS
 from .replays import MAX_GROWTH_EXPONENT, MAX_MEMORY_BYTES, Growth, ReplayCost
 
 FILE_WIDTH = 140  # characters, where the output is not a terminal
@@ -35,6 +38,8 @@ class BenchmarkReport:
         How the cost of a replay grows; None if not measured.
     distortions
         Replays of distorted logs; None if not measured.
+    prediction
+        Predictions of the reference ships; None if not measured.
     """
 
     machine: dict[str, str]
@@ -45,10 +50,12 @@ class BenchmarkReport:
     peer_stages: dict[str, float] = field(default_factory=dict)
     growth: Growth | None = None
     distortions: MatrixResults | None = None
+    prediction: PredictionStudy | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Return the report as plain values for JSON."""
-        return asdict(self)
+        prediction = study_as_plain(self.prediction) if self.prediction else None
+        return {**asdict(self), "prediction": prediction}
 
 
 @dataclass(frozen=True)
@@ -100,6 +107,8 @@ def _grids(report: BenchmarkReport) -> list[_Grid]:
         grids.append(_growth_grid(report.growth))
     if report.distortions is not None:
         grids.append(_distortion_grid(report.distortions))
+    if report.prediction is not None:
+        grids += _prediction_grids(report.prediction)
     grids.append(_Grid("Measured on", ("item", "value"), list(report.machine.items())))
     return grids
 
@@ -192,3 +201,19 @@ def _distortion_grid(results: MatrixResults) -> _Grid:
     remarks = (summary, *results.failures, *alarms)
     title = f"{sum(results.counts['total'])} replays and identifications of a distorted trial"
     return _Grid(title, ("distortion", *OUTCOMES), rows, remarks)
+
+
+def _prediction_grids(study: PredictionStudy) -> list[_Grid]:
+    head, *rows = (_without_bold(row) for row in summary_table(study.trials))
+    grids = [_Grid("Predictions of ships nobody tuned to", head, rows)]
+    for name, setting in SETTINGS.items():
+        chosen = [each for each in study.trials if each.setting == name]
+        if chosen:
+            head, *rows = (_without_bold(row) for row in setting_table(chosen))
+            remark = "mean error over both sides, in brackets the largest; † beyond the target"
+            grids.append(_Grid(f"Predictions, {setting.title}", head, rows, (remark,)))
+    return grids
+
+
+def _without_bold(row: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(f"{cell.strip('*')} †" if cell.startswith("**") else cell for cell in row)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from ships import container_ship, esso_tanker
 from ships.sea_trial import GOOD, SHIPS, Steering, TrialShip, as_log, sail
+from ships.true_indices import circle_indices, turn_from_execute, zigzag_indices
 
 CONTAINER, TANKER = SHIPS[3:]
 STEP = 1e-6  # relative, of the differences
@@ -145,3 +146,50 @@ def test_a_log_has_sway_where_its_sensors_measure_it() -> None:
     (sway,) = [channel for channel in log if channel.name == "sway"]
     assert sway.values.min() < -0.3  # to port in a turn to starboard
     assert "sway" not in {each.name for each in as_log(trial, GOOD, np.random.default_rng(0))}
+
+
+def test_the_indices_of_a_uniform_circle_are_those_of_geometry() -> None:
+    step, rate, speed = 0.1, 0.02, 5.0
+    time = np.arange(0.0, 400.0, step)
+    for side in (1.0, -1.0):
+        turned = np.maximum(time - 20.0, 0.0) * rate
+        heading = 0.3 + side * turned
+        radius = speed / rate
+        ahead = np.where(time < 20.0, (time - 20.0) * speed, radius * np.sin(turned))
+        across = side * radius * (1.0 - np.cos(turned))
+        north = ahead * np.cos(0.3) - across * np.sin(0.3)
+        east = ahead * np.sin(0.3) + across * np.cos(0.3)
+        motion = np.column_stack(
+            (np.full_like(time, 4.0), np.full_like(time, 3.0), side * np.full_like(time, rate))
+        )
+        track = np.column_stack((north, east))
+        turn = turn_from_execute(step, 200, side, 0.3, heading, motion, track)
+        values = circle_indices(turn)
+        assert values["advance"] == pytest.approx(radius, rel=1e-4)
+        assert values["transfer"] == pytest.approx(radius, rel=1e-4)
+        assert values["tactical diameter"] == pytest.approx(2 * radius, rel=1e-4)
+        assert values["time to 180°"] == pytest.approx(np.pi / rate, rel=1e-4)
+        assert values["initial turning distance"] == pytest.approx(radius * radians(10), rel=1e-3)
+        assert values["steady yaw rate"] == pytest.approx(rate)
+        assert values["steady speed"] == pytest.approx(5.0)
+
+
+def test_what_a_circle_does_not_reach_is_nan() -> None:
+    time = np.arange(0.0, 100.0)
+    motion = np.tile([5.0, 0.0, 0.02], (100, 1))
+    turn = turn_from_execute(1.0, 0, 1.0, 0.0, 0.02 * time, motion, motion[:, :2])
+    values = circle_indices(turn)
+    assert np.isfinite(values["time to 90°"])
+    assert np.isnan([values["time to 180°"], values["tactical diameter"]]).all()
+
+
+def test_the_overshoots_of_a_heading_in_waves_are_its_amplitude_beyond_the_switch() -> None:
+    time = np.arange(0.0, 300.0, 0.1)
+    heading = 0.5 * np.sin(time / 20.0)
+    motion = np.tile([5.0, 0.0, 0.0], (len(time), 1))
+    turn = turn_from_execute(0.1, 0, -1.0, 0.0, -heading, motion, motion[:, :2])
+    reversed_at = [round(10 * t) for t in (20 * np.arcsin(0.6), 20 * (np.pi + np.arcsin(0.6)))]
+    values = zigzag_indices(turn, 0.3, reversed_at)
+    assert values["overshoot 1"] == pytest.approx(0.2, abs=1e-5)
+    assert values["overshoot 2"] == pytest.approx(0.2, abs=1e-5)
+    assert values["reach"] == pytest.approx(20 * np.pi, abs=0.05)

@@ -8,6 +8,7 @@ the course and the noise-free motion are known.
 from dataclasses import dataclass
 from itertools import pairwise
 from math import radians
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ class Turn:
 
 def turn_from_execute(
     step: float, first: int, side: float, course: float, heading: Values, motion: Values,
-    track: Values,
+    track: NDArray[np.floating[Any]],
 ) -> Turn:  # fmt: skip
     """Return the turn of a trajectory from its sample `first` on.
 
