@@ -36,6 +36,17 @@ def shortened(text: str, size: int) -> str:
     return f"{text[:head]}…{text[len(text) - (size - 1 - head) :]}"
 
 
+def counted(number: int, thing: str) -> str:
+    """Return a number of things in words, with the plural of a regular noun where it needs one.
+
+    Examples
+    --------
+    >>> counted(1, "metadata record"), counted(0, "attachment")
+    ('1 metadata record', '0 attachments')
+    """
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
 def escape_json(line: str) -> str:
     r"""Escape the characters of a line of JSON that do not print; its value stays the same.
 

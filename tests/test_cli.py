@@ -615,6 +615,25 @@ def test_an_unknown_verb_is_rejected_with_the_list_of_verbs(
     )
 
 
+@pytest.mark.parametrize(
+    ("arguments", "usage"),
+    [
+        ("convert a.mcap b.csv --wde", "shiplog convert "),
+        ("record signalk tcp://127.0.0.1:1 -o a.mcap --wde", "shiplog record signalk "),
+        ("--wde convert a.mcap b.csv", "shiplog "),
+    ],
+)
+def test_an_unknown_option_is_rejected_with_the_usage_of_its_verb(
+    capsys: pytest.CaptureFixture[str], arguments: str, usage: str
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments.split())
+    assert caught.value.code == USAGE
+    err = capsys.readouterr().err
+    assert err.startswith(f"usage: {usage}[-h]")
+    assert err.endswith(f"{usage.strip()}: error: unrecognized arguments: --wde\n")
+
+
 def test_a_replay_imports_no_unneeded_library(recorded: Path) -> None:
     code = (
         "import sys\n"

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from shiplog.errors import LogError
+from shiplog.printable import counted
 from shiplog.units import display_conversion
 
 from .channel_stats import ChannelStats, LogStats, is_rudder_order
@@ -89,7 +90,7 @@ def hold_warnings(channel: ChannelStats, end_ns: int) -> Iterator[str]:
     if hold:
         after = (end_ns - channel.valid_span_ns[1]) * 1e-9
         at_end = f" and for the last {after:.1f} s of the log" if after > 0 else ""
-        samples = _count(channel.valid, "sample")
+        samples = counted(channel.valid, "sample")
         if not hold.stated:
             yield (
                 f"held at its last value between its {samples}, the longest interval "
@@ -143,7 +144,7 @@ def unusable_causes(channel: ChannelStats) -> Iterator[str]:
     infinite, backward = channel.infinite, channel.backward_steps
     if infinite.count:
         yield (
-            f"has {_count(infinite.count, 'infinite value')}, the first "
+            f"has {counted(infinite.count, 'infinite value')}, the first "
             f"{infinite.first_secs:.3f} s after its start; convert the log to CSV, replace "
             f"{'it' if infinite.count == 1 else 'them'} by nan and convert it back"
         )
@@ -169,8 +170,8 @@ def _time_warnings(channel: ChannelStats) -> Iterator[str]:
     if channel.gaps:
         start, longest = max(channel.gaps, key=lambda gap: gap[1])
         yield (
-            f"{_count(len(channel.gaps), 'gap')}, the longest {longest:.1f} s, {start:.1f} s after "
-            "its start; samples were lost: check the sensor and its connection"
+            f"{counted(len(channel.gaps), 'gap')}, the longest {longest:.1f} s, {start:.1f} s "
+            "after its start; samples were lost: check the sensor and its connection"
         )
     if channel.duplicate_times:
         yield _duplicate_times_warning(channel)
@@ -183,7 +184,7 @@ def _time_warnings(channel: ChannelStats) -> Iterator[str]:
         )
     if channel.received_early.count:
         yield (
-            f"{_count(channel.received_early.count, 'sample')} received before being measured, by "
+            f"{counted(channel.received_early.count, 'sample')} received before being measured, by "
             f"up to {channel.received_early.extent:.3g} s; the sensor's clock is ahead of the "
             "recorder's: synchronise them"
         )
@@ -191,7 +192,7 @@ def _time_warnings(channel: ChannelStats) -> Iterator[str]:
 
 def _duplicate_times_warning(channel: ChannelStats) -> str:
     """Word the warning of repeated time stamps, which are coarse where most of them repeat."""
-    text = f"{_count(channel.duplicate_times, 'sample')} with the same time as the one before"
+    text = f"{counted(channel.duplicate_times, 'sample')} with the same time as the one before"
     per_stamp = channel.valid / max(channel.valid - channel.duplicate_times, 1)
     if per_stamp < MIN_SAMPLES_PER_STAMP or not channel.interval_secs:
         return (
@@ -215,7 +216,7 @@ def _value_warnings(channel: ChannelStats) -> Iterator[str]:
     if channel.missing and not empty_cells:
         share = 100 * channel.missing / channel.samples
         yield (
-            f"{_count(channel.missing, 'sample')} ({share:.1f} %) not measured (NaN); "
+            f"{counted(channel.missing, 'sample')} ({share:.1f} %) not measured (NaN); "
             "the sensor gave no value: check it if that is unexpected"
         )
     stuck = channel.stuck
@@ -229,14 +230,14 @@ def _value_warnings(channel: ChannelStats) -> Iterator[str]:
     yield from _impossible_warnings(channel)
     for value, number in channel.sentinels:
         yield (
-            f"{_count(number, 'sample')} of exactly {_displayed(channel, value)}, to which the "
+            f"{counted(number, 'sample')} of exactly {_displayed(channel, value)}, to which the "
             'channel jumps and from which it returns: it stands for "not available" and is not '
             "used; check the sensor, and write nan instead where the log is made"
         )
     if channel.spikes:
         number, first_ns = len(channel.spikes), channel.spikes.times_ns[0]
         yield (
-            f"{_count(number, 'spike')} ({100 * number / channel.samples:.2g} %), up to "
+            f"{counted(number, 'spike')} ({100 * number / channel.samples:.2g} %), up to "
             f"{_displayed(channel, channel.spikes.largest)} away from the samples around, the "
             f"first {(first_ns - channel.span_ns[0]) * 1e-9:.1f} s after its start: not used; "
             "check the sensor and its connection"
@@ -251,7 +252,7 @@ def _impossible_warnings(channel: ChannelStats) -> Iterator[str]:
         return
     lowest, highest = channel.limits
     yield (
-        f"{_count(count, 'impossible value')}, {_worst(channel)}; possible are "
+        f"{counted(count, 'impossible value')}, {_worst(channel)}; possible are "
         f"{_displayed(channel, lowest)} to {_displayed(channel, highest)}: "
         "not used; check the unit in the layout and the sensor"
     )
@@ -271,7 +272,3 @@ def _displayed(channel: ChannelStats, value: float) -> str:
     """Format a value in the unit people use."""
     unit, factor = display_conversion(channel.name, channel.unit)
     return f"{value * factor:.4g} {unit}"
-
-
-def _count(number: int, thing: str) -> str:
-    return f"1 {thing}" if number == 1 else f"{number} {thing}s"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shiplog.errors import ShiplogError
+from shiplog.printable import counted
 
 from .console import print_line, print_tables, print_toml, print_warnings, progress, write_json
 from .options import add_cut_options, add_derive_option
@@ -161,9 +162,8 @@ def _convert(arguments: argparse.Namespace) -> ExitCode:
             shape=shape,
         )
     print_warnings(warnings)
-    samples = sum(len(channel) for channel in log.channels)
-    channels = "1 channel" if len(log.channels) == 1 else f"{len(log.channels)} channels"
-    print_line(f"{arguments.target}: {samples} samples of {channels}")
+    samples = counted(sum(len(channel) for channel in log.channels), "sample")
+    print_line(f"{arguments.target}: {samples} of {counted(len(log.channels), 'channel')}")
     return ExitCode.DATA_LOST if log.data_lost else ExitCode.OK
 
 

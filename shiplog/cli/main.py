@@ -13,7 +13,7 @@ from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from shiplog.errors import ShiplogError, UsageError
 from shiplog.extensions import declared_entries, extension_names, load_extension
@@ -139,6 +139,20 @@ def _fail(error: object, code: ExitCode) -> ExitCode:
 
 class _ArgumentParser(argparse.ArgumentParser):
     """Parser whose errors quote arguments in characters that print, and whose help is complete."""
+
+    def parse_known_args(  # type: ignore[override]
+        self,
+        args: Sequence[str] | None = None,
+        namespace: Any = None,  # noqa: ANN401 - as argparse has it
+    ) -> tuple[Any, list[str]]:
+        """Parse all arguments: an unknown one is an error of the verb that it follows.
+
+        Else argparse passes it on to the parser of all verbs, which prints a usage without options.
+        """
+        parsed, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return parsed, unknown
 
     def error(self, message: str) -> NoReturn:
         """Print the usage and the error, and end the process."""

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from shiplog.printable import counted
 from shiplog.text_table import TextTable
 
 from .console import print_line, print_tables, print_warnings
@@ -33,9 +34,8 @@ def _recover(arguments: argparse.Namespace) -> ExitCode:
         for topic, count in sorted((dict.fromkeys(lost or {}, 0) | recovery.messages).items())
     )
     print_tables([TextTable("Recovered", ("topic", "messages", "lost"), rows)])
-    print_line(
-        f"also {recovery.attachments} attachments and {recovery.metadata_records} metadata records"
-    )
+    attachments = counted(recovery.attachments, "attachment")
+    print_line(f"also {attachments} and {counted(recovery.metadata_records, 'metadata record')}")
     warnings = [*recovery.part_warnings, *damage_warnings(recovery.damage)]
     if not recovery.is_finished:
         warnings.append(
@@ -44,7 +44,8 @@ def _recover(arguments: argparse.Namespace) -> ExitCode:
         )
     print_warnings(warnings)
     outcome = "the rest is lost" if recovery.is_lost else "nothing is lost"
-    print_line(f"{arguments.output}: {sum(recovery.messages.values())} messages; {outcome}")
+    messages = counted(sum(recovery.messages.values()), "message")
+    print_line(f"{arguments.output}: {messages}; {outcome}")
     return ExitCode.DATA_LOST if recovery.is_lost else ExitCode.OK
 
 

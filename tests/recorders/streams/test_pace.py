@@ -69,11 +69,19 @@ def test_a_trial_at_its_own_pace_is_the_one_at_full_speed(
     assert slow == fast
 
 
-def test_a_stretch_at_its_own_pace_takes_its_time(tmp_path: Path) -> None:
+def test_a_stretch_is_let_through_by_the_clock_of_the_system(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert paced.__kwdefaults__ == {"clock": time.monotonic, "sleep": time.sleep}
+    waits: list[float] = []
+
+    def sleep(secs: float) -> None:
+        waits.append(secs)
+        time.sleep(secs)
+
+    monkeypatch.setattr("recorders.trial.open_source.paced", partial(paced, sleep=sleep))
     sentences = b"".join(SHIP.read_bytes().splitlines(keepends=True)[:40])
-    began = time.monotonic()
-    slow = _outputs(tmp_path / "slow", sentences, "--pace", "1", replay=False)
-    elapsed = time.monotonic() - began
+    slow = _outputs(tmp_path / "slow", sentences, "--pace", "4", replay=False)
     fast = _outputs(tmp_path / "fast", sentences, replay=False)
-    assert elapsed > 2
+    assert waits
     assert slow == fast

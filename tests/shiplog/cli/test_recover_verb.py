@@ -39,6 +39,15 @@ def test_where_nothing_is_lost_the_exit_code_is_0(tmp_path: Path) -> None:
     assert samples(read(good)) == samples(original)
 
 
+def test_what_is_kept_is_counted_in_the_singular_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, good = tmp_path / "whole.mcap", tmp_path / "good.mcap"
+    write_flushed(path)
+    recover(path, good)
+    assert "also 0 attachments and 1 metadata record\n" in capsys.readouterr().out
+
+
 def test_the_damaged_file_is_not_written_over(tmp_path: Path) -> None:
     path = tmp_path / "bad.mcap"
     _, data = write_flushed(path)
