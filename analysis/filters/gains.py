@@ -21,6 +21,7 @@ from shiplog.ships.paper import Coefficients, yaw_stiffness
 from shiplog.types import FloatArray
 from shiplog.vessel.settings import FilterSettings
 
+from .kernels import copy_matrix
 from .noise_model import NoiseModel
 
 WAVE_DECAY = 0.2  # decay rate of the wave's error over the wave's frequency, for stated poles
@@ -170,35 +171,95 @@ def relinearised_gain(
         K[2] = 1.0 - poles[2].real / np.exp(J[2, 2] * interval)
         return K
     count = size - 1
-    F, row, placed = np.zeros((count, count)), np.empty(count), np.empty(count, np.complex128)
-    F[:2, :2], F[2:, 2:] = _exponential(J[:2, :2] * interval), wave
+    F, gain = np.zeros((count, count)), np.zeros(count)
+    row, placed = np.empty(count), np.empty(count, np.complex128)
+    _set_exponential(F, J, interval)
+    copy_matrix(F[2:, 2:], wave)
     for i in range(count):
         state = i if i < 2 else i + 1  # v, the third state, is no state of yaw
         row[i], placed[i] = c[state], poles[state]
-    O, polynomial = np.empty((count, count)), np.eye(count).astype(np.complex128)
-    for i in range(count):
-        O[i] = row
-        row = row @ F
-        polynomial = polynomial @ (F - placed[i] * np.eye(count))
-    last = np.zeros(count)
-    last[-1] = 1.0
-    gain = np.linalg.solve(F, np.ascontiguousarray(polynomial.real) @ np.linalg.solve(O, last))
+    gain[-1] = 1.0
+    _solve(_observability(F, row), gain)
+    _multiply_by_factors(F, placed, gain)
+    _solve(F, gain)
     for i in range(count):
         K[i if i < 2 else i + 1] = gain[i]
     return K
 
 
 @compiled
-def _exponential(A: FloatArray) -> FloatArray:
-    """Return exp(A): the power series of A / 2^k, squared k times."""
-    halvings = 0
-    while np.abs(A).sum() > 2.0**halvings:
-        halvings += 1
-    scaled = A / 2.0**halvings
-    total, term = np.eye(len(A)), np.eye(len(A))
-    for k in range(1, 20):
-        term = term @ scaled / k
-        total += term
-    for _ in range(halvings):
-        total = total @ total
-    return total
+def _observability(F: FloatArray, row: FloatArray) -> FloatArray:
+    """Return the rows c, c F, c F² ... (k, k) of the output c (k,)."""
+    O = np.zeros(F.shape)
+    for j in range(len(row)):
+        O[0, j] = row[j]
+    for i in range(1, len(row)):
+        for j in range(len(row)):
+            for k in range(len(row)):
+                O[i, j] += O[i - 1, k] * F[k, j]
+    return O
+
+
+@compiled
+def _multiply_by_factors(F: FloatArray, poles: ComplexArray, vector: FloatArray) -> None:
+    """Multiply a vector (k,) by F - p I of each pole p, in place; the product is real."""
+    product, factor = vector.astype(np.complex128), np.empty(len(vector), np.complex128)
+    for pole in poles:
+        for i in range(len(vector)):
+            factor[i] = -pole * product[i]
+            for j in range(len(vector)):
+                factor[i] += F[i, j] * product[j]
+        product, factor = factor, product
+    for i in range(len(vector)):
+        vector[i] = product[i].real
+
+
+@compiled
+def _set_exponential(F: FloatArray, J: FloatArray, interval: float) -> None:
+    """Set the first two rows and columns of F to exp(A), A being those of J times the interval.
+
+    By the theorem of Cayley and Hamilton exp(A) = e^m (c I + s (A - m I)), where m is the mean of
+    the eigenvalues m ± q, c = cosh q and s = sinh q / q.
+    """
+    mean = 0.5 * (J[0, 0] + J[1, 1]) * interval
+    half = 0.5 * (J[0, 0] - J[1, 1]) * interval
+    b, c = J[0, 1] * interval, J[1, 0] * interval
+    square = half * half + b * c  # of q
+    q = np.sqrt(abs(square))
+    if q < 1e-4:  # the next term of the series is below the rounding
+        even, odd = 1.0 + square / 2, 1.0 + square / 6
+    elif square > 0:
+        even, odd = np.cosh(q), np.sinh(q) / q
+    else:
+        even, odd = np.cos(q), np.sin(q) / q
+    growth = np.exp(mean)
+    F[0, 0], F[0, 1] = growth * (even + odd * half), growth * odd * b
+    F[1, 0], F[1, 1] = growth * odd * c, growth * (even - odd * half)
+
+
+@compiled
+def _solve(M: FloatArray, b: FloatArray) -> None:
+    """Replace b (n,) by the solution of M x = b, by elimination with pivots; M (n, n) is changed.
+
+    Numba compiles `numpy.linalg.solve` for six seconds.
+    """
+    n = len(b)
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(M[i, k]) > abs(M[pivot, k]):
+                pivot = i
+        if M[pivot, k] == 0.0:
+            raise np.linalg.LinAlgError("the yaw is not observable at this motion")
+        b[k], b[pivot] = b[pivot], b[k]
+        for j in range(n):
+            M[k, j], M[pivot, j] = M[pivot, j], M[k, j]
+        for i in range(k + 1, n):
+            ratio = M[i, k] / M[k, k]
+            b[i] -= ratio * b[k]
+            for j in range(k, n):
+                M[i, j] -= ratio * M[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            b[k] -= M[k, j] * b[j]
+        b[k] /= M[k, k]

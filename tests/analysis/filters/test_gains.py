@@ -6,6 +6,7 @@ from filter_runs import designed_gain, signals_of
 from gaussian import held
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 
+from analysis.filters import gains
 from analysis.filters.gains import LinearAxis, linear_axes, relinearised_gain
 from analysis.filters.noise_model import NoiseModel, Wave
 from analysis.filters.ship_step import ShipState, jacobian, ship_slopes
@@ -289,3 +290,31 @@ def test_at_the_usual_motion_a_per_tick_gain_is_the_one_designed(
     among[2] = poles[0]
     K = placed(J, between, np.eye(len(c))[2], among, 0.5, 1)
     assert K[2] == pytest.approx(gain[0], rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("stiffness", [-4.0, -1e-2, -1e-10, 0.0, 1e-10, 1e-3, 2.0])
+@pytest.mark.parametrize("a", [-1.5, -1e-3, 0.0])
+@pytest.mark.parametrize("interval", [0.02, 1.0, 7.0])
+def test_the_exponential_of_the_yaw_is_that_of_scipy(
+    stiffness: float, a: float, interval: float
+) -> None:
+    F, J = np.zeros((2, 2)), np.array([[0.0, 1.0], [stiffness, a]])
+    gains._set_exponential.py_func(F, J, interval)
+    expected = expm(J * interval)
+    np.testing.assert_allclose(F, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("size", [1, 2, 4])
+def test_elimination_with_pivots_solves_what_numpy_solves(size: int) -> None:
+    rng = np.random.default_rng(size)
+    M, b = rng.normal(size=(size, size)), rng.normal(size=size)
+    if size > 1:
+        M[0, 0] = 0.0  # a row must be exchanged
+    expected = np.linalg.solve(M, b)
+    gains._solve.py_func(M, b)
+    np.testing.assert_allclose(b, expected, rtol=1e-12)
+
+
+def test_a_motion_at_which_the_yaw_is_not_observable_has_no_gain() -> None:
+    with pytest.raises(np.linalg.LinAlgError, match="not observable"):
+        gains._solve.py_func(np.array([[1.0, 2.0], [0.5, 1.0]]), np.ones(2))
