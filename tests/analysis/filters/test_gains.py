@@ -294,7 +294,7 @@ def test_at_the_usual_motion_a_per_tick_gain_is_the_one_designed(
 
 @pytest.mark.parametrize("stiffness", [-4.0, -1e-2, -1e-10, 0.0, 1e-10, 1e-3, 2.0])
 @pytest.mark.parametrize("a", [-1.5, -1e-3, 0.0])
-@pytest.mark.parametrize("interval", [0.02, 1.0, 7.0])
+@pytest.mark.parametrize("interval", [0.02, 0.5, 2.0])
 def test_the_exponential_of_the_yaw_is_that_of_scipy(
     stiffness: float, a: float, interval: float
 ) -> None:
