@@ -3,9 +3,8 @@
 from math import radians
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
-from scipy.signal import savgol_filter
 
 from shiplog.types import FloatArray
 
@@ -63,7 +62,10 @@ def first_execute(rudder: FloatArray, dt: float) -> int | None:
 
 def remove_spikes(rudder: FloatArray, dt: float) -> FloatArray:
     """Remove deflections shorter than `MAX_SPIKE_SECS` by a running median."""
-    return median_filter(rudder, 1 + 2 * round(MAX_SPIKE_SECS / 2 / dt))
+    half = round(MAX_SPIKE_SECS / 2 / dt)
+    # a replay, which looks for manoeuvres, starts without scipy's slow filters
+    windows = sliding_window_view(np.pad(rudder, half, "symmetric"), 1 + 2 * half)
+    return np.asarray(np.median(windows, axis=1))
 
 
 def smooth_heading(heading: FloatArray, half_width: int) -> FloatArray:
@@ -72,6 +74,8 @@ def smooth_heading(heading: FloatArray, half_width: int) -> FloatArray:
     A parabola keeps the height of an extreme (Savitzky and Golay, "Smoothing and differentiation
     of data by simplified least squares procedures", 1964).
     """
+    from scipy.signal import savgol_filter  # noqa: PLC0415 - slow to import
+
     return savgol_filter(heading, 1 + 2 * max(1, half_width), 2)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
+from .found_manoeuvre import FoundManoeuvre
 from .manoeuvre_part import TAIL_SECS, ManoeuvrePart
 from .manoeuvre_values import MAX_TRACK_SMOOTHING_SECS, IndexCase
 from .sailed_manoeuvre import ManoeuvreKind, ManoeuvreMark, ManoeuvreSeries
@@ -67,25 +68,53 @@ def manoeuvre_marks(
     part: ManoeuvrePart, case: IndexCase, indices: tuple[TrialIndex, ...]
 ) -> tuple[ManoeuvreMark, ...]:
     """Return the instants that the figures mark."""
-    dt, found = case.signals.dt_secs, part.found
-    marks = [ManoeuvreMark("execute", 0.0)] if part.side or found.kind in EXECUTED else []
-    marks += [
-        ManoeuvreMark(f"execute {k}", (at - case.execute) * dt)
-        for k, at in enumerate(found.reversals, 2)
-    ]
+    dt = case.signals.dt_secs
+    marks = execute_marks(part, case.execute)
     marks += [
         ManoeuvreMark(index.name.removeprefix("time to "), index.value)
         for index in indices
         if index.name.startswith("time to ") and index.name.endswith("°")
     ]
-    if found.kind is ManoeuvreKind.ZIGZAG:
+    if part.found.kind is ManoeuvreKind.ZIGZAG:
         change = case.signals.heading - case.approach
-        edges = [*found.reversals, found.end]
-        for k, (start, stop) in enumerate(pairwise(edges), 1):
-            if any(index.name == f"overshoot {k}" for index in indices):
-                peak = start + int(np.argmax(np.abs(change[start:stop])))
-                marks.append(ManoeuvreMark(f"overshoot {k}", (peak - case.execute) * dt))
+        marks += [
+            ManoeuvreMark(f"overshoot {k}", (at - case.execute) * dt)
+            for k, at in enumerate(overshoot_samples(part.found, change), 1)
+            if any(index.name == f"overshoot {k}" for index in indices)
+        ]
     marks += [
         ManoeuvreMark("stopped", index.value) for index in indices if index.name == "stopping time"
     ]
     return tuple(sorted(marks, key=lambda mark: mark.time_secs))
+
+
+def execute_marks(part: ManoeuvrePart, execute: float) -> list[ManoeuvreMark]:
+    """Return the marks of the executes; a manoeuvre without an order has none.
+
+    Parameters
+    ----------
+    part
+        The part of the trial with the manoeuvre.
+    execute
+        The sample of the first execute, from which their times count.
+    """
+    dt, found = part.filled.dt_secs, part.found
+    marks = [ManoeuvreMark("execute", 0.0)] if part.side or found.kind in EXECUTED else []
+    return marks + [
+        ManoeuvreMark(f"execute {k}", (at - execute) * dt)
+        for k, at in enumerate(found.reversals, 2)
+    ]
+
+
+def overshoot_samples(found: FoundManoeuvre, change: FloatArray) -> list[int]:
+    """Return the samples at which a zig-zag's heading is furthest, after each of its reversals.
+
+    Parameters
+    ----------
+    found
+        The zig-zag.
+    change
+        (n,) change of heading, of the same samples.
+    """
+    edges = [*found.reversals, found.end]
+    return [start + int(np.argmax(np.abs(change[start:stop]))) for start, stop in pairwise(edges)]

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from .execute import remove_spikes
 from .found_manoeuvre import FoundManoeuvre
@@ -58,6 +57,8 @@ def find_speed_manoeuvres(signals: TrialSignals) -> Iterator[FoundManoeuvre]:
 def _stop(
     signals: TrialSignals, levels: list[HeldLevel], before: HeldLevel
 ) -> FoundManoeuvre | None:
+    from scipy.ndimage import uniform_filter1d  # noqa: PLC0415 - slow to import
+
     execute, speed = before.last, signals.speed
     initial = float(np.median(speed[max(0, execute - round(5 / signals.dt_secs)) : execute + 1]))
     later = [held for held in levels if held.first > execute and held.level > before.level / 3]

@@ -18,7 +18,8 @@ from .quantity_panel import has_any_value, quantity_panel
 class FurtherChannels:
     """Draws the channels of a log that a replay does not use, chunk by chunk.
 
-    Of a quantity with several sources all are drawn, the one that the replay uses included.
+    The heading counts as used, as it is drawn over the rudder. Of a quantity with several sources
+    all are drawn, the one that the replay uses included.
     Positions are not drawn, as they are the track, nor are the times of a satellite receiver. Where
     the chunks are cut changes no result.
 
@@ -34,6 +35,7 @@ class FurtherChannels:
 
     def __init__(self, screening: Screening, clock: Clock, *, full: bool = False) -> None:
         span = clock.start_ns, (clock.count - 1) * clock.dt_secs
+        drawn = {*REQUIRED_CHANNELS, *({"heading"} & set(clock.channels))}
         self._groups = {
             quantity: [
                 ChannelSeries(
@@ -42,7 +44,7 @@ class FurtherChannels:
                 for channel in channels
             ]
             for quantity, channels in channels_by_quantity(screening.all_stats).items()
-            if quantity.name not in REQUIRED_CHANNELS or len(channels) > 1
+            if quantity.name not in drawn or len(channels) > 1
         }
 
     def __bool__(self) -> bool:

@@ -17,7 +17,7 @@ from shiplog.printable import printable
 from .identification_panels import RunSheet, parameter_panels, run_sheets
 from .panels import Panel
 from .rerun_io import (
-    axis_until,
+    axis_between,
     chart_view,
     make_blueprint,
     plot_view,
@@ -99,7 +99,7 @@ def _track_origin(i: int) -> str:
 def _blueprint(
     ship: IdentifiedShip, sheets: Sequence[RunSheet], parameters: Sequence[Panel]
 ) -> rrb.Blueprint:
-    axis = axis_until(total_duration_secs(ship.fit.problem.segments))
+    axis = axis_between(0.0, total_duration_secs(ship.fit.problem.segments))
     columns = 3 if len(parameters) <= MAX_LARGE_PANELS else 4
     overview = rrb.Horizontal(
         rrb.Grid(*(plot_view(panel, axis) for panel in parameters), grid_columns=columns),
@@ -113,10 +113,10 @@ def _blueprint(
 
 def _run_tab(i: int, sheet: RunSheet) -> rrb.Container:
     """Return outputs over inputs on the left, residuals, autocorrelation and track on the right."""
-    axis = axis_until(sheet.duration_secs)
+    axis = axis_between(0.0, sheet.duration_secs)
     left = [plot_view(panel, axis) for panel in (*sheet.outputs, *sheet.inputs)]
     right: list[rrb.View] = [plot_view(panel, axis) for panel in sheet.residuals]
-    right.append(plot_view(sheet.correlation, axis_until(sheet.lag_secs)))
+    right.append(plot_view(sheet.correlation, axis_between(0.0, sheet.lag_secs)))
     if sheet.track is not None:
         right.append(chart_view(_track_origin(i), sheet.track))
     shares = [1] * (len(right) - 1) + [2 if sheet.track is not None else 1]

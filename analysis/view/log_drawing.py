@@ -14,11 +14,11 @@ from shiplog.types import Channel, Event, EventLevel, FloatArray, Log
 
 from .channel_series import ChannelSeries, DrawnQuantity, channel_label, channels_by_quantity
 from .decimation import Decimator, bucket_size
+from .panels import REVIEW_UNITS
 from .quantity_panel import has_any_value
 from .series import GREY, Line, Series
 
 MAX_GAPS = 200  # of a channel that are marked: the longest ones
-DISPLAY_UNITS = {"yaw_rate": "deg/min"}  # as rate of turn indicators show it
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def draw_log(log: Log, *, full: bool = False) -> LogDrawing:
     if not any(channel.samples for channel in stats):
         raise no_samples_error("view", log.warnings, log.name)
     span = stats.span_ns[0], stats.duration_secs
-    groups = channels_by_quantity(stats, DISPLAY_UNITS)
+    groups = channels_by_quantity(stats, REVIEW_UNITS)
     drawn = {
         quantity: [
             ChannelSeries(each, span, quantity, channel_label(each, quantity), full=full)

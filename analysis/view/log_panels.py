@@ -6,12 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from shiplog.checks.event_table import OPERATOR
-from shiplog.types import FloatArray
 from shiplog.units import CATALOGUE
 
 from .channel_series import DrawnQuantity
 from .log_drawing import LogDrawing
-from .panels import Panel, title_of, words
+from .panels import Panel, range_text, strokes, title_of, with_range, words
 from .quantity_panel import SOURCE_COLOURS, entity_part, joined_panel, turned_together
 from .series import BLUE, GREEN, GREY, ORANGE, RED, Colour, Line, Series
 
@@ -113,9 +112,8 @@ def _relative_headings(
 
 
 def _values_text(drawings: Sequence[LogDrawing], quantities: Sequence[DrawnQuantity]) -> str:
-    return _range_text(
-        [each for drawing in drawings for q in quantities for each in drawing.series.get(q, [])]
-    )
+    drawn = [s for drawing in drawings for q in quantities for s in drawing.series.get(q, [])]
+    return range_text(*(line.values for series in drawn for line in series.lines))
 
 
 def _reference_text(drawings: Sequence[LogDrawing], references: Sequence[float]) -> str:
@@ -166,7 +164,7 @@ def _panel(drawings: Sequence[LogDrawing], quantities: Sequence[DrawnQuantity]) 
         alone: tuple[Colour, ...] = (COLOURS.get(first.name, GREY),)
         colours = list(alone if len(colours) == 1 else SOURCE_COLOURS)
     title = title_of(" and ".join(words(each.name) for each in quantities), first.display[0])
-    title = f"{title}: {_range_text(drawn)}"
+    title = with_range(title, *(line.values for series in drawn for line in series.lines))
     name = f"channels_{entity_part(first.name)}_{'_'.join(map(entity_part, first.fields))}"
     panel = joined_panel(name.rstrip("_"), title, drawn, colours)
     return _marked(panel, drawings, quantities)
@@ -180,16 +178,6 @@ def _labelled(series: Series, label: str, *, is_thin: bool) -> Series:
         for line in series.lines
     )
     return replace(series, lines=tuple(lines))
-
-
-def _range_text(drawn: Sequence[Series]) -> str:
-    """Return the lowest and the highest value in words.
-
-    An axis has grid lines at powers of ten only, without a number where they are close.
-    """
-    values = np.concatenate([line.values for series in drawn for line in series.lines])
-    lowest, highest = (f"{end(values):.4g}" for end in (np.nanmin, np.nanmax))
-    return lowest if lowest == highest else f"{lowest} to {highest}"
 
 
 def _marked(
@@ -209,16 +197,8 @@ def _marked(
     series = list(panel.series)
     if marks:
         spans = np.column_stack((marks, marks))
-        lines = _strokes("00_marks", spans, (low, high), Line("mark", np.zeros(0), GREY, 0.8))
+        lines = strokes("00_marks", spans, (low, high), Line("mark", np.zeros(0), GREY, 0.8))
         series.insert(0, lines)
     if len(gaps):
-        series.append(_strokes("gaps", gaps, (low, low), Line("gap", np.zeros(0), RED, 5.0)))
+        series.append(strokes("gaps", gaps, (low, low), Line("gap", np.zeros(0), RED, 5.0)))
     return replace(panel, series=tuple(series))
-
-
-def _strokes(name: str, spans: FloatArray, levels: tuple[float, float], line: Line) -> Series:
-    """Return strokes from the first to the second of each of `spans`, (g, 2) s, at two levels."""
-    spans = spans[np.argsort(spans[:, 0])]
-    times = np.column_stack((spans, spans[:, 1])).ravel()
-    values = np.tile([*levels, np.nan], len(spans))
-    return Series(name, times, (replace(line, values=values),))

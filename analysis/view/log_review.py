@@ -32,7 +32,7 @@ from .rerun_io import (
     send_style,
     send_text,
 )
-from .series import CYAN, GREY, Colour
+from .series import GREY, PALE, Colour
 from .track_chart import TrackChart, make_chart
 
 LEGEND = """
@@ -172,7 +172,7 @@ def _heading_along(drawing: LogDrawing) -> FloatArray | None:
 def _colours(number: int, count: int) -> tuple[Colour, Colour]:
     """Return the colours of the track and the ships of one of several logs."""
     if count == 1:
-        return GREY, CYAN
+        return GREY, PALE
     colour = SOURCE_COLOURS[number % len(SOURCE_COLOURS)]
     return colour, colour
 

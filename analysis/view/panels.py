@@ -1,15 +1,18 @@
 """Panels: series that share an axis, with a title and limits."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from math import floor, log10
 
 import numpy as np
 
 from shiplog.types import FloatArray
+from shiplog.units import CATALOGUE, conversion_factor
 
-from .series import Series
+from .series import Line, Series
 
 WILD_SHARE = 0.01  # of the values at either end, which may lie outside an axis
+REVIEW_UNITS: Mapping[str, str] = {"yaw_rate": "deg/min"}  # as rate of turn indicators show it
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +60,68 @@ def title_of(name: str, unit: str) -> str:
     ('yaw rate [deg/s]', 'rpm', 'satellites')
     """
     return words(name) if unit in (name, "1") else f"{words(name)} [{unit}]"
+
+
+def review_unit(name: str) -> tuple[str, float]:
+    """Return the unit in which reviews draw a quantity, and the factor to it from the SI unit.
+
+    Examples
+    --------
+    >>> review_unit("rudder")[0], review_unit("yaw_rate")[0]
+    ('deg', 'deg/min')
+    """
+    unit = REVIEW_UNITS.get(name, CATALOGUE[name].display_unit)
+    return unit, conversion_factor(CATALOGUE[name].unit, unit)
+
+
+def range_text(*arrays: FloatArray) -> str:
+    """Return the lowest and the highest of some values in words; empty where none is finite.
+
+    An axis has grid lines at powers of ten only, without a number where they are close.
+
+    Examples
+    --------
+    >>> range_text(np.array([1.0, np.nan]), np.array([2.5])), range_text(np.array([80.0]))
+    ('1 to 2.5', '80')
+    """
+    values = np.concatenate(arrays)
+    if not np.isfinite(values).any():
+        return ""
+    lowest, highest = (f"{end(values):.4g}" for end in (np.nanmin, np.nanmax))
+    return lowest if lowest == highest else f"{lowest} to {highest}"
+
+
+def with_range(title: str, *arrays: FloatArray) -> str:
+    """Return a title with the range of the values.
+
+    Examples
+    --------
+    >>> with_range("rpm", np.array([80.0]))
+    'rpm: 80'
+    """
+    text = range_text(*arrays)
+    return f"{title}: {text}" if text else title
+
+
+def strokes(name: str, spans: FloatArray, levels: tuple[float, float], line: Line) -> Series:
+    """Return strokes between two levels.
+
+    Parameters
+    ----------
+    name
+        That of the series.
+    spans
+        (g, 2) s: each stroke goes from the first of them to the second; equal, it is vertical.
+    levels
+        The values at both ends.
+    line
+        Its name, colour and width are those of the strokes.
+    """
+    spans = spans[np.argsort(spans[:, 0])]
+    times = np.column_stack((spans, spans[:, 1])).ravel()
+    values = np.tile([*levels, np.nan], len(spans))
+    # else a viewer draws the mean of the values at one instant
+    return Series(name, times, (replace(line, values=values),), spiky=True)
 
 
 def thousands(size: float) -> tuple[str, float]:

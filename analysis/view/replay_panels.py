@@ -1,6 +1,7 @@
-"""The panels of a replay's review: outputs, inputs, disturbances, residuals, coefficients."""
+"""The panels of a replay's review: motion, disturbances, residuals, coefficients."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,29 +9,42 @@ from analysis.regression.changes import Change
 from analysis.regression.coefficients import Coefficient
 from analysis.replay.replay_results import Findings
 from analysis.report.display import BAND_STDS, DISTURBANCES
-from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
+from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import FloatArray
-from shiplog.units import CATALOGUE
 
-from .panels import Panel, limits, rounded, thousands, title_of, words
-from .series import BLUE, GREY, ORANGE, RED, Colour, Line, Series, banded
+from .panels import Panel, limits, review_unit, rounded, thousands, title_of, with_range, words
+from .series import BLUE, GREY, RED, Line, Series, banded
+from .series_builder import STEERING
+from .steering_panels import steering_panels
 
 Drawn = Mapping[str, Series]  # by entity, as `SeriesBuilder.result` returns them
+MIN_RPM_RANGE = 0.02  # of the largest revolutions; those that vary less need no panel
 MAX_MODEL_DISTANCE = 10.0  # in half-heights of an axis: up to here it includes the model's value
 
 
+def trial_panels(drawn: Drawn) -> list[Panel]:
+    """Return the panels of heading with rudder, yaw rate, speed, and of rpm where they vary."""
+    headings = [drawn[each] for each in (f"{STEERING}/heading/measured",) if each in drawn]
+    first = ""
+    if "heading" in drawn and len(drawn["heading"].time_secs):
+        degrees = np.degrees(drawn["heading"].lines[0].values[0])
+        first = f"{round(degrees, 1) % 360:.1f}°"
+    panels = steering_panels(STEERING, drawn[f"{STEERING}/rudder/measured"], headings, first)
+    yaw_rate, speed = (_output(drawn, output) for output in PAPER_OUTPUTS)
+    rpm = drawn["rpm/measured"]
+    values = rpm.lines[0].values
+    known = values[np.isfinite(values)]
+    if len(known) and np.ptp(known) <= MIN_RPM_RANGE * np.max(np.abs(known)):
+        speed = replace(speed, title=f"{speed.title}; at {np.median(known):.4g} rpm")
+        return [*panels, yaw_rate, speed]
+    return [*panels, yaw_rate, speed, Panel("rpm", with_range("rpm", known), (rpm,), limits(known))]
+
+
 def equation_panels(findings: Findings, drawn: Drawn) -> tuple[list[Panel], list[Panel]]:
-    """Return the panels of yaw and of surge; each row belongs side by side."""
+    """Return disturbance and innovation of yaw and of surge; each row belongs side by side."""
     yaw, surge = (
-        [
-            _output(drawn, output),
-            _input(drawn, input_),
-            _disturbance(findings, drawn, disturbance),
-            _innovation(findings, drawn, output),
-        ]
-        for output, input_, disturbance in zip(
-            PAPER_OUTPUTS, PAPER_INPUTS, ("yaw", "surge"), strict=True
-        )
+        [_disturbance(findings, drawn, disturbance), _innovation(findings, drawn, output)]
+        for output, disturbance in zip(PAPER_OUTPUTS, ("yaw", "surge"), strict=True)
     )
     return yaw, surge
 
@@ -39,28 +53,26 @@ def history_panels(findings: Findings, drawn: Drawn) -> list[Panel]:
     """Return the history of each coefficient that any window determines, with the model's value."""
     model = findings.plan.vessel.paper_coefficients._asdict()
     panels = [
-        _history(findings, drawn, name, coefficient, model[name], colour)
-        for fit, colour in ((findings.yaw, BLUE), (findings.surge, ORANGE))
+        _history(findings, drawn, name, coefficient, model[name])
+        for fit in (findings.yaw, findings.surge)
         for name, coefficient in fit.coefficients.items()
     ]
-    return [panel for panel in panels if panel is not None]
+    known = [panel for panel in panels if panel is not None]
+    return [replace(panel, legend=panel is known[0]) for panel in known]  # it serves all
 
 
 def _output(drawn: Drawn, name: str) -> Panel:
     measured, state = drawn[f"{name}/measured"], drawn[f"{name}/state"]
-    title = title_of(name, CATALOGUE[name].display_unit)
-    axis = limits(measured.lines[0].values, state.lines[-1].values)
-    return Panel(name, title, (measured, state, *_optional(drawn, f"{name}/wave")), axis)
+    estimate = state.lines[-1].values
+    title = with_range(title_of(name, review_unit(name)[0]), estimate)
+    axis = limits(measured.lines[0].values, estimate)
+    series = (measured, state, *_optional(drawn, f"{name}/wave"))
+    return Panel(name, title, series, axis, legend=True)
 
 
 def _optional(drawn: Drawn, entity: str) -> tuple[Series, ...]:
     """Return a series that exists only where it was asked for."""
     return (drawn[entity],) if entity in drawn else ()
-
-
-def _input(drawn: Drawn, name: str) -> Panel:
-    measured, title = drawn[f"{name}/measured"], title_of(name, CATALOGUE[name].display_unit)
-    return Panel(name, title, (measured,), limits(measured.lines[0].values))
 
 
 def _disturbance(findings: Findings, drawn: Drawn, name: str) -> Panel:
@@ -83,7 +95,7 @@ def _disturbance(findings: Findings, drawn: Drawn, name: str) -> Panel:
         axis = [line.values for line in estimate.lines]
     waves = [each.lines[0].values for each in series if each.name in ("wave", "wind")]
     title = f"{name} disturbance [{unit}]"
-    return Panel(f"disturbance_{name}", title, series, limits(*axis, *waves))
+    return Panel(f"disturbance_{name}", title, series, limits(*axis, *waves), legend=True)
 
 
 def _innovation(findings: Findings, drawn: Drawn, name: str) -> Panel:
@@ -93,11 +105,12 @@ def _innovation(findings: Findings, drawn: Drawn, name: str) -> Panel:
         f"{words(name)} innovation / expected σ",
         (normalised, _guides(findings, "±2σ", BAND_STDS, "sigma_limits")),
         limits(normalised.lines[0].values, np.array([-2.0, 2.0]) * BAND_STDS),
+        legend=True,
     )
 
 
 def _history(
-    findings: Findings, drawn: Drawn, name: str, whole: Coefficient, model: float, colour: Colour
+    findings: Findings, drawn: Drawn, name: str, whole: Coefficient, model: float
 ) -> Panel | None:
     """Draw a coefficient's windows, its model value and its changes; None if nothing is known.
 
@@ -125,7 +138,7 @@ def _history(
     reference = Line("model", np.full(2, model * scale), GREY, 1.5)
     series = (
         Series("model", span, (reference,)),
-        Series("per_window", at, banded("window", value, half_width, colour)),
+        Series("per_window", at, banded("sliding window", value, half_width, BLUE)),
         *steps,
     )
     text = rounded(result, result_half_width) if whole.determined else "not determined"

@@ -1,28 +1,36 @@
-"""The review of a replay in Rerun: its entities, and the page and the tab that show them."""
+"""The review of a replay in Rerun: its series, tracks, events and text."""
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 
+from analysis.filters.base import OUTPUT_STATES
+from analysis.manoeuvres.manoeuvre_spans import ManoeuvreSpan, manoeuvre_spans
 from analysis.replay.plan import Plan
 from analysis.replay.replay_results import Analysis, Findings, ReplayChunk
+from analysis.trial.thinned_signals import SEARCHED, ThinnedSignals
 from shiplog.printable import printable
+from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import Event, EventLevel, Log
 
 from .further_channels import FurtherChannels
-from .panels import Panel
-from .replay_panels import equation_panels, history_panels
+from .manoeuvre_sheets import (
+    MAX_NAMED,
+    ManoeuvreSheet,
+    MotionHistory,
+    manoeuvre_events,
+    manoeuvre_sheet,
+    with_executes,
+    with_manoeuvres,
+)
+from .replay_layout import SUMMARY, TRACK, ReplayPage, replay_blueprint, track_origin
+from .replay_panels import equation_panels, history_panels, trial_panels
 from .rerun_io import (
-    chart_view,
-    events_view,
-    make_blueprint,
-    plot_view,
     save_recording,
     send_chart,
     send_events,
@@ -31,34 +39,11 @@ from .rerun_io import (
     send_text,
 )
 from .sensor_panels import sensor_panels
+from .series import Series
 from .series_builder import SeriesBuilder
-from .track_chart import TrackChart, draw_track
+from .track_chart import draw_track
 
-ROW_SHARES = [1.45, 0.8, 1.0, 0.9]  # heights: outputs, inputs, disturbances, innovations
-LEGEND = """
-## Legend
-
-- **grey**: measured; in coefficient panels, the value of the model
-- **blue**, **orange**: estimates of yaw and of surge, with ±2σ
-- **green**: inputs; among the disturbances, moment and force of the wind
-- **red**: disturbances (between the grey lines they may be sensor noise), and coefficients before \
-and after a change
-- **cyan**: waves
-- **coefficients**: in the title, the value over the whole trial with ±2σ; as a curve, that of the \
-sliding window that ends there
-- **gap in a curve**: nothing measured, or a window that does not determine the coefficient
-"""
-SENSORS_NAME = "sensors"
-SENSORS_LEGEND = f"""\
-- **tab "{SENSORS_NAME}"**: sensor errors, current and coefficients of the wind with ±2σ, as \
-estimated with the states; the heading, measured and estimated, and the innovations of heading and \
-position
-"""
-FURTHER_NAME = "further channels"
-FURTHER_LEGEND = f"""\
-- **tab "{FURTHER_NAME}"**: what else the log has, as measured, and all sources of a quantity that \
-has several; steps are values held until the next, such as orders
-"""
+ESTIMATES = dict(zip(PAPER_OUTPUTS, OUTPUT_STATES, strict=True))  # states, by output
 
 
 class ReplayReview:
@@ -68,12 +53,19 @@ class ReplayReview:
         self._recording, self._full = recording, full
         self._start_ns = plan.clock.start_ns
         self._builder = SeriesBuilder(plan.clock, plan.stats)
+        names = (*SEARCHED, *map(_estimate_name, ESTIMATES))
+        self._thinned = ThinnedSignals(plan.clock.count, plan.clock.dt_secs, names)
+        self._dense: set[str] = set()  # entities sent with every sample
         self._further = FurtherChannels(plan.screening, plan.clock, full=full)
 
     def add(self, chunk: ReplayChunk) -> None:
         """Draw the next chunk."""
         dense = self._builder.add(chunk)
+        states = chunk.estimates.states
+        estimates = {_estimate_name(name): states[:, i] for name, i in ESTIMATES.items()}
+        self._thinned.add(chunk.signals.first, {**chunk.signals.values, **estimates})
         if self._full:
+            self._dense.update(dense)
             for entity, series in dense.items():
                 send_points(self._recording, entity, series, self._start_ns)
 
@@ -97,29 +89,64 @@ class ReplayReview:
         findings
             The findings of the replay.
         text
-            The page of text, in Markdown; a legend is added to it.
+            The page of text, in Markdown.
         """
         recording, start_ns = self._recording, self._start_ns
-        drawn = self._builder.result()
-        yaw, surge = equation_panels(findings, drawn)
-        coefficients, chart = history_panels(findings, drawn), draw_track(findings, drawn)
-        sensors = sensor_panels(findings, drawn)
-        further, events = self._further.panels(), _events_with_changes(findings, start_ns)
-        page = _replay_page(yaw, surge, coefficients, chart, has_events=bool(events))
-        rr.send_blueprint(_blueprint(page, sensors, further), recording=recording)
+        drawn, spans = self._builder.result(), manoeuvre_spans(self._thinned.trial_signals())
+        sheets = _manoeuvre_sheets(findings, drawn, spans, self._thinned)
+        steering, *others = trial_panels(drawn)
+        page = ReplayPage(
+            motion=[with_executes(steering, spans, legend=len(spans) <= MAX_NAMED), *others],
+            chart=with_manoeuvres(draw_track(findings, drawn), spans),
+            has_events=bool(spans or findings.events or findings.changes),
+            manoeuvres=sheets,
+            equations=equation_panels(findings, drawn),
+            coefficients=history_panels(findings, drawn),
+            sensors=sensor_panels(findings, drawn),
+            further=self._further.panels(),
+            duration_secs=(findings.plan.clock.count - 1) * findings.plan.clock.dt_secs,
+        )
+        rr.send_blueprint(replay_blueprint(page), recording=recording)
         _send_properties(recording, findings)
-        legends = (SENSORS_LEGEND if any(sensors) else "") + (FURTHER_LEGEND if further else "")
-        send_text(recording, "summary", text + LEGEND + legends)
-        for panel in (*yaw, *surge, *coefficients, *sensors[0], *sensors[1], *further):
+        send_text(recording, SUMMARY, text)
+        for panel in page.panels():
             for series in panel.series:
                 entity = f"{panel.name}/{series.name}"
                 send_style(recording, entity, series)
-                if not (self._full and series is drawn.get(entity)):
+                if entity not in self._dense:
                     send_points(recording, entity, series, start_ns)
-        if chart is not None:
-            send_chart(recording, "track", chart, start_ns)
-        if events:
-            send_events(recording, "events", events, start_ns)
+        charts = {TRACK: page.chart} | {track_origin(each): each.chart for each in sheets}
+        for origin, chart in charts.items():
+            if chart is not None:
+                send_chart(recording, origin, chart, start_ns)
+        if page.has_events:
+            send_events(recording, "events", _all_events(findings, spans, start_ns), start_ns)
+
+
+def _estimate_name(output: str) -> str:
+    return f"{output}_estimate"
+
+
+def _manoeuvre_sheets(
+    findings: Findings,
+    drawn: Mapping[str, Series],
+    spans: Sequence[ManoeuvreSpan],
+    thinned: ThinnedSignals,
+) -> list[ManoeuvreSheet]:
+    """Return the sheet of each manoeuvre, measured and estimated."""
+    values = thinned.values()
+    history = MotionHistory(
+        thinned.time_secs,
+        values["rudder"],
+        {name: values[name] for name in ("heading", *PAPER_OUTPUTS)},
+        {name: values[_estimate_name(name)] for name in PAPER_OUTPUTS},
+        "estimated",
+    )
+    length = findings.plan.vessel.length
+    return [
+        manoeuvre_sheet(span, history, [drawn["track"]], length, f"manoeuvre_{span.number}")
+        for span in spans
+    ]
 
 
 @contextmanager
@@ -200,57 +227,13 @@ def _send_properties(recording: rr.RecordingStream, findings: Findings) -> None:
     recording.send_property("trial", trial)
 
 
-def _blueprint(
-    page: rrb.Container, sensors: tuple[list[Panel], list[Panel]], further: list[Panel]
-) -> rrb.Blueprint:
-    """Return a blueprint of the page, with tabs for sensors and further channels if there are any.
-
-    Histories of sensor errors are on the left, heading and innovations on the right.
-    """
-    tabs = [page]
-    if any(sensors):
-        halves = (rrb.Vertical(*map(plot_view, panels)) for panels in sensors if panels)
-        tabs.append(rrb.Horizontal(*halves, name=SENSORS_NAME))
-    if further:
-        columns = 1 + (len(further) > 3) + (len(further) > 8)
-        tabs.append(rrb.Grid(*map(plot_view, further), grid_columns=columns, name=FURTHER_NAME))
-    return make_blueprint(rrb.Tabs(*tabs, active_tab=0) if len(tabs) > 1 else page)
-
-
-def _events_with_changes(findings: Findings, start_ns: int) -> tuple[Event, ...]:
-    """Return the events of the log, and the changes of coefficients as warnings among them."""
+def _all_events(
+    findings: Findings, spans: Sequence[ManoeuvreSpan], start_ns: int
+) -> tuple[Event, ...]:
+    """Return the events of the log, the manoeuvres, and changes of coefficients as warnings."""
     changes = (
         Event(start_ns + round(change.at_secs * 1e9), str(change), "replay", EventLevel.WARNING)
         for change in findings.changes
     )
-    return tuple(sorted((*findings.events, *changes), key=lambda event: event.time_ns))
-
-
-def _replay_page(
-    yaw: list[Panel],
-    surge: list[Panel],
-    coefficients: list[Panel],
-    chart: TrackChart | None,
-    *,
-    has_events: bool,
-) -> rrb.Container:
-    """Lay out one page: yaw and surge on the left; track, summary and coefficients on the right.
-
-    The events of the log and the changes of coefficients are a list of texts below these.
-    """
-    plots = rrb.Horizontal(
-        *(rrb.Vertical(*map(plot_view, column), row_shares=ROW_SHARES) for column in (yaw, surge))
-    )
-    top: list[rrb.View | rrb.Container] = [rrb.TextDocumentView(origin="summary", name="summary")]
-    if chart is not None:
-        top.insert(0, chart_view("track", chart))
-    shares = [3, 4][2 - len(top) :]
-    side: list[rrb.View | rrb.Container] = [rrb.Horizontal(*top, column_shares=shares)]
-    if coefficients:
-        side.append(rrb.Grid(*map(plot_view, coefficients), grid_columns=3, name="coefficients"))
-    row_shares = [2, 3][: len(side)]
-    if has_events:
-        side.append(events_view())
-        row_shares.append(1)
-    right = rrb.Vertical(*side, row_shares=row_shares)
-    return rrb.Horizontal(plots, right, column_shares=[1, 1], name="replay")
+    events = (*findings.events, *changes, *manoeuvre_events(spans, start_ns))
+    return tuple(sorted(events, key=lambda event: event.time_ns))

@@ -20,11 +20,12 @@ from shiplog.types import Event, EventLevel, FloatArray
 
 from .file_pipe import pipe_to_file
 from .panels import Panel
-from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Colour, Series
+from .series import BLUE, GREEN, GREY, ORANGE, PALE, RED, Colour, Series
 from .track_chart import TrackChart
 
 RRD_MAGIC, FOOTER_MAGIC, FOOTER_BYTES = b"RRF2", b"RRF2FOOT", 32
 MAX_ROWS = 1 << 16  # sent at once
+AXIS_MARGIN = 0.03  # of the length of a time axis, after its end
 EVENT_LEVELS = {EventLevel.INFO: "INFO", EventLevel.WARNING: "WARN", EventLevel.ERROR: "ERROR"}
 WHOLE_RUN = rrb.TimeAxis(
     view_range=rr.TimeRange(
@@ -115,9 +116,20 @@ def send_events(
         rr.TimeColumn("time", duration=(stamps - start_ns).astype("m8[ns]")),
         rr.TimeColumn("stamp", timestamp=stamps.astype("M8[ns]")),
     ]
-    texts = [printable(f"{event.source}: {event.text}") for event in events]
+    # the column of times is narrower than a time
+    texts = [
+        printable(f"{_elapsed(event.time_ns - start_ns)} {event.source}: {event.text}")
+        for event in events
+    ]
     levels = [EVENT_LEVELS[event.level] for event in events]
     recording.send_columns(entity, times, rr.TextLog.columns(text=texts, level=levels))
+
+
+def _elapsed(duration_ns: int) -> str:
+    """Return a time since the start as hours, minutes and seconds."""
+    seconds = round(abs(duration_ns) * 1e-9)
+    sign = "-" if duration_ns < 0 and seconds else ""
+    return f"{sign}{seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02}"
 
 
 def send_text(recording: rr.RecordingStream, entity: str, text: str) -> None:
@@ -131,7 +143,7 @@ def send_chart(
     origin: str,
     chart: TrackChart,
     start_ns: int | None,
-    colours: tuple[Colour, Colour] = (GREY, CYAN),
+    colours: tuple[Colour, Colour] = (GREY, PALE),
 ) -> None:
     """Send a track with its ships, ends and scale, and the position at each time.
 
@@ -145,6 +157,24 @@ def send_chart(
     if chart.simulated is not None:
         simulated = rr.LineStrips2D([chart.simulated], colors=[BLUE], radii=thin)
         recording.log(f"{origin}/simulated", simulated, static=True)
+    if chart.parts:
+        parts = rr.LineStrips2D(
+            [part.points for part in chart.parts],
+            colors=[part.colour for part in chart.parts],
+            labels=[printable(part.label) for part in chart.parts],
+            radii=rr.Radius.ui_points(1.6),
+            show_labels=all(part.label for part in chart.parts),
+        )
+        recording.log(f"{origin}/manoeuvres", parts, static=True)
+    if chart.marks:
+        marks = rr.Points2D(
+            [mark.point for mark in chart.marks],
+            colors=[mark.colour for mark in chart.marks],
+            labels=[printable(mark.label) for mark in chart.marks],
+            radii=rr.Radius.ui_points(3.5),
+            show_labels=True,
+        )
+        recording.log(f"{origin}/marks", marks, static=True)
     ends = rr.Points2D(
         chart.track[[0, -1]], labels=["start", "end"], colors=[GREEN, RED], radii=dot
     )
@@ -180,9 +210,10 @@ def plot_view(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesVie
     )
 
 
-def axis_until(secs: float) -> rrb.TimeAxis:
-    """Return a time axis from the start to `secs`."""
-    ends = (rr.TimeRangeBoundary.absolute(seconds=at) for at in (0.0, secs))
+def axis_between(start_secs: float, end_secs: float) -> rrb.TimeAxis:
+    """Return a time axis between two instants, s, with room for the label of its last tick."""
+    last = end_secs + AXIS_MARGIN * (end_secs - start_secs)
+    ends = (rr.TimeRangeBoundary.absolute(seconds=at) for at in (start_secs, last))
     return rrb.TimeAxis(view_range=rr.TimeRange(*ends))
 
 

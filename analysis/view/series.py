@@ -10,11 +10,16 @@ from shiplog.types import FloatArray
 
 Colour = tuple[int, int, int, int]
 GREY: Colour = (140, 140, 140, 255)
+PALE: Colour = (205, 205, 205, 255)
 CYAN: Colour = (60, 190, 210, 255)
 GREEN: Colour = (76, 175, 80, 255)
 BLUE: Colour = (66, 150, 245, 255)  # estimates of yaw
 ORANGE: Colour = (245, 140, 40, 255)  # estimates of surge
 RED: Colour = (225, 70, 80, 255)
+MAGENTA: Colour = (225, 90, 190, 255)
+YELLOW: Colour = (225, 200, 60, 255)
+VIOLET: Colour = (150, 110, 235, 255)
+BROWN: Colour = (170, 120, 80, 255)
 
 BAND_ALPHA = 120  # of 255
 

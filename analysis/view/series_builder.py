@@ -6,11 +6,12 @@ from analysis.filters.base import OUTPUT_STATES
 from analysis.replay.replay_results import ReplayChunk
 from analysis.report.display import BAND_STDS, DISTURBANCES
 from analysis.signals.signal_stats import SignalStats
+from shiplog.checks.channel_stats import gap_threshold_secs
 from shiplog.resampling import Clock
-from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
-from shiplog.units import CATALOGUE, conversion_factor
+from shiplog.ships.paper import PAPER_OUTPUTS
 
 from .decimation import Decimator, bucket_size, is_long
+from .panels import review_unit
 from .sensor_panels import SensorSeries
 from .series import (
     BLUE,
@@ -24,6 +25,9 @@ from .series import (
     Series,
     banded,
 )
+from .steering_panels import WIDTH, heading_series, rudder_series
+
+STEERING = "steering"  # the panel of heading and rudder
 
 
 class SeriesBuilder:
@@ -45,11 +49,15 @@ class SeriesBuilder:
             name: MeasuredSamples(longest)
             for name, longest in zip(PAPER_OUTPUTS, stats.gap_steps, strict=True)
         }
+        self._first_heading: float | None = None  # rad
+        if "heading" in clock.channels:
+            gap_secs = gap_threshold_secs(clock.channels["heading"].interval_secs)
+            self._samples["heading"] = MeasuredSamples(gap_secs / clock.dt_secs)
 
     def add(self, chunk: ReplayChunk) -> dict[str, Series]:
         """Add the next chunk; return its series over time, by entity, with every sample."""
         dense = self._outputs(chunk) | _inputs(chunk) | _disturbances(chunk)
-        dense |= self._sensors.step(chunk)
+        dense |= self._heading(chunk) | self._sensors.step(chunk)
         for entity, series in (dense | _sparse(chunk)).items():
             if entity not in self._decimators:
                 size = bucket_size(self._clock.count, len(series.lines))
@@ -68,7 +76,7 @@ class SeriesBuilder:
         for i, (name, state, colour) in enumerate(
             zip(PAPER_OUTPUTS, OUTPUT_STATES, (BLUE, ORANGE), strict=True)
         ):
-            scale = _scale(name)
+            scale = review_unit(name)[1]
             innovation = estimates.innovations[:, i] / estimates.innovation_stds[:, i]
             rows, columns = self._samples[name].step(
                 chunk.signals.first, np.column_stack((chunk.signals[name] * scale, innovation))
@@ -87,15 +95,31 @@ class SeriesBuilder:
             drawn[f"innovation_{name}/normalised"] = series
         return drawn
 
+    def _heading(self, chunk: ReplayChunk) -> dict[str, Series]:
+        """Heading from its first value, without jumps at north; nothing where none is measured."""
+        if "heading" not in chunk.signals or "heading" not in self._samples:
+            return {}
+        heading = chunk.signals["heading"]
+        known = heading[np.isfinite(heading)]
+        if self._first_heading is None:
+            self._first_heading = float(known[0]) if len(known) else None
+        if self._first_heading is None:
+            return {}
+        turned = np.degrees(heading - self._first_heading)[:, None]
+        rows, columns = self._samples["heading"].step(chunk.signals.first, turned)
+        (series,) = heading_series(rows * chunk.signals.dt_secs, columns[:, 0])
+        return {f"{STEERING}/heading/{series.name}": series}
+
 
 def _inputs(chunk: ReplayChunk) -> dict[str, Series]:
     """Rudder and revolutions."""
-    drawn = {}
-    for name in PAPER_INPUTS:
-        line = Line(name, chunk.signals[name] * _scale(name), GREEN, 1.5)
-        series = Series("measured", chunk.signals.time_secs, (line,), spiky=True)
-        drawn[f"{name}/measured"] = series
-    return drawn
+    at = chunk.signals.time_secs
+    rudder = rudder_series(at, np.degrees(chunk.signals["rudder"]))
+    line = Line("rpm", chunk.signals["rpm"], GREEN, WIDTH)
+    return {
+        f"{STEERING}/rudder/{rudder.name}": rudder,
+        "rpm/measured": Series("measured", at, (line,), spiky=True),
+    }
 
 
 def _disturbances(chunk: ReplayChunk) -> dict[str, Series]:
@@ -126,7 +150,7 @@ def _disturbances(chunk: ReplayChunk) -> dict[str, Series]:
 
 
 def _sparse(chunk: ReplayChunk) -> dict[str, Series]:
-    """Coefficients with their standard deviations in SI, the track in m, the heading in rad."""
+    """Coefficients with their standard deviations in SI, and the track in m."""
     drawn = {}
     for history in (chunk.yaw_history, chunk.surge_history):
         for i, name in enumerate(history.names):
@@ -141,8 +165,3 @@ def _sparse(chunk: ReplayChunk) -> dict[str, Series]:
         line = Line("heading", heading[known], GREY)
         drawn["heading"] = Series("heading", chunk.signals.time_secs[known], (line,))
     return drawn
-
-
-def _scale(name: str) -> float:
-    """Return the factor from a channel's SI unit to the one in which it is shown."""
-    return conversion_factor(CATALOGUE[name].unit, CATALOGUE[name].display_unit)

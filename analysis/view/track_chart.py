@@ -12,13 +12,31 @@ import numpy as np
 from analysis.replay.replay_results import Findings
 from shiplog.types import FloatArray
 
-from .series import Series
+from .series import Colour, Series
 
 MAX_OUTLINES = 10  # along the track
 MIN_OUTLINE_SHARE = 1 / 20  # of the chart's width: the least length of an outline
 HULL = np.array(  # forward and starboard, in ship lengths: bow, shoulders, stern
     [[0.5, 0.0], [0.25, 0.09], [-0.5, 0.09], [-0.5, -0.09], [0.25, -0.09], [0.5, 0.0]]
 )
+
+
+@dataclass(frozen=True, eq=False)
+class ChartPart:
+    """A part of a track in a colour of its own, (k, 2) points."""
+
+    label: str
+    colour: Colour
+    points: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ChartMark:
+    """A place on a track to be marked, (2,) point."""
+
+    label: str
+    colour: Colour
+    point: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +59,10 @@ class TrackChart:
         The corners of the chart with the least and the greatest x and y, (2,) each.
     simulated
         (m, 2) the track of a simulated ship; None without one.
+    parts
+        Parts in colours of their own, such as manoeuvres.
+    marks
+        Places with labels.
     """
 
     title: str
@@ -51,6 +73,8 @@ class TrackChart:
     scale_label: str
     bounds: tuple[FloatArray, FloatArray]
     simulated: FloatArray | None = None
+    parts: tuple[ChartPart, ...] = ()
+    marks: tuple[ChartMark, ...] = ()
 
 
 def draw_track(findings: Findings, drawn: Mapping[str, Series]) -> TrackChart | None:

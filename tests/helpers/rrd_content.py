@@ -18,6 +18,16 @@ def static_components(path: Path, component: str) -> dict[str, list[Any]]:
 
 def view_titles(path: Path) -> list[str]:
     """Return the titles of the views of the blueprint in the file."""
-    reader, name = RrdReader(path), "ViewBlueprint:display_name"
+    return _blueprint_names(path, "ViewBlueprint:display_name")
+
+
+def tab_names(path: Path) -> list[str]:
+    """Return the names of the containers of the blueprint in the file."""
+    return _blueprint_names(path, "ContainerBlueprint:display_name")
+
+
+def _blueprint_names(path: Path, component: str) -> list[str]:
+    reader = RrdReader(path)
     batches = (c.to_record_batch() for c in reader.stream(store=reader.blueprints()[0]))
-    return [row[0] for b in batches if name in b.schema.names for row in b[name].to_pylist()]
+    found = (b[component].to_pylist() for b in batches if component in b.schema.names)
+    return [row[0] for rows in found for row in rows]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from places import SAMPLE_DATA
 from rerun.chunk import RrdReader
+from rrd_content import tab_names, view_titles
 from stderr_lines import foreign_lines
 
 import shiplog
@@ -22,7 +23,12 @@ from analysis.replay.replay_results import Analysis, ReplayChunk
 from analysis.replay.track import EMPTY_TRACK
 from analysis.view.decimation import Decimator
 from analysis.view.panels import limits
-from analysis.view.replay_panels import Drawn, equation_panels, history_panels
+from analysis.view.replay_panels import (
+    Drawn,
+    equation_panels,
+    history_panels,
+    trial_panels,
+)
 from analysis.view.replay_review import write_replay_review
 from analysis.view.series import Line, MeasuredSamples, Series
 from analysis.view.series_builder import SeriesBuilder
@@ -125,6 +131,13 @@ def static(path: Path, entity: str, component: str) -> list[Any]:
     pytest.fail(f"no {component} in {entity}")
 
 
+def events_of(path: Path) -> Any:  # noqa: ANN401 - a record batch of pyarrow
+    """The events of a review, as one batch."""
+    chunks = (chunk for chunk in RrdReader(path).stream() if chunk.entity_path == "/events")
+    (batch,) = (chunk.to_record_batch() for chunk in chunks)
+    return batch
+
+
 def layout(path: Path, component: str) -> list[Any]:
     """The values of one component of the blueprint, in no order."""
     reader = RrdReader(path)
@@ -132,8 +145,8 @@ def layout(path: Path, component: str) -> list[Any]:
     return [row[0] for b in batches if component in b.schema.names for row in b[component].tolist()]
 
 
-def test_outputs_are_drawn_in_degrees_and_knots(review: Path, analysis: Analysis) -> None:
-    for name, state, scale in (("yaw_rate", 0, 180 / pi), ("speed", 3, 3600 / 1852)):
+def test_outputs_are_drawn_in_degrees_a_minute_and_knots(review: Path, analysis: Analysis) -> None:
+    for name, state, scale in (("yaw_rate", 0, 180 / pi * 60), ("speed", 3, 3600 / 1852)):
         at, _, measured = columns(review, f"{name}/measured")
         np.testing.assert_allclose(at, analysis.signals.time_secs, atol=1e-9)
         np.testing.assert_allclose(measured[:, 0], analysis.signals[name] * scale, rtol=1e-12)
@@ -144,10 +157,8 @@ def test_outputs_are_drawn_in_degrees_and_knots(review: Path, analysis: Analysis
 
 
 def test_inputs_disturbances_and_residuals(review: Path, analysis: Analysis) -> None:
-    _, _, rudder = columns(review, "rudder/measured")
+    _, _, rudder = columns(review, "steering/rudder/measured")
     np.testing.assert_allclose(rudder[:, 0], np.degrees(analysis.signals["rudder"]), rtol=1e-12)
-    _, _, rpm = columns(review, "rpm/measured")
-    np.testing.assert_array_equal(rpm[:, 0], analysis.signals["rpm"])
     found = analysis.disturbance
     _, _, yaw = columns(review, "disturbance_yaw/estimate")
     np.testing.assert_allclose(yaw[:, 0], np.degrees(found.yaw) * 1e6, rtol=1e-12)
@@ -193,24 +204,59 @@ def test_measured_is_drawn_under_the_estimate(review: Path) -> None:
     assert len(static(review, "yaw_rate/state", "SeriesLines:widths")) == 3
 
 
-def test_the_blueprint_holds_every_view(review: Path) -> None:
-    names = layout(review, "ViewBlueprint:display_name")
+def test_the_heading_is_drawn_from_its_first_value_with_the_rudder_over_it(
+    review: Path, analysis: Analysis
+) -> None:
+    _, _, heading = columns(review, "steering/heading/measured")
+    measured = analysis.signals["heading"]
+    known = measured[np.isfinite(measured)]
+    np.testing.assert_allclose(heading[:, 0], np.degrees(known - known[0]), atol=1e-9)
+    steering = next(t for t in view_titles(review) if t.startswith("heading from "))
+    assert "; rudder: -20 to 20 [deg]" in steering
+
+
+def test_the_blueprint_has_a_tab_for_each_kind_of_result_and_one_for_the_manoeuvre(
+    review: Path,
+) -> None:
+    assert {name for name in tab_names(review) if name} == {
+        "trial", "1 zig-zag 20°/20°", "filter", "coefficients",
+    }  # fmt: skip
+    titles = view_titles(review)
     for expected in (
-        "yaw rate [deg/s]", "speed [kn]", "rudder [deg]", "rpm", "yaw disturbance [10⁻⁶ deg/s³]",
-        "surge disturbance [mm/s²]", "yaw rate innovation / expected σ",
-        "speed innovation / expected σ", "track, north up: recorded positions", "summary",
+        "yaw disturbance [10⁻⁶ deg/s³]", "surge disturbance [mm/s²]",
+        "yaw rate innovation / expected σ", "speed innovation / expected σ",
+        "track, north up: recorded positions", "track from the execute, approach heading up",
+        "summary", "events",
     ):  # fmt: skip
-        assert expected in names
-    coefficients = sorted(name.split()[0] for name in names if "±" in name)
+        assert titles.count(expected) == 1
+    for beginning in ("heading from ", "yaw rate [deg/min]: ", "speed [kn]: "):
+        assert sum(title.startswith(beginning) for title in titles) == 2  # trial and manoeuvre
+    coefficients = sorted(name.split()[0] for name in titles if "±" in name)
     assert coefficients == ["a", "b1", "b2", "b3", "d", "e", "f", "g", "h"]
-    assert len(names) == 10 + 9
+    assert len(titles) == 2 * 3 + 8 + 9
     assert layout(review, "TimePanelBlueprint:timeline") == ["time"]
 
 
+def test_constant_revolutions_are_in_a_title_and_others_have_a_panel(analysis: Analysis) -> None:
+    drawn = drawn_of(analysis)
+    *_, speed = trial_panels(drawn)
+    assert speed.title.endswith("; at 80 rpm")
+    (line,) = drawn["rpm/measured"].lines
+    lower = replace(line, values=line.values * np.linspace(1.0, 0.5, len(line.values)))
+    changed = {**drawn, "rpm/measured": replace(drawn["rpm/measured"], lines=(lower,))}
+    assert trial_panels(changed)[-1].title == "rpm: 40 to 80"
+
+
+def test_a_manoeuvre_is_an_event_and_a_part_of_the_track(review: Path) -> None:
+    first = events_of(review)["TextLog:text"].to_pylist()[0][0]
+    assert first == "0:00:10 manoeuvre 1: zig-zag 20°/20°, first to starboard, execute"
+    assert static(review, "track/manoeuvres", "LineStrips2D:labels") == ["1"]
+    labels = static(review, "manoeuvre_1/track/marks", "Points2D:labels")
+    assert labels[:3] == ["execute", "execute 2", "overshoot 1"]
+
+
 def test_the_text_is_on_the_page(review: Path) -> None:
-    (page,) = static(review, "summary", "TextDocument:text")
-    assert page.startswith("# What was found")
-    assert "## Legend" in page
+    assert static(review, "summary", "TextDocument:text") == ["# What was found"]
     assert static(review, "summary", "TextDocument:media_type") == ["text/markdown"]
 
 
@@ -328,11 +374,13 @@ def test_a_long_trial_is_decimated_unless_in_full(
         path = tmp_path / f"{full}.rrd"
         write_replay_review(analysis, path, text="", full=full)
         at, _, drawn = columns(path, "yaw_rate/state")
-        value = np.degrees(analysis.estimates.states[:, 0])
+        value = np.degrees(analysis.estimates.states[:, 0]) * 60
         assert (len(at) == len(value)) == full
         assert len(at) > 100
         assert (drawn[:, 2].min(), drawn[:, 2].max()) == pytest.approx((value.min(), value.max()))
         assert static(path, "yaw_rate/state", "SeriesLines:names") == ["±2σ", "±2σ", "estimate"]
+        at, _, _ = columns(path, "steering/rudder/measured")
+        assert (len(at) == len(value)) == full
 
 
 def test_a_review_drawn_in_chunks_is_the_same(analysis: Analysis) -> None:
@@ -396,10 +444,9 @@ def test_a_coefficient_that_no_window_determines_is_not_drawn(
     some = replace(analysis, yaw_history=replace(history, values=values), surge_history=empty)
     names = [panel.name for panel in history_panels(some.findings, drawn_of(some))]
     assert names == [f"coefficient_{name}" for name in ("a", "b2", "b3", "d", "e")]
-    write_replay_review(some, tmp_path / "some.rrd", text="")
     none = replace(some, yaw_history=replace(history, values=np.full_like(values, np.nan)))
     write_replay_review(none, tmp_path / "none.rrd", text="")
-    assert len(layout(tmp_path / "none.rrd", "ViewBlueprint:display_name")) == 10
+    assert "coefficients" not in tab_names(tmp_path / "none.rrd")
 
 
 def test_the_chart_has_east_right_and_north_up(review: Path, analysis: Analysis) -> None:
@@ -461,21 +508,18 @@ def test_a_change_of_a_coefficient_is_a_warning_at_its_instant(tmp_path: Path) -
     found = analyse(replace(log, events=(execute,)))
     path = tmp_path / "changed.rrd"
     write_replay_review(found, path, text="")
-    (batch,) = (
-        chunk.to_record_batch()
-        for chunk in RrdReader(path).stream()
-        if chunk.entity_path == "/events"
-    )
-    assert [row[0] for row in batch["TextLog:level"].to_pylist()] == ["INFO", "WARN"]
-    text = batch["TextLog:text"].to_pylist()[1][0]
-    assert text.startswith("replay: d changed by -19.9 %")
-    at = batch["time"].to_numpy(zero_copy_only=False).astype(np.int64)[1] * 1e-9
+    batch = events_of(path)
+    levels = [row[0] for row in batch["TextLog:level"].to_pylist()]
+    (warning,) = (number for number, level in enumerate(levels) if level == "WARN")
+    text = batch["TextLog:text"].to_pylist()[warning][0]
+    assert " replay: d changed by -19.9 %" in text
+    at = batch["time"].to_numpy(zero_copy_only=False).astype(np.int64)[warning] * 1e-9
     assert abs(at - 600) < 100
-    assert "events" in layout(path, "ViewBlueprint:display_name")
+    assert "events" in view_titles(path)
 
 
 def test_events_are_texts_with_their_levels_on_both_timelines(
-    analysis: Analysis, review: Path, tmp_path: Path
+    analysis: Analysis, tmp_path: Path
 ) -> None:
     start_ns = analysis.signals.start_ns
     events = (
@@ -485,15 +529,12 @@ def test_events_are_texts_with_their_levels_on_both_timelines(
     path = tmp_path / "events.rrd"
     findings = replace(analysis.findings, events=events)
     write_replay_review(replace(analysis, findings=findings), path, text="")
-    (batch,) = (
-        chunk.to_record_batch()
-        for chunk in RrdReader(path).stream()
-        if chunk.entity_path == "/events"
-    )
+    batch = events_of(path)
     texts = [row[0] for row in batch["TextLog:text"].to_pylist()]
-    assert texts == ["operator: execute, 20 starboard", "gps: no data"]
-    assert [row[0] for row in batch["TextLog:level"].to_pylist()] == ["INFO", "WARN"]
+    first = texts.index("0:01:00 operator: execute, 20 starboard")
+    assert texts[first + 1] == "0:01:01 gps: no data"
+    levels = [row[0] for row in batch["TextLog:level"].to_pylist()]
+    assert levels[first : first + 2] == ["INFO", "WARN"]
     since = batch["time"].to_numpy(zero_copy_only=False).astype(np.int64)
-    assert since.tolist() == [60 * 10**9, 61 * 10**9]
-    assert "events" in layout(path, "ViewBlueprint:display_name")
-    assert "events" not in layout(review, "ViewBlueprint:display_name")
+    assert since[first : first + 2].tolist() == [60 * 10**9, 61 * 10**9]
+    assert (np.diff(since) >= 0).all()

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
+from rrd_content import tab_names
 from windy_trials import windy_analysis
 
 from analysis.replay.replay_results import Analysis
@@ -80,7 +81,7 @@ def test_smoothed_disturbances_have_bands(
 ) -> None:
     yaw, surge = equation_panels(sensor_analysis.findings, drawn)
     for axis, (column, scale) in enumerate(((yaw, degrees(1) * 1e6), (surge, 1e3))):
-        panel = column[2]
+        panel = column[0]
         (series,) = panel.series  # no line of the observer's noise
         high, low, _ = (line.values for line in series.lines)
         stds = sensor_analysis.disturbance.stds
@@ -102,8 +103,8 @@ def test_the_wind_has_its_coefficients_and_its_moment_drawn() -> None:
     assert histories[2].title.endswith(" [mm/s²]")
     yaw, surge = equation_panels(result.findings, drawn)
     for panel, values in (
-        (yaw[2], result.disturbance.yaw_wind),
-        (surge[2], result.disturbance.surge_wind),
+        (yaw[0], result.disturbance.yaw_wind),
+        (surge[0], result.disturbance.surge_wind),
     ):
         wind = panel.series[-1]
         assert wind.name == "wind"
@@ -123,12 +124,8 @@ def test_a_replay_without_further_states_has_no_sensors(zigzag_analysis: Analysi
 def test_the_review_has_a_tab_of_the_sensors(sensor_analysis: Analysis, tmp_path: Path) -> None:
     path = tmp_path / "review.rrd"
     write_replay_review(sensor_analysis, path, text="")
-    reader = RrdReader(path)
-    batches = [c.to_record_batch() for c in reader.stream(store=reader.blueprints()[0])]
-    column = "ContainerBlueprint:display_name"
-    names = [row[0] for b in batches if column in b.schema.names for row in b[column].to_pylist()]
-    assert {"replay", "sensors"} <= set(names)
-    entities = {chunk.entity_path for chunk in reader.stream()}
+    assert {"trial", "sensors"} <= set(tab_names(path))
+    entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
     assert {"/sensor_gyro/state", "/sensor_heading/measured", "/innovation_north/normalised"} <= (
         entities
     )

@@ -1,0 +1,126 @@
+"""The tabs of a replay's review in Rerun: trial, manoeuvres, filter, coefficients, and others."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import rerun.blueprint as rrb
+
+from shiplog.printable import printable
+
+from .manoeuvre_sheets import ManoeuvreSheet
+from .panels import Panel
+from .rerun_io import axis_between, chart_view, events_view, make_blueprint, plot_view
+from .track_chart import TrackChart
+
+SUMMARY, TRACK = "summary", "track"  # entities
+FIRST_SHARE = 1.3  # of the height of other panels: that of the first one
+COLUMN_SHARES = [3, 2]  # widths: panels over time, and track
+MAX_TABS = 5  # of manoeuvres among the other tabs; more are in a tab of their own
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayPage:
+    """What the review of a replay shows.
+
+    Attributes
+    ----------
+    motion
+        Panels of the whole trial: heading with rudder, yaw rate, speed.
+    chart
+        The track; None where no position is known.
+    has_events
+        Whether there is any event.
+    manoeuvres
+        The sheet of each manoeuvre.
+    equations
+        Disturbances and innovations of yaw, and those of surge.
+    coefficients
+        The history of each coefficient.
+    sensors
+        Histories of sensor errors, and innovations of heading and position.
+    further
+        Panels of channels that the replay does not use.
+    duration_secs
+        Of the trial.
+    """
+
+    motion: list[Panel]
+    chart: TrackChart | None
+    has_events: bool
+    manoeuvres: list[ManoeuvreSheet]
+    equations: tuple[list[Panel], list[Panel]]
+    coefficients: list[Panel]
+    sensors: tuple[list[Panel], list[Panel]]
+    further: list[Panel]
+    duration_secs: float
+
+    def panels(self) -> Iterator[Panel]:
+        """Yield every panel."""
+        yield from self.motion
+        for sheet in self.manoeuvres:
+            yield from sheet.panels
+        for columns in (self.equations, self.sensors):
+            for column in columns:
+                yield from column
+        yield from self.coefficients
+        yield from self.further
+
+
+def replay_blueprint(page: ReplayPage) -> rrb.Blueprint:
+    """Return the blueprint of a page; what has no content has no tab."""
+    axis = axis_between(0.0, page.duration_secs)
+
+    def column(panels: list[Panel]) -> rrb.Vertical:
+        return rrb.Vertical(*(plot_view(panel, axis) for panel in panels))
+
+    tabs: list[rrb.View | rrb.Container] = [_trial_tab(page, axis)]
+    manoeuvres = [manoeuvre_tab(sheet) for sheet in page.manoeuvres]
+    if len(manoeuvres) > MAX_TABS:
+        manoeuvres = [rrb.Tabs(*manoeuvres, name="manoeuvres", active_tab=0)]
+    tabs += manoeuvres
+    tabs.append(rrb.Horizontal(*map(column, page.equations), name="filter"))
+    if page.coefficients:
+        views = (plot_view(panel, axis) for panel in page.coefficients)
+        tabs.append(rrb.Grid(*views, grid_columns=3, name="coefficients"))
+    if any(page.sensors):
+        columns = (column(panels) for panels in page.sensors if panels)
+        tabs.append(rrb.Horizontal(*columns, name="sensors"))
+    if page.further:
+        count = 1 + (len(page.further) > 3) + (len(page.further) > 8)
+        views = (plot_view(panel, axis) for panel in page.further)
+        tabs.append(rrb.Grid(*views, grid_columns=count, name="further channels"))
+    return make_blueprint(rrb.Tabs(*tabs, active_tab=0))
+
+
+def _trial_tab(page: ReplayPage, axis: rrb.TimeAxis) -> rrb.Container:
+    """Return the panels of the trial beside the track, with summary and events below it."""
+    side: list[rrb.View | rrb.Container] = []
+    if page.chart is not None:
+        side.append(chart_view(TRACK, page.chart))
+    texts: list[rrb.View] = [rrb.TextDocumentView(origin=SUMMARY, name="summary")]
+    if page.has_events:
+        texts.append(events_view())
+    side.append(rrb.Tabs(*texts, active_tab=len(texts) - 1) if len(texts) > 1 else texts[0])
+    right = rrb.Vertical(*side, row_shares=[3, 2] if len(side) > 1 else [1])
+    left = _panel_column(page.motion, axis)
+    return rrb.Horizontal(left, right, column_shares=COLUMN_SHARES, name="trial")
+
+
+def manoeuvre_tab(sheet: ManoeuvreSheet) -> rrb.Container:
+    """Return the panels of a manoeuvre beside its track."""
+    left = _panel_column(sheet.panels, axis_between(sheet.start_secs, sheet.end_secs))
+    name = printable(sheet.name)
+    if sheet.chart is None:
+        return rrb.Vertical(*left.contents, row_shares=left.row_shares, name=name)
+    chart = chart_view(track_origin(sheet), sheet.chart)
+    return rrb.Horizontal(left, chart, column_shares=COLUMN_SHARES, name=name)
+
+
+def track_origin(sheet: ManoeuvreSheet) -> str:
+    """Return the entity of a manoeuvre's track."""
+    return f"{sheet.origin}/{TRACK}"
+
+
+def _panel_column(panels: "list[Panel] | tuple[Panel, ...]", axis: rrb.TimeAxis) -> rrb.Vertical:
+    shares = [FIRST_SHARE, *[1] * (len(panels) - 1)]
+    return rrb.Vertical(*(plot_view(panel, axis) for panel in panels), row_shares=shares)
