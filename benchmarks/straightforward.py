@@ -299,7 +299,7 @@ def log_all(result: StraightforwardReplay, out: Path) -> None:
         recording.set_time("time", duration=t)
         recording.set_time("stamp", timestamp=signals.start_ns * 1e-9 + t)
         for name, i, scale, thousandths in (
-            ("yaw_rate", 0, DEGREES, 1e3 * DEGREES),
+            ("yaw_rate", 0, 60 * DEGREES, 1e3 * DEGREES),  # deg/min
             ("speed", 3, KNOTS, 1e3),
         ):
             output = 0 if i == 0 else 1
@@ -312,7 +312,7 @@ def log_all(result: StraightforwardReplay, out: Path) -> None:
             disturbance = result.disturbance[k, output] * thousandths
             recording.log(f"disturbance_{kind}/estimate", rr.Scalars(disturbance))
             recording.log(f"innovation_{name}/normalised", rr.Scalars(normalised))
-        recording.log("rudder/measured", rr.Scalars(signals["rudder"][k] * DEGREES))
+        recording.log("steering/rudder/measured", rr.Scalars(signals["rudder"][k] * DEGREES))
         recording.log("rpm/measured", rr.Scalars(signals["rpm"][k]))
         recording.log("track/now", rr.Points2D([[east[k], -north[k]]]))
         window, within = divmod(k - WINDOW + 1, STRIDE)

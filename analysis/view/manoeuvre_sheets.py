@@ -135,14 +135,16 @@ def manoeuvre_sheet(
     """
     start = max(span.start_secs, span.execute_secs - APPROACH_SECS)
     part = history.part(start, span.end_secs)
-    up = span.approach_heading if np.isfinite(span.approach_heading) else 0.0
+    up = span.approach_heading if np.isfinite(span.approach_heading) else None
     first, *others = motion_panels(origin, part, up)
     panels = (with_executes(first, [span]), *others)
     chart = _chart(span, part, tracks, length)
     return ManoeuvreSheet(short_title(span), origin, panels, chart, start, span.end_secs)
 
 
-def motion_panels(origin: str, history: MotionHistory, reference: float = 0.0) -> list[Panel]:
+def motion_panels(
+    origin: str, history: MotionHistory, reference: float | None = None
+) -> list[Panel]:
     """Return the panels of heading with rudder, yaw rate and speed, as far as they are known.
 
     Parameters
@@ -152,19 +154,19 @@ def motion_panels(origin: str, history: MotionHistory, reference: float = 0.0) -
     history
         The motion.
     reference
-        The heading from which headings are drawn, rad; 0 is north.
+        The heading from which headings are drawn, rad; None draws them from north.
     """
     at = history.time_secs
     headings: list[Series] = []
     if np.isfinite(history.measured["heading"]).any():
         degrees = [
-            np.degrees(values["heading"] - reference)
+            np.degrees(values["heading"] - (reference or 0.0))
             for values in (history.measured, history.computed)
             if "heading" in values
         ]
         headings = [_drawn(each) for each in heading_series(at, *degrees)]
     rudder = _drawn(rudder_series(at, np.degrees(history.rudder)))
-    counted = f"{round(np.degrees(reference), 1) % 360:.1f}°" if reference else ""
+    counted = "" if reference is None else f"{round(np.degrees(reference), 1) % 360:.1f}°"
     panels = steering_panels(f"{origin}/steering", rudder, headings, counted)
     outputs = [_output_panel(origin, history, name) for name in ("yaw_rate", "speed")]
     known = [panel for panel in outputs if panel is not None]
