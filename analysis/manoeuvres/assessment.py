@@ -9,7 +9,14 @@ import numpy as np
 from .found_manoeuvre import FoundManoeuvre
 from .imo_criteria import criterion_of, probability_below
 from .index_names import SYMBOLS, index_unit, missing_reason, unreached_reason
-from .index_uncertainty import COVERAGE_FACTOR, IndexInputs, index_stds, index_values
+from .index_uncertainty import (
+    COVERAGE_FACTOR,
+    IndexInputs,
+    index_stds,
+    index_values,
+    noise_draws,
+    without_noise_bias,
+)
 from .manoeuvre_figures import manoeuvre_marks, manoeuvre_series
 from .manoeuvre_part import ManoeuvrePart
 from .manoeuvre_values import IndexCase, mean_before
@@ -121,14 +128,17 @@ def _indices(
     values = index_values(case)
     others = {name: index_values(inputs.case(execute=at)) for name, at in part.others.items()}
     finite = {name: value for name, value in values.items() if np.isfinite(value)}
-    stds = index_stds(inputs, finite)
+    draws = noise_draws(inputs)
+    stds = index_stds(inputs, finite, draws)
+    corrected = without_noise_bias(finite, draws)
     astern = bool(np.min(case.signals.rpm[case.first :], initial=0.0) < 0)
     indices, unreached = [], []
-    for name, value in values.items():
+    for name in values:
         reason = missing_reason(name, missing)
         if reason or name not in finite:
             unreached.append(NotComputed(name, reason or unreached_reason(name, case)))
             continue
+        value = corrected[name]
         std = float(np.sqrt(sum(each**2 for each in stds[name].values())))
         criterion = criterion_of(
             name, part.found.kind, (part.rudder, part.switch), settings.ship, astern=astern

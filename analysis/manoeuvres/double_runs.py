@@ -14,7 +14,7 @@ from .sailed_manoeuvre import ManoeuvreKind, SailedManoeuvre
 from .straight_runs import is_double_run
 from .trial_index import TrialIndex
 from .trial_signals import TrialSignals
-from .water_velocity import POSITION_DRIFT
+from .turn_current import POSITION_DRIFT
 
 DOUBLE_RUN_SPEED, DOUBLE_RUN_POWER = "speed of the double run", "power of the double run"
 

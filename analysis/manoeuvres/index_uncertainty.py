@@ -5,7 +5,7 @@ parametric bootstrap), and with each systematic error changed by its standard de
 propagation of JCGM 100:2008, "Guide to the expression of uncertainty in measurement", 5.1.2).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,12 +13,14 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
+from .execute import APPROACH_SECS, smooth_heading
 from .found_manoeuvre import FoundManoeuvre
 from .manoeuvre_values import VALUES, IndexCase, index_case, smoothed
 from .start_rules import Execute
 from .trial_signals import TrialSignals
 from .water_velocity import VelocityErrors, corrected_signals
 
+MIN_DRAWN_SHARE = 0.5  # of the draws that reach an index: fewer give no bias of it
 DRAWS = 40  # of the noise and the sampling instants
 SEED = 1
 COVERAGE_FACTOR = 1.959963984540054  # of 95 %, normal distribution
@@ -27,8 +29,10 @@ NOISE, VELOCITY, START, APPROACH, COMPASS, GYRO = (
     "slow error of the compass", "gyro bias",
 )  # fmt: skip
 GYRO_BIAS_STD = np.radians(0.005)  # rad/s, of a heading that is the integral of the yaw rate
-HELM_CORRELATION_SECS = 25.0  # of the heading under helm
-WANDER_SECS = 30.0
+WANDER_SECS = 60.0  # before the execute, over which the wander of the heading is taken
+WANDER_SMOOTHING_SECS = 5.0  # half width: helm moves a heading more slowly
+WANDER_SHARE = 0.5  # of its variance, that a mean over 30 s of periods of a minute keeps
+SMOOTHING_GAIN = 9 / 4  # of n samples' noise variance over that of their parabola, times n
 SAMPLED = ("heading", "yaw_rate", "speed", "sway", "positions")
 
 
@@ -83,12 +87,36 @@ class IndexInputs:
         return index_case(corrected, self.found, at, self.half_secs, self.switch)
 
 
+@dataclass(frozen=True)
+class NoiseDraws:
+    """Indices of a manoeuvre's smoothed signals, and of those with noise and sampling once more.
+
+    Attributes
+    ----------
+    smooth
+        By name, of the smoothed signals.
+    drawn
+        The same for each draw; NaN for what it does not reach.
+    """
+
+    smooth: Mapping[str, float]
+    drawn: Sequence[Mapping[str, float]]
+
+    def of(self, name: str) -> FloatArray:
+        """Return the finite values of an index, (k,)."""
+        values = np.array([each[name] for each in self.drawn])
+        finite: FloatArray = values[np.isfinite(values)]
+        return finite
+
+
 def index_values(case: IndexCase) -> dict[str, float]:
     """Compute the indices of a case, whatever manoeuvre it is."""
     return VALUES[case.found.kind](case)
 
 
-def index_stds(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
+def index_stds(
+    inputs: IndexInputs, values: Mapping[str, float], draws: NoiseDraws
+) -> dict[str, dict[str, float]]:
     """Estimate the standard uncertainty of each index by source.
 
     Parameters
@@ -97,6 +125,8 @@ def index_stds(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, di
         Signals, execute and systematic errors.
     values
         The indices of `inputs.case()`.
+    draws
+        As of `noise_draws`.
 
     Returns
     -------
@@ -104,7 +134,7 @@ def index_stds(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, di
         By the name of the index: standard deviations, in its unit, by the name of the source.
     """
     changes: dict[str, list[dict[str, float]]] = {
-        NOISE: [_deviation(values, _draws(inputs))],
+        NOISE: [_deviation(values, draws)],
         START: [_start_change(inputs, values)],
         APPROACH: [_heading_change(inputs, values, approach_std(inputs))],
         VELOCITY: _velocity_changes(inputs, values),
@@ -113,7 +143,7 @@ def index_stds(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, di
         changes[GYRO] = [_gyro_change(inputs, values)]
     else:
         std = float(np.hypot(inputs.compass_change_std, inputs.signals.heading_step / np.sqrt(6.0)))
-        changes[COMPASS] = [_heading_change(inputs, values, std)]
+        changes[COMPASS] = [_deflection_change(inputs, values, std)]
     return {
         name: {
             source: float(np.sqrt(sum(change.get(name, 0.0) ** 2 for change in each)))
@@ -148,22 +178,42 @@ def _start_change(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str,
 def _heading_change(
     inputs: IndexInputs, values: Mapping[str, float], std: float
 ) -> dict[str, float]:
-    """Return the changes of the indices where all changes of heading have an error, rad."""
+    """Return the changes of the indices where the approach heading has an error, rad."""
     base = inputs.case()
     return _difference(values, lambda sign: replace(base, approach=base.approach + sign * std))
 
 
+def _deflection_change(
+    inputs: IndexInputs, values: Mapping[str, float], std: float
+) -> dict[str, float]:
+    """Return the changes of the indices where the compass errs after the execute, rad.
+
+    The approach heading and with it the axes of the track stay: only the instants change at which
+    a heading is reached.
+    """
+    base = inputs.case()
+    after = np.arange(len(base.signals)) > base.first
+
+    def deflected(sign: float) -> IndexCase:
+        heading = base.signals.heading + sign * std * after
+        return replace(base, signals=replace(base.signals, heading=heading))
+
+    return _difference(values, deflected)
+
+
 def approach_std(inputs: IndexInputs) -> float:
     """Estimate the standard uncertainty of the approach heading, rad, from its wander."""
-    dt, execute = inputs.signals.dt_secs, round(inputs.execute.sample)
-    window = inputs.signals.heading[max(0, execute - round(WANDER_SECS / dt)) : execute + 1]
-    if len(window) < 3:
-        return float(inputs.signals.noise.get("heading", 0.0))
-    secs, noise = len(window) * dt, inputs.signals.noise.get("heading", 0.0)
-    samples = max(1.0, secs / inputs.signals.interval("heading"))
-    wander = max(0.0, float(np.var(window)) - noise**2)
-    correlated = wander * min(1.0, HELM_CORRELATION_SECS / secs)
-    return float(np.sqrt(correlated + noise**2 / samples))
+    signals, dt, noise = inputs.signals, inputs.signals.dt_secs, inputs.signals.noise
+    execute, heading_noise = round(inputs.execute.sample), noise.get("heading", 0.0)
+    window = signals.heading[max(0, execute - round(WANDER_SECS / dt)) : execute + 1]
+    half = min(round(WANDER_SMOOTHING_SECS / dt), (len(window) - 1) // 2)
+    if half < 2:
+        return float(heading_noise)
+    per_sample = dt / signals.interval("heading")
+    smooth_noise = heading_noise**2 * SMOOTHING_GAIN / max(1.0, (2 * half + 1) * per_sample)
+    wander = max(0.0, float(np.var(smooth_heading(window, half))) - smooth_noise)
+    samples = max(1.0, min(len(window) * dt, APPROACH_SECS) / signals.interval("heading"))
+    return float(np.sqrt(WANDER_SHARE * wander + heading_noise**2 / samples))
 
 
 def _velocity_changes(inputs: IndexInputs, values: Mapping[str, float]) -> list[dict[str, float]]:
@@ -188,11 +238,12 @@ def _gyro_change(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, 
     return _difference(values, drifted)
 
 
-def _draws(inputs: IndexInputs) -> list[dict[str, float]]:
-    """Return the indices of signals with other noise and other sampling instants."""
+def noise_draws(inputs: IndexInputs) -> NoiseDraws:
+    """Compute the indices of signals with other noise and other sampling instants."""
     rng = np.random.default_rng(SEED)
     base = smoothed(inputs.signals, inputs.half_secs)
-    return [index_values(inputs.case(signals=_sampled_anew(base, rng))) for _ in range(DRAWS)]
+    drawn = [index_values(inputs.case(signals=_sampled_anew(base, rng))) for _ in range(DRAWS)]
+    return NoiseDraws(index_values(inputs.case(signals=base)), drawn)
 
 
 def _sampled_anew(signals: TrialSignals, rng: np.random.Generator) -> TrialSignals:
@@ -220,11 +271,31 @@ def _sampled_anew(signals: TrialSignals, rng: np.random.Generator) -> TrialSigna
     return replace(signals, **changed)
 
 
-def _deviation(values: Mapping[str, float], draws: list[dict[str, float]]) -> dict[str, float]:
+def without_noise_bias(values: Mapping[str, float], draws: NoiseDraws) -> dict[str, float]:
+    """Return the indices less the bias that noise and sampling give them.
+
+    The largest of noisy headings is too large, the sum of noisy steps too long: the mean of the
+    draws exceeds the index of the signals from which they are drawn by as much (Efron and
+    Tibshirani, "An introduction to the bootstrap", 1993, chapter 10).
+
+    Parameters
+    ----------
+    values
+        The indices, finite.
+    draws
+        As of `noise_draws`.
+    """
+    corrected = dict(values)
+    for name, value in values.items():
+        drawn = draws.of(name)
+        if len(drawn) > MIN_DRAWN_SHARE * DRAWS and np.isfinite(draws.smooth[name]):
+            corrected[name] = value - (float(np.mean(drawn)) - draws.smooth[name])
+    return corrected
+
+
+def _deviation(values: Mapping[str, float], draws: NoiseDraws) -> dict[str, float]:
     """Return the standard deviation of each index over the draws."""
-    found = {}
-    for name in values:
-        drawn = np.array([each[name] for each in draws])
-        drawn = drawn[np.isfinite(drawn)]
-        found[name] = float(np.std(drawn, ddof=1)) if len(drawn) > 2 else 0.0
-    return found
+    drawn = {name: draws.of(name) for name in values}
+    return {
+        name: float(np.std(each, ddof=1)) if len(each) > 2 else 0.0 for name, each in drawn.items()
+    }

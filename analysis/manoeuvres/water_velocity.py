@@ -1,15 +1,13 @@
 """Current, and the systematic errors of log and compass, from straight runs and full turns.
 
-On a straight run the velocity over the ground is R(ψ)·(u, v) + c; a turn after its first 180°
-repeats its motion through the water every 360°, so that (Δx, Δy)/Δt between such positions is the
-current (IMO MSC/Circ.1053, explanatory notes, appendix on the correction for current). All
-equations are solved together by least squares, with the assumed sizes of the systematic errors as
-prior knowledge.
+On a straight run the velocity over the ground is R(ψ)·(u, v) + c; the positions of a long turn show
+the current without a log (`turn_current`). All equations are solved together by least squares,
+with the assumed sizes of the systematic errors as prior knowledge.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import pi, radians
+from math import radians
 
 import numpy as np
 
@@ -18,16 +16,14 @@ from shiplog.types import FloatArray
 from .found_manoeuvre import FoundManoeuvre
 from .sailed_manoeuvre import ManoeuvreKind
 from .trial_signals import TrialSignals
+from .turn_current import POSITION_DRIFT, current_in_turn
 
 APPROACH_SECS = 60.0  # before an execute
 MIN_STRAIGHT_SECS = 15.0
 MAX_STRAIGHT_YAW = radians(6.0)  # range of the heading on a stretch that counts as straight
 MAX_MEAN_DRIFT = 0.004  # of the speed: sway of a ship that is steered straight
 BLOCK_SECS, MAX_BLOCK_YAW = 30.0, radians(10.0)  # of a log with a measured sway
-POSITION_DRIFT = 0.5  # m, slow error of positions over a stretch
 WIDE_CURRENT_STD = 1.5  # m/s, before any equation
-PAIR_ANGLE, FIRST_PAIR_ANGLE = 2 * pi, pi
-MIN_PAIR_RANGE = radians(20.0)  # of the headings at which pairs begin
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +144,7 @@ def _straight_equation(
         north, east = (signals.positions[end - 1] - signals.positions[first]) / secs
     else:
         north, east = np.polyfit(time, signals.positions[first:end], 1)[0]
-    count = max(2.0, secs / signals.interval("positions"))
+    count = max(2.0, secs / signals.interval("position"))
     position_noise = signals.noise.get("position", 0.0)
     std = float(np.hypot(position_noise * np.sqrt(12 / count), POSITION_DRIFT)) / secs
     ahead = signals.speed[first:end]
@@ -168,32 +164,13 @@ def _straight_equation(
 
 
 def _turn_equations(signals: TrialSignals, found: FoundManoeuvre) -> Iterator[_Equation]:
-    """Yield the mean current of pairs of positions 360° apart, after the first 180° of a turn."""
+    """Yield the current that a long turning circle shows."""
     if found.kind is not ManoeuvreKind.TURNING_CIRCLE:
         return
-    part = slice(found.execute, found.end)
-    turned = found.side * (signals.heading[part] - signals.heading[found.execute])
-    turned = np.maximum.accumulate(turned)
-    last = float(turned[-1]) - PAIR_ANGLE
-    if last - FIRST_PAIR_ANGLE < MIN_PAIR_RANGE:
-        return
-    angles = np.arange(FIRST_PAIR_ANGLE, last, radians(5.0))
-    samples = np.arange(len(turned)) + 1e-9 * turned
-    before = np.interp(angles, turned, samples)
-    after = np.interp(angles + PAIR_ANGLE, turned, samples)
-    places = [
-        np.column_stack(
-            [np.interp(at, np.arange(len(turned)), column) for column in signals.positions[part].T]
-        )
-        for at in (before, after)
-    ]
-    secs = (after - before) * signals.dt_secs
-    currents = (places[1] - places[0]) / secs[:, None]
-    noise = np.sqrt(2.0) * np.hypot(signals.noise.get("position", 0.0), POSITION_DRIFT)
-    mean_noise = noise / float(np.mean(secs)) / np.sqrt(max(1.0, len(angles) / 6))
-    trend = np.ptp(currents, axis=0) / np.sqrt(12.0)
-    stds = np.sqrt(mean_noise**2 + trend**2 / max(1.0, np.ptp(angles) / pi))
-    yield _Equation(np.eye(2, 4), currents.mean(axis=0), np.maximum(stds, 1e-4))
+    estimate = current_in_turn(signals, found)
+    if estimate is not None:
+        current, std = estimate
+        yield _Equation(np.eye(2, 4), current, np.full(2, max(std, 1e-4)))
 
 
 def corrected_signals(

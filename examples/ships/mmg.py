@@ -2,7 +2,10 @@
 
 H. Yasukawa and Y. Yoshimura, "Introduction of MMG standard method for ship maneuvering
 predictions", Journal of Marine Science and Technology 20, 2015: equations (4) to (34), and the
-KVLCC2 in its Tables 1 to 3. Y. Yoshimura and Y. Masumoto, "Hydrodynamic database and manoeuvring
+KVLCC2 in its Tables 1 to 3. The propeller astern: K. Hasegawa and T. Kitera, "Mathematical model of
+manoeuvrability at low advance velocity and its application to berthing control", 1993, with the
+coefficients of the Esso Osaka, as a model of any tanker's propeller; the rudder is then in the
+wake without a jet. Y. Yoshimura and Y. Masumoto, "Hydrodynamic database and manoeuvring
 prediction method with medium high-speed merchant ships and fishing vessels", MARSIM 2012: the
 Seiun Maru.
 """
@@ -11,7 +14,12 @@ from dataclasses import dataclass
 from math import atan2, cos, exp, hypot, pi, sin, sqrt
 
 DENSITY = 1025.0
-ASTERN = 0.2  # thrust coefficient astern, assumed: the paper gives only the propeller ahead
+# astern, by Js = u / (n D): thrust C6 + C7 Js, beyond C10 it is C3; side force and moment
+# A1 + A2 Js and B1 + B2 Js within -0.35 to -0.06, A3 + A4 Js beyond, A5 and B5 below
+C3, C6, C7, C10 = -0.251, -0.175, 0.330, -0.233
+ASTERN_FORCE = (-7.90e-5, 7.99e-3, -4.93e-3, -5.87e-3, -5.58e-4)
+ASTERN_MOMENT = (3.5e-5, -3.17e-3, 1.96e-3, 2.33e-3, 2.25e-4)
+ASTERN_RANGE = (-0.35, -0.06)
 
 
 @dataclass(frozen=True)
@@ -49,6 +57,7 @@ class MmgShip:
         vp, rp = v / speed, r * self.length / speed
         drift = atan2(-v, u)
         thrust, slip = self._thrust(u, drift, rp, rpm)
+        astern = self._astern(u, rpm)
         fx, fy, fn = self._rudder(speed, drift, rp, rudder, slip)
         x, y, n = self.x, self.y, self.n
         surge = -x["0"] + x["vv"] * vp**2 + x["vr"] * vp * rp + x["rr"] * rp**2 + x["vvvv"] * vp**4
@@ -59,9 +68,9 @@ class MmgShip:
         )  # fmt: skip
         return self._accelerations(
             motion,
-            pressure * surge + (1 - self.thrust_deduction) * thrust + fx,
-            pressure * sway + fy,
-            pressure * self.length * yaw + fn,
+            pressure * surge + (1 - self.thrust_deduction) * thrust + astern[0] + fx,
+            pressure * sway + astern[1] + fy,
+            pressure * self.length * yaw + astern[2] + fn,
         )
 
     def _thrust(self, u: float, drift: float, rp: float, rpm: float) -> tuple[float, float]:
@@ -71,8 +80,8 @@ class MmgShip:
         c2 = ahead if at_propeller >= 0 else behind
         inflow = u * (1 - self.wake) * (1 + (1 - exp(-c1 * abs(at_propeller))) * (c2 - 1))
         turns = rpm / 60.0
-        if turns <= 0 or u <= 0:  # outside the polynomial: a bollard's thrust astern, no jet
-            return -ASTERN * DENSITY * turns**2 * self.propeller**4, max(u, 0.0)
+        if turns <= 0 or u <= 0:  # outside the polynomial
+            return 0.0, max(u, 0.0) * self.rudder_flow[0] * (1 - self.wake)
         advance = inflow / (turns * self.propeller)
         k0, k1, k2 = self.open_water
         coefficient = k0 + k1 * advance + k2 * advance**2
@@ -80,6 +89,26 @@ class MmgShip:
         epsilon, kappa, eta = self.rudder_flow
         jet = 1 + kappa * (sqrt(max(0.0, 1 + 8 * coefficient / (pi * advance**2))) - 1)
         return thrust, epsilon * inflow * sqrt(eta * jet**2 + 1 - eta)
+
+    def _astern(self, u: float, rpm: float) -> tuple[float, float, float]:
+        """Return the forces of the propeller astern, N and Nm; zero where it turns ahead."""
+        if rpm >= 0:
+            return 0.0, 0.0, 0.0
+        tip = rpm / 60.0 * self.propeller
+        js = u / tip
+        thrust = C6 + C7 * js if js >= C10 else C3
+
+        def lateral(c: tuple[float, float, float, float, float]) -> float:
+            if js > ASTERN_RANGE[1]:
+                return c[4]
+            return c[0] + c[1] * js if js >= ASTERN_RANGE[0] else c[2] + c[3] * js
+
+        side = 0.5 * DENSITY * self.length * self.draught * tip**2
+        return (
+            DENSITY * tip**2 * self.propeller**2 * thrust,
+            side * lateral(ASTERN_FORCE),
+            side * self.length * lateral(ASTERN_MOMENT),
+        )
 
     def _rudder(
         self, speed: float, drift: float, rp: float, rudder: float, flow: float
