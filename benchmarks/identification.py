@@ -47,10 +47,11 @@ INTRODUCTION = """\
 This page is made by
 
     python -m benchmarks.identification > docs/accuracy.md
+    python -m benchmarks.prediction --before benchmarks/prediction_before.json >> docs/accuracy.md
 
 It contains a Monte Carlo study on a simulated ship, a comparison of the methods, a prediction of
-the turning circle of a real tanker from zig-zags alone, and the time of a fit. Missed goals are
-marked."""
+the turning circle of a real tanker from zig-zags alone, the time of a fit, and predictions of five
+reference ships. Missed goals are marked."""
 MONTE_CARLO_TEXT = """
 ## A simulated ship
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
+from textwrap import fill
 
 import numpy as np
 
@@ -21,6 +22,7 @@ TARGETS = {
     "time to 180°": 3.0, "steady yaw rate": 6.0, "steady speed": 6.0,
 }  # %  # fmt: skip
 OVERSHOOT_TARGET = 1.5  # degrees
+PAGE_WIDTH = 100  # characters of a line of text
 COVERAGE_TARGET = (90.0, 98.0)  # %, of the 95 % intervals
 ORDINALS = ("first", "second")
 OVERSHOOT_ROWS = {
@@ -33,16 +35,14 @@ SHIP_TITLES = {
     "mariner": "Mariner", "kvlcc2": "KVLCC2", "seiun-maru": "Seiun Maru",
     "container": "container ship", "tanker": "tanker",
 }  # fmt: skip
-INTRODUCTION = """\
+INTRODUCTION = """
 ## Ships nobody tuned to
 
-    python -m benchmarks.prediction --seeds N
-
-Five ships by their published equations (`examples/ships`), which have nothing in common with the
-models of shiplog: the Mariner (Chislett and Strøm-Tejsen 1965), the KVLCC2 (Yasukawa and Yoshimura
-2015) and the Seiun Maru (Yoshimura and Masumoto 2012) by the MMG method, the container ship of Son
-and Nomoto (1982) with roll, and the tanker of van Berlekom and Goddard (1972), which is unstable on
-a straight course.
+Five ships by their published equations (`examples/ships`), written apart from the models of
+shiplog: the Mariner (Chislett and Strøm-Tejsen 1965), the KVLCC2 (Yasukawa and Yoshimura 2015) and
+the Seiun Maru (Yoshimura and Masumoto 2012) by the MMG method, the container ship of Son and Nomoto
+(1982) with roll, and the tanker of van Berlekom and Goddard (1972), which is unstable on a straight
+course.
 
 Each ship sails zig-zags 10/10 and 20/20, begun to starboard and to port: four logs of {minutes:.0f}
 minutes at 2 Hz (poor sensors: 1 Hz) with speed through the water, yaw rate, heading, rudder,
@@ -57,11 +57,12 @@ indices are computed from the exact motion and the known execute, apart from the
 
 **Protocol.** The model, its parameters and its intervals come from the zig-zags' logs alone. The
 exact manoeuvres are sailed by the reference ship and used after the identification, to compute the
-errors. Ships, settings, seeds, sensors and targets were fixed before any error of this study was
-seen, but for a short run of the Seiun Maru that tried the code. One ship was known before: the
-model with three degrees of freedom was developed on model tests of the KVLCC2 (above). Since
-2026-11-30 the errors are printed here, so that later changes of the models are not blind to these
-ships; no module of shiplog refers to one of them."""
+errors. The targets were set after errors of an earlier version on four such ships were known. Then
+ships, settings, seeds and sensors were fixed before any error of this study was seen, but for a
+short run of the Seiun Maru that tried the code. The KVLCC2 was known before: the model with three
+degrees of freedom was developed on its model tests (above). Since 2026-11-30 the errors are printed
+here, so that later changes of the models are not blind to these ships; no module of shiplog refers
+to one of them."""
 READING = """
 An error is the mean over both sides and all seeds, in % of the true value, of an overshoot in
 degrees; in brackets the largest. It is in bold where the largest misses the target."""
@@ -191,6 +192,8 @@ def summary_table(
         def median(of: list[IdentifiedTrials], row: str = row, limit: float = limit) -> str:
             errors = np.abs(errors_by_row(of)[row])
             value = float(np.median(errors)) if len(errors) else np.nan
+            if np.isinf(value):
+                return "**not reached**"
             return f"**{value:.1f}**" if value > limit else f"{value:.1f}"
 
         unit = " %" if row in TARGETS else "°"
@@ -220,13 +223,15 @@ def section_lines(study: PredictionStudy, before: PredictionStudy | None = None)
     """
     trials = study.trials
     yield INTRODUCTION.format(minutes=LOG_SECS / 60)
-    yield f"\n{targets_text()}\n"
-    yield f"Measured {study.measured_at} with {_seeds_text(trials)}: the median over ships,"
-    yield "sides and seeds.\n"
-    yield from _markdown(summary_table(trials, before.trials if before else ()))
+    yield f"\n{fill(targets_text(), PAGE_WIDTH)}\n"
+    measured = f"Measured {study.measured_at} with {_seeds_text(trials)}"
     if before:
-        yield f"\nBefore the arrow: an earlier version, measured {before.measured_at} with"
-        yield f"{_seeds_text(before.trials)}."
+        measured += (
+            f"; before the arrow an earlier version, measured {before.measured_at} with "
+            f"{_seeds_text(before.trials)}"
+        )
+    yield fill(f"{measured}. The median over ships, sides and seeds:", PAGE_WIDTH) + "\n"
+    yield from _markdown(summary_table(trials, before.trials if before else ()))
     yield READING
     for name, setting in SETTINGS.items():
         chosen = _of_setting(trials, name)
@@ -237,7 +242,8 @@ def section_lines(study: PredictionStudy, before: PredictionStudy | None = None)
     if refused:
         yield "\nRefused:\n"
         for each in refused:
-            yield f"- {each.ship}, {SETTINGS[each.setting].title}, seed {each.seed}: {each.refusal}"
+            case = f"{SHIP_TITLES[each.ship]}, {SETTINGS[each.setting].title}, seed {each.seed}"
+            yield f"- {case}: {each.refusal}"
 
 
 def _seeds_text(trials: Sequence[IdentifiedTrials]) -> str:
