@@ -11,6 +11,8 @@ import numpy as np
 
 from shiplog.files import atomic_write
 
+DIGITS = 7  # of a saved number
+
 
 @dataclass(frozen=True)
 class PredictedIndex:
@@ -90,14 +92,19 @@ def study_now(trials: Iterable[IdentifiedTrials]) -> PredictionStudy:
 
 
 def study_as_plain(study: PredictionStudy) -> dict[str, Any]:
-    """Return a study as plain values for JSON, which has null instead of NaN."""
+    """Return a study as plain values for JSON: null instead of NaN, `DIGITS` significant digits."""
     plain = asdict(study)
     for trials in plain["trials"]:
+        trials["secs"] = _rounded(trials["secs"])
         for prediction in trials["predictions"]:
             for name, value in prediction.items():
-                if isinstance(value, float) and not np.isfinite(value):
-                    prediction[name] = None
+                if isinstance(value, float):
+                    prediction[name] = _rounded(value)
     return plain
+
+
+def _rounded(value: float) -> float | None:
+    return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
 
 
 def save_study(path: Path, study: PredictionStudy) -> None:

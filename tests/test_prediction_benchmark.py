@@ -151,7 +151,15 @@ def test_a_study_is_read_as_it_was_written(trials: IdentifiedTrials, tmp_path: P
     study = PredictionStudy("2026-11-30 12:00 UTC", (trials,))
     save_study(tmp_path / "a.json", study)
     again = load_study(tmp_path / "a.json")
-    assert repr(again) == repr(study)  # NaN is not equal to itself
+    for name in ("true", "predicted", "low", "high"):
+        np.testing.assert_allclose(
+            [getattr(each, name) for each in again.trials[0].predictions],
+            [getattr(each, name) for each in trials.predictions],
+            rtol=1e-6,
+        )
+    assert replace(again.trials[0], predictions=(), secs=0.0) == replace(
+        trials, predictions=(), secs=0.0
+    )
     assert len(joined([study, again]).trials) == 2
 
 
