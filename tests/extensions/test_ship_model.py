@@ -1,12 +1,20 @@
 """A ship model of another package, as docs/how_to_add_a_ship_model.md makes it."""
 
+import sys
 import tomllib
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import pytest
-from extensions import EXTENSIONS, code_blocks, installed, run_python, run_shiplog
+from extensions import EXTENSIONS, code_blocks, import_from, installed, run_shiplog
 from places import PROJECT
+
+from analysis import ReadingOptions, identify
+from shiplog import load_vessel, open_log
+from shiplog.cli.main import main
+from shiplog.ships import ship_model
 
 VESSEL = """
 name = "a quadratic ship"
@@ -22,17 +30,6 @@ k = 0.5
 f = -0.5
 g = -0.05
 h = 0.05
-"""
-IN_PYTHON = """
-from analysis import ReadingOptions, identify
-from quadratic_nomoto import QUADRATIC
-from shiplog import load_vessel, open_log
-from shiplog.ships import ship_model
-
-assert ship_model("quadratic") is QUADRATIC
-options = ReadingOptions(load_vessel("ship.toml")[0])
-ship = identify([open_log("run.mcap")], model=QUADRATIC, options=options)
-print(ship.model.name, *(round(value, 1) for value in ship.parameters.values()))
 """
 TRUTH = {"a": -0.5, "a2": -1.5, "k": 0.5, "f": -0.5, "g": -0.05, "h": 0.05}
 
@@ -61,28 +58,38 @@ def test_the_page_shows_the_files_of_the_package() -> None:
     }
 
 
-def test_the_command_line_identifies_the_model_by_its_name(
-    environment: Mapping[str, str], folder: Path
-) -> None:
+@pytest.fixture
+def package(
+    environment: Mapping[str, str], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> ModuleType:
+    """The module of the model, whose package this process finds for the time of a test."""
+    import_from(environment, monkeypatch)
+    monkeypatch.chdir(folder)
+    monkeypatch.delitem(sys.modules, "quadratic_nomoto", raising=False)
+    return import_module("quadratic_nomoto")
+
+
+@pytest.mark.usefixtures("package")
+def test_the_command_line_identifies_the_model_by_its_name() -> None:
     identify = "identify run.mcap --model quadratic --vessel ship.toml -o found.toml"
-    done = run_shiplog(environment, folder, *identify.split())
-    assert done.returncode == 0, done.stderr
-    text = (folder / "found.toml").read_text(encoding="utf-8")
-    model = tomllib.loads(text)["model"]
+    assert main(identify.split()) == 0
+    model = tomllib.loads(Path("found.toml").read_text(encoding="utf-8"))["model"]
     assert model["name"] == "quadratic"
     assert {name: model[name] for name in TRUTH} == pytest.approx(TRUTH, rel=0.02)
 
 
-def test_python_identifies_the_model_itself(environment: Mapping[str, str], folder: Path) -> None:
-    done = run_python(environment, folder, "-c", IN_PYTHON)
-    assert done.returncode == 0, done.stderr
-    name, a, _, k, *_ = done.stdout.split()
-    assert (name, float(a), float(k)) == ("quadratic", -0.5, 0.5)
+def test_python_identifies_the_model_itself(package: ModuleType) -> None:
+    assert ship_model("quadratic") is package.QUADRATIC
+    options = ReadingOptions(load_vessel("ship.toml")[0])
+    ship = identify([open_log("run.mcap")], model=package.QUADRATIC, options=options)
+    assert ship.model.name == "quadratic"
+    found = ship.parameters
+    assert (found["a"], found["k"]) == pytest.approx((-0.5, 0.5), abs=0.05)
 
 
+@pytest.mark.usefixtures("package")
 def test_an_unknown_name_is_reported_with_the_new_one_among_the_known(
-    environment: Mapping[str, str], folder: Path
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    done = run_shiplog(environment, folder, "identify", "run.mcap", "--model", "quadratics")
-    assert done.returncode == 2
-    assert "did you mean 'quadratic'" in done.stderr
+    assert main(["identify", "run.mcap", "--model", "quadratics"]) == 2
+    assert "did you mean 'quadratic'" in capsys.readouterr().err

@@ -151,9 +151,15 @@ def names_used(function: ast.FunctionDef) -> set[str]:
     return {n.id for n in ast.walk(body) if isinstance(n, ast.Name) and n not in types}
 
 
+@pytest.fixture(scope="module")
+def hashed() -> set[Path]:
+    return {source.relative_to(PROJECT_FOLDER) for source in compiled_sources()}
+
+
 @pytest.mark.parametrize("path", SOURCES, ids=str)
-def test_the_cache_depends_on_all_that_compiled_functions_use(path: Path) -> None:
-    hashed = {source.relative_to(PROJECT_FOLDER) for source in compiled_sources()}
+def test_the_cache_depends_on_all_that_compiled_functions_use(
+    path: Path, hashed: set[Path]
+) -> None:
     tree = ast.parse((PROJECT_FOLDER / path).read_text(encoding="utf-8"))
     imported = imported_names(tree, path)
     for function in filter(is_compiled_function, ast.walk(tree)):

@@ -22,6 +22,8 @@ from shiplog.cli.main import main
 from shiplog.cli.verb import ExitCode
 from shiplog.vessel.vessel_parser import parse_vessel
 
+RATES = {f"{name}.rate_hz": 5.0 for name in ("yaw_rate", "speed", "rudder", "rpm")}
+
 
 @dataclass(frozen=True)
 class AutoIdentification:
@@ -54,7 +56,7 @@ def identify_auto() -> AutoIdentification:
                 manoeuvre,
                 duration_secs=200.0,
                 seed=seed,
-                sensors=suite("paper"),
+                sensors=suite("paper", RATES),
                 vessel_toml=toml,
             )
             logs.append(str(Path(folder) / f"{manoeuvre}.mcap"))

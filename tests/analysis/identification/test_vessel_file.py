@@ -30,7 +30,8 @@ from shiplog.vessel.ship import ship_from_vessel
 from shiplog.vessel.vessel_parser import parse_vessel
 
 pytestmark = pytest.mark.usefixtures("fit_alone")
-NOISE = {"yaw_rate.white": 1e-4, "speed.white": 0.03, "heading.white": 1e-3, "sway.white": 0.03}
+NOISE = {"yaw_rate.white": 7e-5, "speed.white": 0.02, "heading.white": 1e-3, "sway.white": 0.02}
+RATES = {f"{name}.rate_hz": 5.0 for name in ("yaw_rate", "speed", "rudder", "rpm", "sway")}
 RUNS = ("zigzag-20-20", "pseudo-random", "turning-circle-35-port")
 SECOND_ORDER = ("slipstream", "drift-lag", "three-dof")
 GEAR = "[rudder]\nmax = 0.6\nrate = 0.04\n"
@@ -41,7 +42,7 @@ def logs_of(name: str) -> tuple[TrialLog, ...]:
     text = toml_of(name) + GEAR
     segments = [
         simulate(parse_vessel(text, name), run, duration_secs=300.0, seed=seed, vessel_toml=text,
-                 sensors=suite("white", NOISE))
+                 sensors=suite("white", NOISE | RATES))
         for seed, run in enumerate(RUNS)
     ]  # fmt: skip
     return tuple(as_log(trial, f"{run}.mcap") for trial, run in zip(segments, RUNS, strict=True))
@@ -211,10 +212,12 @@ def test_length_gear_and_alphas_come_from_the_file_a_log_carries() -> None:
 @cache
 def without_length() -> IdentifiedShip:
     text = PRESETS["table1"]
+    without_sway = {name: rate for name, rate in RATES.items() if not name.startswith("sway")}
     segments = [
-        simulate(parse_vessel(text, "x"), run, duration_secs=300.0, seed=1, vessel_toml=text)
+        simulate(parse_vessel(text, "x"), run, duration_secs=300.0, seed=1, vessel_toml=text,
+                 sensors=suite("none", without_sway))
         for run in RUNS[:2]
-    ]
+    ]  # fmt: skip
     return identify([as_log(trial) for trial in segments], "three-dof")
 
 

@@ -11,12 +11,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from extensions import declare
+from extensions import declare, import_from
 from mcap.reader import make_reader
 from places import PROJECT
 
 from recorders.streams.format import GROUP
 from shiplog import read
+from shiplog.cli.main import main
 
 TRIAL = """
 [output]
@@ -220,11 +221,17 @@ def test_a_dry_run_reports_what_is_missing_and_writes_nothing(
     ],
 )
 def test_what_cannot_be_recorded_is_one_line_of_error(
-    environment: Mapping[str, str], tmp_path: Path, arguments: str, message: str
+    environment: Mapping[str, str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: str,
+    message: str,
 ) -> None:
-    with _running(environment, tmp_path, *arguments.split()) as process:
-        output, error = process.communicate(timeout=60)
-    assert process.returncode in (1, 2)
+    import_from(environment, monkeypatch)
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments.split()) in (1, 2)
+    output, error = capsys.readouterr()
     assert output == ""
     assert message in error
     assert error.count("\n") == 1

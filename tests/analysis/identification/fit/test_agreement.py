@@ -23,12 +23,14 @@ pytestmark = pytest.mark.usefixtures("fit_alone")
 SHIP = load_vessel("table1")[0]
 C = SHIP.coefficients
 OTHER = replace(SHIP, coefficients=C._replace(d=1.3 * C.d, e=1.3 * C.e))
+RATES = {f"{name}.rate_hz": 5.0 for name in ("yaw_rate", "speed", "rudder", "rpm")}
 RUNS = (("zigzag-20-20", 0), ("zigzag-10-10", 1), ("zigzag-20-20-port", 2))
 
 
 @cache
 def a_log(manoeuvre: str, seed: int, vessel: Vessel = SHIP, noise: str = "paper") -> TrialLog:
-    trial = simulate(vessel, manoeuvre, duration_secs=400.0, seed=seed, sensors=suite(noise))
+    sensors = suite(noise, RATES)
+    trial = simulate(vessel, manoeuvre, duration_secs=400.0, seed=seed, sensors=sensors)
     return as_log(trial, f"{manoeuvre}-{seed}.mcap")
 
 
