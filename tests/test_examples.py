@@ -103,6 +103,7 @@ def printed(
     return Printed(tmp_path / "figures", monkeypatch, capsys)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("script", PAPERS, ids=lambda script: script.stem)
 def test_a_page_of_a_paper_is_the_output_of_its_script(script: Path, printed: Printed) -> None:
     page = printed.by(script)

@@ -38,6 +38,7 @@ print("survived")
 """
 
 
+@pytest.mark.slow
 def test_killed_interrupted_and_full_disks_leave_whole_files_or_readable_remainders(
     tmp_path: Path,
 ) -> None:

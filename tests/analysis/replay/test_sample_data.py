@@ -96,6 +96,7 @@ def kvlcc2_log(run: Path) -> TrialLog:
     return read_table(run, load_layout(SAMPLE_DATA / "layouts" / f"simman_{run.parent.name}.toml"))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not RUNS, reason="the SIMMAN data are not in ../shared/data/kvlcc2")
 @pytest.mark.parametrize(("kind", "smooth"), KINDS)
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
