@@ -41,12 +41,47 @@ def identification_tables(ship: IdentifiedShip) -> tuple[TextTable, ...]:
         method, and the fitted runs; where runs were predicted, the validation and the indices of
         each manoeuvre.
     """
-    tables = [_model_table(ship)] if ship.candidates else []
-    tables += [_parameter_table(ship), _prior_table(ship), _fit_table(ship)]
-    if ship.validations:
-        tables.append(_validation_table(ship))
-        tables += [_index_table(each) for each in ship.validations if each.indices]
-    return tuple(tables)
+    return (*parameter_tables(ship), *proof_tables(ship))
+
+
+def parameter_tables(ship: IdentifiedShip) -> tuple[TextTable, ...]:
+    """Return the tables of the models compared, of the parameters, and of the share of prior."""
+    models = (_model_table(ship),) if ship.candidates else ()
+    return (*models, _parameter_table(ship), _prior_table(ship))
+
+
+def proof_tables(ship: IdentifiedShip) -> tuple[TextTable, ...]:
+    """Return the tables of the fitted runs, and of the runs that were predicted if there are any.
+
+    Each manoeuvre among the latter has a table of its indices.
+    """
+    if not ship.validations:
+        return (_fit_table(ship),)
+    indices = (_index_table(each) for each in ship.validations if each.indices)
+    return (_fit_table(ship), _validation_table(ship), *indices)
+
+
+def fitted_run_tables(ship: IdentifiedShip, number: int) -> tuple[TextTable, ...]:
+    """Return what `identification_tables` has of one of the fitted segments, a row a quantity."""
+    return (_transposed(_fit_table(ship), number, f"fit: {ship.runs[number].name}"),)
+
+
+def validation_tables(ship: IdentifiedShip, number: int) -> tuple[TextTable, ...]:
+    """Return what `identification_tables` has of one of the predicted segments.
+
+    The errors have a row for each quantity.
+    """
+    validation = ship.validations[number]
+    title = f"prediction: {validation.segment.name}"
+    indices = (_index_table(validation),) if validation.indices else ()
+    return (*indices, _transposed(_validation_table(ship), number, title))
+
+
+def _transposed(table: TextTable, number: int, title: str) -> TextTable:
+    """Return one row of a table as a table of its own, with a row for each of its columns."""
+    cells = zip(table.columns, table.rows[number], strict=True)
+    rows = tuple((column.replace("\n", " "), cell) for column, cell in cells if cell)
+    return TextTable(title, ("quantity", "value"), rows[1:], table.remarks)
 
 
 # ---- models

@@ -40,11 +40,19 @@ def markdown_page(title: str, tables: Iterable[TextTable], warnings: Iterable[st
     if listed:
         blocks += ["## Warnings", listed]
     for table in tables:
-        columns = (column.replace("\n", " ") for column in table.columns)
-        blocks += [f"## {_inline(table.title)}", _markdown_table(columns, table.rows)]
-        if table.remarks:
-            blocks.append(_markdown_list(table.remarks))
+        blocks += [f"## {_inline(table.title)}", *_table_blocks(table)]
     return "\n\n".join(blocks) + "\n"
+
+
+def markdown_tables(tables: Iterable[TextTable]) -> str:
+    """Format tables with their remarks, without headings, for a small text beside a picture."""
+    return "\n\n".join(block for table in tables for block in _table_blocks(table)) + "\n"
+
+
+def _table_blocks(table: TextTable) -> list[str]:
+    columns = (column.replace("\n", " ") for column in table.columns)
+    rows = _markdown_table(columns, table.rows)
+    return [rows, _markdown_list(table.remarks)] if table.remarks else [rows]
 
 
 def _markdown_list(items: Iterable[str]) -> str:

@@ -10,14 +10,18 @@ from shiplog.types import Event, FloatArray
 
 from .decimation import decimated
 from .execute_alignment import track_from_execute
-from .panels import Panel, limits, review_unit, strokes, title_of, with_range
+from .panels import Panel, limits, review_unit, strokes, title_of, varies, with_range
 from .series import (
     BLUE,
     BROWN,
     CYAN,
     GREEN,
     GREY,
+    LIME,
     MAGENTA,
+    PALE,
+    PINK,
+    STEEL,
     VIOLET,
     YELLOW,
     Colour,
@@ -29,7 +33,9 @@ from .steering_panels import MEASURED_WIDTH, WIDTH, heading_series, rudder_serie
 from .track_chart import ChartMark, ChartPart, TrackChart, make_chart
 
 # of the tracks and executes of manoeuvres, in order; heading and rudder have other ones
-MANOEUVRE_COLOURS = CYAN, MAGENTA, YELLOW, VIOLET, GREEN, BROWN
+MANOEUVRE_COLOURS = CYAN, MAGENTA, YELLOW, VIOLET, GREEN, BROWN, LIME, PINK, STEEL
+OUTPUTS = ("yaw_rate", "speed", "sway")  # that have a panel each
+COMPARED_TITLE = "{} (grey: measured, blue: simulated)"  # of a chart, which has no legend
 MAX_NAMED = 6  # manoeuvres in the legend of a panel
 MAX_MARKS = 20  # of a manoeuvre that are drawn; a longer one would be covered by them
 APPROACH_SECS = 30.0  # before the execute, shown on a sheet
@@ -47,9 +53,11 @@ class MotionHistory:
         (n,) s since the start of the signals.
     rudder
         (n,) rad.
+    rpm
+        (n,) revolutions per minute.
     measured
-        (n,) each, by the name of the channel: ``heading``, ``yaw_rate``, ``speed``; NaN where not
-        measured.
+        (n,) each, by the name of the channel: ``heading``, ``yaw_rate``, ``speed``, and ``sway``
+        if it may be measured; NaN where it is not.
     computed
         The same, simulated or estimated.
     computed_name
@@ -58,6 +66,7 @@ class MotionHistory:
 
     time_secs: FloatArray
     rudder: FloatArray
+    rpm: FloatArray
     measured: Mapping[str, FloatArray]
     computed: Mapping[str, FloatArray] = field(default_factory=dict)
     computed_name: str = "simulated"
@@ -70,8 +79,8 @@ class MotionHistory:
             for each in (self.measured, self.computed)
         )
         return replace(
-            self, time_secs=self.time_secs[cut], rudder=self.rudder[cut], measured=measured,
-            computed=computed,
+            self, time_secs=self.time_secs[cut], rudder=self.rudder[cut], rpm=self.rpm[cut],
+            measured=measured, computed=computed,
         )  # fmt: skip
 
 
@@ -145,7 +154,7 @@ def manoeuvre_sheet(
 def motion_panels(
     origin: str, history: MotionHistory, reference: float | None = None
 ) -> list[Panel]:
-    """Return the panels of heading with rudder, yaw rate and speed, as far as they are known.
+    """Return the panels of heading with rudder, outputs, and rpm where they vary, as known.
 
     Parameters
     ----------
@@ -168,10 +177,15 @@ def motion_panels(
     rudder = _drawn(rudder_series(at, np.degrees(history.rudder)))
     counted = "" if reference is None else f"{round(np.degrees(reference), 1) % 360:.1f}°"
     panels = steering_panels(f"{origin}/steering", rudder, headings, counted)
-    outputs = [_output_panel(origin, history, name) for name in ("yaw_rate", "speed")]
+    outputs = [_output_panel(origin, history, name) for name in OUTPUTS if name in history.measured]
     known = [panel for panel in outputs if panel is not None]
     # the first legend serves all
     panels += [replace(panel, legend=panel.legend and panel is known[0]) for panel in known]
+    if varies(history.rpm):
+        line = Line("rpm", history.rpm, GREEN, WIDTH)
+        rpm = _drawn(Series("rpm", at, (line,), spiky=True))
+        title = with_range("rpm", history.rpm)
+        panels.append(Panel(f"{origin}/rpm", title, (rpm,), limits(history.rpm)))
     return panels
 
 
@@ -211,19 +225,20 @@ def _drawn(series: Series) -> Series:
 def with_executes(panel: Panel, spans: Sequence[ManoeuvreSpan], *, legend: bool = False) -> Panel:
     """Return a panel with a vertical line at the execute of each manoeuvre, in its colour.
 
-    The legend names each manoeuvre where asked for; otherwise the lines are grey.
+    The legend names each manoeuvre where asked for.
     """
     lines = [
         strokes(
             f"00_execute_{span.number}",
             np.full((1, 2), span.execute_secs),
             panel.limits,
-            Line(short_title(span), np.zeros(0), manoeuvre_colour(span), WIDTH)
-            if legend
-            else Line("execute", np.zeros(0), GREY, 0.8),
+            Line(
+                short_title(span) if legend else "execute", np.zeros(0), manoeuvre_colour(span),
+                WIDTH,
+            ),
         )
         for span in spans
-    ]
+    ]  # fmt: skip
     has_legend = panel.legend or (legend and len(lines) > 0)
     return replace(panel, series=(*lines, *panel.series), legend=has_legend)
 
@@ -254,6 +269,8 @@ def _chart(
         measured = np.isfinite(compass)
         heading = np.interp(at, part.time_secs[measured], compass[measured]) - up
     title = f"track from the execute, {'approach heading' if known else 'north'} up"
+    if len(turned) > 1:
+        title = COMPARED_TITLE.format(title)
     chart = make_chart(title, turned[0], at, heading, length, *turned[1:])
     return with_manoeuvres(chart, [span], every_mark=True)
 
@@ -262,6 +279,8 @@ def with_manoeuvres(
     chart: TrackChart | None, spans: Sequence[ManoeuvreSpan], *, every_mark: bool = False
 ) -> TrackChart | None:
     """Return a chart with its manoeuvres in their colours, numbered, and with their marks.
+
+    Where a simulated track is compared with the measured one, these have the colours.
 
     Parameters
     ----------
@@ -276,10 +295,11 @@ def with_manoeuvres(
         return None
     parts: list[ChartPart] = []
     marks: list[ChartMark] = []
+    is_compared = chart.simulated is not None
     for span in spans:
-        colour, at = manoeuvre_colour(span), chart.time_secs
+        colour, at = PALE if is_compared else manoeuvre_colour(span), chart.time_secs
         inside = (at >= span.execute_secs) & (at <= span.end_secs)
-        if inside.sum() > 1:
+        if inside.sum() > 1 and not is_compared:
             number = "" if every_mark else str(span.number)
             parts.append(ChartPart(number, colour, chart.track[inside]))
         shown = [each for each in span.marks if every_mark or each.label in TRIAL_MARKS]

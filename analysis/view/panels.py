@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import floor, log10
+from typing import Literal
 
 import numpy as np
 
@@ -12,6 +13,11 @@ from shiplog.units import CATALOGUE, conversion_factor
 from .series import Line, Series
 
 WILD_SHARE = 0.01  # of the values at either end, which may lie outside an axis
+Corner = Literal["RightTop", "LeftTop", "RightBottom", "LeftBottom"]
+CORNERS: tuple[Corner, ...] = ("RightTop", "LeftTop", "RightBottom", "LeftBottom")
+CORNER = (0.25, 0.5)  # of the width and the height of a panel: what a legend may cover
+CORNER_RATIO = 1.5  # of the points covered in two corners: below it they are alike
+MIN_VARIATION = 0.02  # of the largest value
 REVIEW_UNITS: Mapping[str, str] = {"yaw_rate": "deg/min"}  # as rate of turn indicators show it
 
 
@@ -101,6 +107,42 @@ def with_range(title: str, *arrays: FloatArray) -> str:
     """
     text = range_text(*arrays)
     return f"{title}: {text}" if text else title
+
+
+def free_corner(panel: Panel) -> Corner:
+    """Return a corner of a panel that its lines cross hardly more than any other, for its legend.
+
+    The upper right one is the first choice.
+    """
+    low, high = panel.limits
+    spans = [each.time_secs[[0, -1]] for each in panel.series if len(each.time_secs)]
+    if not spans:
+        return "RightTop"
+    start, end = min(each[0] for each in spans), max(each[1] for each in spans)
+    crossings: dict[Corner, float] = dict.fromkeys(CORNERS, 0.0)
+    for series in panel.series:
+        at = (series.time_secs - start) / max(end - start, 1e-9)
+        for line in series.lines:
+            level = (line.values - low) / (high - low)
+            for corner in crossings:
+                beside = at > 1 - CORNER[0] if corner.startswith("Right") else at < CORNER[0]
+                depth = 1 - level if corner.endswith("Top") else level
+                covered = beside & (depth > 0) & (depth < CORNER[1])
+                crossings[corner] += np.count_nonzero(covered) / max(len(at), 1)
+    few = CORNER_RATIO * min(crossings.values())
+    return next(corner for corner in CORNERS if crossings[corner] <= few)
+
+
+def varies(values: FloatArray) -> bool:
+    """Return whether values differ by more than `MIN_VARIATION`, so that they need a panel.
+
+    Examples
+    --------
+    >>> varies(np.array([80.0, np.nan, 80.1])), varies(np.array([80.0, 60.0]))
+    (False, True)
+    """
+    known = values[np.isfinite(values)]
+    return len(known) > 0 and bool(np.ptp(known) > MIN_VARIATION * np.max(np.abs(known)))
 
 
 def strokes(name: str, spans: FloatArray, levels: tuple[float, float], line: Line) -> Series:

@@ -1,11 +1,12 @@
 """The tabs of a replay's review in Rerun: trial, manoeuvres, filter, coefficients, and others."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import rerun.blueprint as rrb
 
 from shiplog.printable import printable
+from shiplog.ships.paper import PAPER_INPUTS
 
 from .manoeuvre_sheets import ManoeuvreSheet
 from .panels import Panel
@@ -13,9 +14,9 @@ from .rerun_io import axis_between, chart_view, events_view, make_blueprint, plo
 from .track_chart import TrackChart
 
 SUMMARY, TRACK = "summary", "track"  # entities
-FIRST_SHARE = 1.3  # of the height of other panels: that of the first one
+FIRST_SHARE, INPUT_SHARE = 1.3, 0.7  # heights of the first panel and of inputs, over others
 COLUMN_SHARES = [3, 2]  # widths: panels over time, and track
-MAX_TABS = 5  # of manoeuvres among the other tabs; more are in a tab of their own
+MAX_TABS = 5  # of a kind among the other tabs; more are in a tab of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +76,7 @@ def replay_blueprint(page: ReplayPage) -> rrb.Blueprint:
 
     tabs: list[rrb.View | rrb.Container] = [_trial_tab(page, axis)]
     manoeuvres = [manoeuvre_tab(sheet) for sheet in page.manoeuvres]
-    if len(manoeuvres) > MAX_TABS:
-        manoeuvres = [rrb.Tabs(*manoeuvres, name="manoeuvres", active_tab=0)]
-    tabs += manoeuvres
+    tabs += gathered_tabs(manoeuvres, "manoeuvres")
     tabs.append(rrb.Horizontal(*map(column, page.equations), name="filter"))
     if page.coefficients:
         views = (plot_view(panel, axis) for panel in page.coefficients)
@@ -102,25 +101,36 @@ def _trial_tab(page: ReplayPage, axis: rrb.TimeAxis) -> rrb.Container:
         texts.append(events_view())
     side.append(rrb.Tabs(*texts, active_tab=len(texts) - 1) if len(texts) > 1 else texts[0])
     right = rrb.Vertical(*side, row_shares=[3, 2] if len(side) > 1 else [1])
-    left = _panel_column(page.motion, axis)
+    left = panel_column(page.motion, axis)
     return rrb.Horizontal(left, right, column_shares=COLUMN_SHARES, name="trial")
 
 
 def manoeuvre_tab(sheet: ManoeuvreSheet) -> rrb.Container:
     """Return the panels of a manoeuvre beside its track."""
-    left = _panel_column(sheet.panels, axis_between(sheet.start_secs, sheet.end_secs))
+    left = panel_column(sheet.panels, axis_between(sheet.start_secs, sheet.end_secs))
     name = printable(sheet.name)
     if sheet.chart is None:
         return rrb.Vertical(*left.contents, row_shares=left.row_shares, name=name)
-    chart = chart_view(track_origin(sheet), sheet.chart)
+    chart = chart_view(track_origin(sheet.origin), sheet.chart)
     return rrb.Horizontal(left, chart, column_shares=COLUMN_SHARES, name=name)
 
 
-def track_origin(sheet: ManoeuvreSheet) -> str:
-    """Return the entity of a manoeuvre's track."""
-    return f"{sheet.origin}/{TRACK}"
+def gathered_tabs(tabs: Sequence[rrb.Container], name: str) -> Sequence[rrb.Container]:
+    """Return tabs of a kind as they are, or in one tab of this name where they are many."""
+    return tabs if len(tabs) <= MAX_TABS else [rrb.Tabs(*tabs, name=name, active_tab=0)]
 
 
-def _panel_column(panels: "list[Panel] | tuple[Panel, ...]", axis: rrb.TimeAxis) -> rrb.Vertical:
-    shares = [FIRST_SHARE, *[1] * (len(panels) - 1)]
+def track_origin(origin: str) -> str:
+    """Return the entity of the track of a sheet whose entities begin with `origin`."""
+    return f"{origin}/{TRACK}"
+
+
+def panel_column(panels: Sequence[Panel], axis: rrb.TimeAxis) -> rrb.Vertical:
+    """Return panels one above the other over the same time axis, the first one higher."""
+    shares = [FIRST_SHARE, *[_share(panel) for panel in panels[1:]]]
     return rrb.Vertical(*(plot_view(panel, axis) for panel in panels), row_shares=shares)
+
+
+def _share(panel: Panel) -> float:
+    """Return the height of a panel below the first one; inputs need less."""
+    return INPUT_SHARE if panel.name.rpartition("/")[2] in PAPER_INPUTS else 1.0

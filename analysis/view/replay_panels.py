@@ -12,13 +12,22 @@ from analysis.report.display import BAND_STDS, DISTURBANCES
 from shiplog.ships.paper import PAPER_OUTPUTS
 from shiplog.types import FloatArray
 
-from .panels import Panel, limits, review_unit, rounded, thousands, title_of, with_range, words
+from .panels import (
+    Panel,
+    limits,
+    review_unit,
+    rounded,
+    thousands,
+    title_of,
+    varies,
+    with_range,
+    words,
+)
 from .series import BLUE, GREY, RED, Line, Series, banded
 from .series_builder import STEERING
 from .steering_panels import steering_panels
 
 Drawn = Mapping[str, Series]  # by entity, as `SeriesBuilder.result` returns them
-MIN_RPM_RANGE = 0.02  # of the largest revolutions; those that vary less need no panel
 MAX_MODEL_DISTANCE = 10.0  # in half-heights of an axis: up to here it includes the model's value
 
 
@@ -33,11 +42,12 @@ def trial_panels(drawn: Drawn) -> list[Panel]:
     yaw_rate, speed = (_output(drawn, output) for output in PAPER_OUTPUTS)
     rpm = drawn["rpm/measured"]
     values = rpm.lines[0].values
-    known = values[np.isfinite(values)]
-    if len(known) and np.ptp(known) <= MIN_RPM_RANGE * np.max(np.abs(known)):
-        speed = replace(speed, title=f"{speed.title}; at {np.median(known):.4g} rpm")
-        return [*panels, yaw_rate, speed]
-    return [*panels, yaw_rate, speed, Panel("rpm", with_range("rpm", known), (rpm,), limits(known))]
+    if varies(values):
+        title = with_range("rpm", values)
+        return [*panels, yaw_rate, speed, Panel("rpm", title, (rpm,), limits(values))]
+    if np.isfinite(values).any():
+        speed = replace(speed, title=f"{speed.title}; at {np.nanmedian(values):.4g} rpm")
+    return [*panels, yaw_rate, speed]
 
 
 def equation_panels(findings: Findings, drawn: Drawn) -> tuple[list[Panel], list[Panel]]:

@@ -115,7 +115,7 @@ class ReplayReview:
                 send_style(recording, entity, series)
                 if entity not in self._dense:
                     send_points(recording, entity, series, start_ns)
-        charts = {TRACK: page.chart} | {track_origin(each): each.chart for each in sheets}
+        charts = {TRACK: page.chart} | {track_origin(each.origin): each.chart for each in sheets}
         for origin, chart in charts.items():
             if chart is not None:
                 send_chart(recording, origin, chart, start_ns)
@@ -138,6 +138,7 @@ def _manoeuvre_sheets(
     history = MotionHistory(
         thinned.time_secs,
         values["rudder"],
+        values["rpm"],
         {name: values[name] for name in ("heading", *PAPER_OUTPUTS)},
         {name: values[_estimate_name(name)] for name in PAPER_OUTPUTS},
         "estimated",

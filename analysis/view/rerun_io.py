@@ -19,13 +19,13 @@ from shiplog.printable import printable
 from shiplog.types import Event, EventLevel, FloatArray
 
 from .file_pipe import pipe_to_file
-from .panels import Panel
+from .panels import Panel, free_corner
 from .series import BLUE, GREEN, GREY, ORANGE, PALE, RED, Colour, Series
 from .track_chart import TrackChart
 
 RRD_MAGIC, FOOTER_MAGIC, FOOTER_BYTES = b"RRF2", b"RRF2FOOT", 32
 MAX_ROWS = 1 << 16  # sent at once
-AXIS_MARGIN = 0.03  # of the length of a time axis, after its end
+AXIS_MARGIN = 0.05  # of the length of a time axis, after its end
 EVENT_LEVELS = {EventLevel.INFO: "INFO", EventLevel.WARNING: "WARN", EventLevel.ERROR: "ERROR"}
 WHOLE_RUN = rrb.TimeAxis(
     view_range=rr.TimeRange(
@@ -206,7 +206,7 @@ def plot_view(panel: Panel, axis: rrb.TimeAxis = WHOLE_RUN) -> rrb.TimeSeriesVie
         name=printable(panel.title),
         axis_x=axis,
         axis_y=rrb.ScalarAxis(range=panel.limits),
-        plot_legend=rrb.PlotLegend("RightTop", visible=panel.legend),
+        plot_legend=rrb.PlotLegend(free_corner(panel), visible=panel.legend),
     )
 
 

@@ -20,6 +20,9 @@ MAGENTA: Colour = (225, 90, 190, 255)
 YELLOW: Colour = (225, 200, 60, 255)
 VIOLET: Colour = (150, 110, 235, 255)
 BROWN: Colour = (170, 120, 80, 255)
+LIME: Colour = (175, 220, 75, 255)
+PINK: Colour = (250, 165, 175, 255)
+STEEL: Colour = (125, 150, 185, 255)
 
 BAND_ALPHA = 120  # of 255
 

@@ -119,6 +119,8 @@ def make_chart(
     if len(points) < 2:
         return None
     other = None if simulated is None else _xy(simulated[np.isfinite(simulated).all(axis=1)])
+    if other is not None and len(other) < 2:
+        other = None  # the simulation diverges from the start, or has no speed
     all_points = points if other is None else np.concatenate((points, other))
     low, high = all_points.min(axis=0), all_points.max(axis=0)
     width = max(float((high - low).max()), 1.0)

@@ -236,6 +236,27 @@ class Problem:
         values[list(self.free)] = z[: len(self.free)]
         return values
 
+    def simulated(self, z: FloatArray, i: int) -> FloatArray:
+        """Simulate segment i without biases of the sensors and waves.
+
+        Parameters
+        ----------
+        z
+            (m,) unknowns.
+        i
+            The segment's number.
+
+        Returns
+        -------
+        outputs
+            (n, 4) in the order of `MODEL_OUTPUTS`, SI; NaN where the simulation diverges.
+        """
+        state, offset, _, _ = self._own(z, i)
+        segment = self.segments[i]
+        return self.model.simulate(
+            self.parameters(z), state, segment.path, len(segment), offset=offset, scale=self.scale
+        )
+
     def predicted(self, z: FloatArray, i: int) -> FloatArray:
         """Simulate segment i.
 
@@ -251,11 +272,9 @@ class Problem:
         outputs
             (n, c) the fitted outputs with biases and waves, SI; NaN where the simulation diverges.
         """
-        state, offset, biases, waves = self._own(z, i)
+        _, _, biases, waves = self._own(z, i)
         segment = self.segments[i]
-        out = self.model.simulate(
-            self.parameters(z), state, segment.path, len(segment), offset=offset, scale=self.scale
-        )[:, self.columns]
+        out = self.simulated(z, i)[:, self.columns]
         for (column, _), bias in zip(self.biases, biases, strict=True):
             out[:, column] += bias
         for omega, *amplitudes in waves:

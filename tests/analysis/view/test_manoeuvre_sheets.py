@@ -41,6 +41,7 @@ TRACK = Series("track", TIMES, (Line("north", -ABEAM, GREY), Line("east", AHEAD,
 HISTORY = MotionHistory(
     TIMES,
     np.where(TIMES < EXECUTE, 0.0, 0.6),
+    np.full(len(TIMES), 80.0),
     {"heading": pi / 2 + TURNED, "yaw_rate": np.gradient(TURNED), "speed": np.full(len(TIMES), 5)},
 )
 
