@@ -10,15 +10,10 @@ from .found_manoeuvre import FoundManoeuvre
 from .rudder_levels import HeldLevel, merged_levels, neutral_rudder, rudder_levels
 from .sailed_manoeuvre import ManoeuvreKind, NotComputed
 from .speed_manoeuvres import find_speed_manoeuvres
-from .spirals import (
-    RATE_SMOOTHING_SECS,
-    find_direct_spirals,
-    find_reverse_spirals,
-    is_steered,
-)
+from .spirals import find_direct_spirals, find_reverse_spirals, is_steered
 from .start_rules import ramp_start
 from .straight_runs import find_straight_runs
-from .trial_signals import TrialSignals, filled_signals, noise_std, slope
+from .trial_signals import TrialSignals, filled_signals, noise_std
 
 MIN_DEFLECTION = radians(4.0)  # of a manoeuvre's rudder from neutral
 REPORTED_DEFLECTION = radians(5.0)  # beyond it, rudder that is no manoeuvre is reported
@@ -29,10 +24,12 @@ PASSING_SECS = 3.0  # shorter stops of a rudder on its way to the other side
 MIN_TURN = pi / 2  # of a turning circle
 MIN_STEADY_TURN = radians(60.0)  # before a pull-out
 MIN_PULL_OUT_SECS = 40.0
+UNSTEADY_SHARE, UNSTEADY_RATE = 0.2, radians(0.05)  # rad/s, of both halves of a turn's last quarter
 PULL_OUT_HELM = radians(1.0)  # of the rudder held midships, noise aside
 FULL_TURN = radians(210.0)  # with less rudder than `HARD_RUDDER`, a shorter turn changes course
 HARD_RUDDER = radians(25.0)
 MAX_RETURN = radians(30.0)  # beyond twice the heading of a zig-zag's reversal, with no reversal
+MIN_RETURN = 0.5  # of the heading at the last reversal, that a zig-zag goes back from it
 MAX_RECOVERY_SECS = 150.0
 INITIAL_TURN = radians(10.0)
 INITIAL_TURN_RUDDER, RUDDER_TOLERANCE = radians(10.0), radians(0.9)
@@ -78,18 +75,18 @@ def detect_manoeuvres(signals: TrialSignals) -> Detection:
         return Detection(tuple(sorted(runs, key=lambda each: each.execute)), 0.0, ())
     levels = rudder_levels(filled.rudder, filled.dt_secs)
     neutral = neutral_rudder(levels)
-    found: list[FoundManoeuvre] = list(find_direct_spirals(levels, neutral, filled.dt_secs))
+    found: list[FoundManoeuvre] = [
+        each
+        for each in find_reverse_spirals(filled.heading, neutral, filled.dt_secs)
+        if is_steered(filled.rudder, each, filled.dt_secs)
+    ]
+    direct = find_direct_spirals(levels, neutral, filled.dt_secs)
+    found += [each for each in direct if not _overlaps(each, found)]
     found += [each for each in find_speed_manoeuvres(filled) if not _overlaps(each, found)]
     rejected: list[NotComputed] = []
     scan = _RudderScan(filled, merged_levels(levels, neutral, filled.dt_secs), neutral)
     for each in scan.results(found):
         (rejected if isinstance(each, NotComputed) else found).append(each)  # type: ignore[arg-type]
-    rate = slope(filled.heading, filled.dt_secs, RATE_SMOOTHING_SECS)
-    found += [
-        each
-        for each in find_reverse_spirals(rate, neutral, filled.dt_secs)
-        if not _overlaps(each, found) and is_steered(filled.rudder, each)
-    ]
     straight = find_straight_runs(filled, found)
     # between manoeuvres a straight run is an approach or a recovery
     found += [run for run in straight if not found or run.kind is ManoeuvreKind.SPEED_RUN]
@@ -189,6 +186,9 @@ class _RudderScan:
         returned = -sides[-1] * (heading[last.last] - heading[reversals[-1]])
         if np.max(np.abs(changes)) > MIN_TURN or returned > 3 * abs(changes[-1]) + MAX_RETURN:
             return None
+        is_cut = last.last >= len(heading) - 2
+        if len(chain) == 2 and not is_cut and returned < MIN_RETURN * abs(changes[-1]):
+            return None  # the ship is steadied on another course
         return FoundManoeuvre(
             ManoeuvreKind.ZIGZAG,
             execute,
@@ -224,7 +224,7 @@ class _RudderScan:
         elif pull_out is None:
             angles = np.abs([level, held.level])  # from neutral, or as ordered
             is_10 = bool(np.min(np.abs(angles - INITIAL_TURN_RUDDER)) <= RUDDER_TOLERANCE)
-            if is_10 and most >= INITIAL_TURN:
+            if is_10 and INITIAL_TURN <= most < MIN_TURN:
                 yield FoundManoeuvre(ManoeuvreKind.INITIAL_TURNING, *made)
             elif abs(level) >= REPORTED_DEFLECTION:
                 yield self._rejected(held, self._reason(held, most))
@@ -274,9 +274,12 @@ class _RudderScan:
         noise = min(noise_std(self._signals.rudder), PULL_OUT_HELM)
         if np.percentile(midship, 95) - np.percentile(midship, 5) > PULL_OUT_HELM + 4 * noise:
             return None  # steered
-        rate = slope(self._signals.heading, self._dt, 5.0)
-        late = rate[held.last - (held.last - held.first) // 4 : held.last + 1]
-        if np.ptp(late) > 0.2 * abs(float(np.mean(late))) + radians(0.05):
+        eighth = max(1, (held.last - held.first) // 8)
+        turned_by = np.diff(
+            self._signals.heading[[held.last - 2 * eighth, held.last - eighth, held.last]]
+        )
+        rates = turned_by / (eighth * self._dt)
+        if np.ptp(rates) > UNSTEADY_SHARE * abs(float(np.mean(rates))) + UNSTEADY_RATE:
             return None  # not yet steady
         level = held.level - self._neutral
         return FoundManoeuvre(ManoeuvreKind.PULL_OUT, held.last, after.last + 1, level, after.level)

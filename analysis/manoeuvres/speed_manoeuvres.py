@@ -11,7 +11,8 @@ from .rudder_levels import HeldLevel, held_levels
 from .sailed_manoeuvre import ManoeuvreKind
 from .trial_signals import TrialSignals, noise_std
 
-MIN_RPM_CHANGE = 0.02  # of the largest revolutions, within two seconds: they are changed
+MIN_RPM_CHANGE = 0.02  # of the largest revolutions, within ten seconds: they are changed
+RPM_MOVING_SECS = 5.0  # half that time: an engine is run up slowly
 MIN_RPM_STEP = 0.15  # of the largest revolutions, from one level to the next
 STOP_RPM = 0.05  # of the largest revolutions: below it the propeller does not drive ahead
 MIN_STOP_SPEED = 1.0  # m/s, from which a ship can be stopped
@@ -41,7 +42,8 @@ def find_speed_manoeuvres(signals: TrialSignals) -> Iterator[FoundManoeuvre]:
     largest = float(np.max(np.abs(rpm)))
     if largest <= 0:
         return
-    levels = held_levels(rpm, dt, MIN_RPM_CHANGE * largest + 3 * noise_std(signals.rpm))
+    movement = MIN_RPM_CHANGE * largest + 3 * noise_std(signals.rpm)
+    levels = held_levels(rpm, dt, movement, RPM_MOVING_SECS)
     for before, after in pairwise(levels):
         step = (after.level - before.level) / largest
         if abs(step) < MIN_RPM_STEP:

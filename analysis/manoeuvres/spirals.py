@@ -8,11 +8,13 @@ from collections.abc import Iterator
 from math import radians
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import savgol_filter
 
 from shiplog.types import FloatArray
 
 from .found_manoeuvre import FoundManoeuvre
-from .rudder_levels import MIN_HELD_SECS, HeldLevel, held_levels
+from .rudder_levels import MIN_HELD_SECS, NOISE_MARGIN, HeldLevel, held_levels
 from .sailed_manoeuvre import ManoeuvreKind
 from .trial_signals import TrialSignals, noise_std
 
@@ -23,7 +25,10 @@ MIN_SPIRAL_STEP = radians(0.5)
 MIN_SIDE = radians(2.0)  # that the largest levels of both sides reach
 MIN_RATE_STEP, MIN_RATE_SIDE = radians(0.03), radians(0.1)  # of a reverse spiral, rad/s
 RATE_SMOOTHING_SECS = 8.0
+RATE_MOVING_SECS = 8.0  # half the time over which a change of the yaw rate is looked for
 MIN_STEERING = radians(1.0)  # of the rudder within a level
+STEERING_SMOOTHING_SECS = 4.0
+DELAY_SHARE = 0.25  # of a level of the yaw rate, at whose end the rudder may move to the next one
 STEADY_SHARE = 0.4  # of a level's end, over which yaw rate and rudder are averaged
 
 
@@ -41,39 +46,50 @@ def find_direct_spirals(
     dt
         Sample interval, s.
     """
-    for chain in _chains(_joined(levels, dt), dt, MIN_SPIRAL_STEP, MIN_SIDE, neutral):
+    joined = _joined(levels, dt, MIN_SPIRAL_STEP / 2, 2 * MIN_HELD_SECS)
+    for chain in _chains(joined, dt, MIN_SPIRAL_STEP, MIN_SIDE, neutral):
         yield _spiral(ManoeuvreKind.DIRECT_SPIRAL, chain, neutral)
 
 
-def find_reverse_spirals(rate: FloatArray, neutral: float, dt: float) -> Iterator[FoundManoeuvre]:
+def find_reverse_spirals(
+    heading: FloatArray, neutral: float, dt: float
+) -> Iterator[FoundManoeuvre]:
     """Find reverse spirals: the rudder is moved to hold one yaw rate after another.
 
     Parameters
     ----------
-    rate
-        (n,) yaw rate, smooth, rad/s.
+    heading
+        (n,) rad, continuous.
     neutral
         The rudder angle that keeps a straight course, rad.
     dt
         Sample interval, s.
     """
-    if not np.isfinite(rate).all() or np.ptp(rate) < 2 * MIN_RATE_SIDE:
+    half = min(max(2, round(RATE_SMOOTHING_SECS / dt)), (len(heading) - 1) // 2)
+    if half < 2 or not np.isfinite(heading).all():
         return
-    steady = held_levels(rate, dt, MIN_RATE_STEP / 2 + 3 * noise_std(rate))
-    for chain in _chains(_joined(steady, dt), dt, MIN_RATE_STEP, MIN_RATE_SIDE, 0.0):
+    rate = savgol_filter(heading, 2 * half + 1, 2, deriv=1, delta=dt)
+    if np.ptp(rate) < 2 * MIN_RATE_SIDE:
+        return
+    noise = noise_std(heading) / (dt * np.sqrt((2 * half + 1) ** 3 / 12))  # of a fitted slope
+    movement = MIN_RATE_STEP + NOISE_MARGIN * np.sqrt(2.0) * noise
+    steady = held_levels(rate, dt, movement, RATE_MOVING_SECS)
+    joined = _joined(steady, dt, movement, 2 * RATE_MOVING_SECS)
+    for chain in _chains(joined, dt, MIN_RATE_STEP, MIN_RATE_SIDE, 0.0):
         yield _spiral(ManoeuvreKind.REVERSE_SPIRAL, chain, neutral)
 
 
-def _joined(levels: list[HeldLevel], dt: float) -> list[HeldLevel]:
+def _joined(levels: list[HeldLevel], dt: float, same: float, gap_secs: float) -> list[HeldLevel]:
     """Join stretches of one level that a short movement separates."""
     joined: list[HeldLevel] = []
     for held in levels:
         if (
             joined
-            and abs(held.level - joined[-1].level) < MIN_SPIRAL_STEP / 2
-            and (held.first - joined[-1].last) * dt < 2 * MIN_HELD_SECS
+            and abs(held.level - joined[-1].level) < same
+            and (held.first - joined[-1].last) * dt < gap_secs
         ):
-            joined[-1] = HeldLevel(joined[-1].first, held.last, joined[-1].level)
+            longer = max(joined[-1], held, key=lambda each: each.last - each.first)
+            joined[-1] = HeldLevel(joined[-1].first, held.last, longer.level)
         else:
             joined.append(held)
     return joined
@@ -110,10 +126,20 @@ def _is_spiral(levels: list[float], side: float) -> bool:
     return int(np.sum(steps[1:] != steps[:-1])) <= 2 and len({round(x, 3) for x in levels}) >= 5
 
 
-def is_steered(rudder: FloatArray, found: FoundManoeuvre) -> bool:
-    """Whether the rudder, (n,) rad, is moved to keep each rate, as in a reverse spiral."""
-    spans = found.levels[:, :2].astype(int)
-    return bool(np.median([np.ptp(rudder[a : b + 1]) for a, b in spans]) > MIN_STEERING)
+def is_steered(rudder: FloatArray, found: FoundManoeuvre, dt: float) -> bool:
+    """Whether the rudder, (n,) rad, is moved to keep each rate, as in a reverse spiral.
+
+    In a direct spiral the rudder rests while the rate is steady; it only moves near the end of that
+    time, for the rate follows it with a delay.
+    """
+    count = 1 + 2 * round(STEERING_SMOOTHING_SECS / 2 / dt)
+    smooth = uniform_filter1d(rudder, count)
+    noise = noise_std(rudder) / np.sqrt(count)
+    moved = [
+        float(np.ptp(smooth[int(first) : int(last - DELAY_SHARE * (last - first)) + 1]))
+        for first, last in found.levels[:, :2]
+    ]
+    return bool(np.median(moved) > MIN_STEERING + 2 * NOISE_MARGIN * noise)
 
 
 def _spiral(kind: ManoeuvreKind, chain: list[HeldLevel], neutral: float) -> FoundManoeuvre:

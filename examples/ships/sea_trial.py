@@ -198,6 +198,7 @@ class Sensors:
     compass_bias: float = 0.0
     speed_scale: float = 0.0
     gyro_bias: float = 0.0
+    rudder_zero: float = 0.0
     compass_deflection: float = 0.0  # from `deflected_at`, s, within `DEFLECTION_SECS`
     deflected_at: float = 0.0
 
@@ -230,7 +231,7 @@ def as_log(
     columns = {
         "yaw_rate": ("rad/s", sampled(trial.yaw_rate + sensors.gyro_bias, sensors.yaw_rate)),
         "speed": ("m/s", sampled(trial.speed * (1 + sensors.speed_scale), sensors.speed)),
-        "rudder": ("rad", sampled(trial.rudder, sensors.rudder)),
+        "rudder": ("rad", sampled(trial.rudder + sensors.rudder_zero, sensors.rudder)),
         "rpm": ("rpm", sampled(trial.rpm, 0.1)),
         "heading": ("rad", heading),
     }
