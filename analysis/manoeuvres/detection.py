@@ -80,7 +80,7 @@ def detect_manoeuvres(signals: TrialSignals) -> Detection:
         for each in find_reverse_spirals(filled.heading, neutral, filled.dt_secs)
         if is_steered(filled.rudder, each, filled.dt_secs)
     ]
-    direct = find_direct_spirals(levels, neutral, filled.dt_secs)
+    direct = find_direct_spirals(filled.rudder, neutral, filled.dt_secs)
     found += [each for each in direct if not _overlaps(each, found)]
     found += [each for each in find_speed_manoeuvres(filled) if not _overlaps(each, found)]
     rejected: list[NotComputed] = []

@@ -5,6 +5,8 @@ MSC/Circ.1053, explanatory notes, section 3.4.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
 from math import radians
 
 import numpy as np
@@ -24,30 +26,38 @@ MAX_PAUSE_SECS = 40.0  # between two levels
 MIN_SPIRAL_STEP = radians(0.5)
 MIN_SIDE = radians(2.0)  # that the largest levels of both sides reach
 MIN_RATE_STEP, MIN_RATE_SIDE = radians(0.03), radians(0.1)  # of a reverse spiral, rad/s
-RATE_SMOOTHING_SECS = 8.0
-RATE_MOVING_SECS = 8.0  # half the time over which a change of the yaw rate is looked for
-MIN_STEERING = radians(1.0)  # of the rudder within a level
+MAX_RATE_NOISE = radians(0.005)  # rad/s, of a yaw rate from the heading
+RATE_SMOOTHING_SECS = (8.0, 20.0)  # half widths of its fit
+RATE_MOVING_SECS = 16.0  # half the time over which a change of the yaw rate is looked for
+MIN_STEERING_STD = radians(0.5)  # of the rudder within a level
+MIN_BEYOND = radians(1.0)  # of the rudder beyond the next level's angle
 STEERING_SMOOTHING_SECS = 4.0
+RUDDER_SMOOTHING_SECS = 10.0  # of the rudder of a direct spiral, whose steps may be small
 DELAY_SHARE = 0.25  # of a level of the yaw rate, at whose end the rudder may move to the next one
 STEADY_SHARE = 0.4  # of a level's end, over which yaw rate and rudder are averaged
 
 
-def find_direct_spirals(
-    levels: list[HeldLevel], neutral: float, dt: float
-) -> Iterator[FoundManoeuvre]:
+def find_direct_spirals(rudder: FloatArray, neutral: float, dt: float) -> Iterator[FoundManoeuvre]:
     """Find direct spirals: the rudder is held at one angle after another, on both sides.
 
     Parameters
     ----------
-    levels
-        The stretches of held rudder, not merged.
+    rudder
+        (n,) rad, without NaN.
     neutral
         The rudder angle that keeps a straight course, rad.
     dt
         Sample interval, s.
     """
+    count = 1 + 2 * round(RUDDER_SMOOTHING_SECS / 2 / dt)
+    if count > len(rudder):
+        return
+    noise = noise_std(rudder) / np.sqrt(count)
+    movement = max(0.8 * MIN_SPIRAL_STEP, NOISE_MARGIN * np.sqrt(2.0) * noise)
+    levels = held_levels(uniform_filter1d(rudder, count), dt, movement, RUDDER_SMOOTHING_SECS / 2)
     joined = _joined(levels, dt, MIN_SPIRAL_STEP / 2, 2 * MIN_HELD_SECS)
-    for chain in _chains(joined, dt, MIN_SPIRAL_STEP, MIN_SIDE, neutral):
+    steps = _Steps(MIN_SPIRAL_STEP, MIN_SIDE, MAX_PAUSE_SECS)
+    for chain in _chains(joined, dt, steps, neutral):
         yield _spiral(ManoeuvreKind.DIRECT_SPIRAL, chain, neutral)
 
 
@@ -65,17 +75,23 @@ def find_reverse_spirals(
     dt
         Sample interval, s.
     """
-    half = min(max(2, round(RATE_SMOOTHING_SECS / dt)), (len(heading) - 1) // 2)
-    if half < 2 or not np.isfinite(heading).all():
+    noise = noise_std(heading)
+    # as wide a fit as keeps the noise of its slope small
+    samples = np.cbrt(12.0 * (noise / (MAX_RATE_NOISE * dt)) ** 2)
+    half = round(float(np.clip(samples * dt / 2, *RATE_SMOOTHING_SECS)) / dt)
+    if not 2 <= half < len(heading) // 2 or not np.isfinite(heading).all():
         return
     rate = savgol_filter(heading, 2 * half + 1, 2, deriv=1, delta=dt)
     if np.ptp(rate) < 2 * MIN_RATE_SIDE:
         return
-    noise = noise_std(heading) / (dt * np.sqrt((2 * half + 1) ** 3 / 12))  # of a fitted slope
-    movement = MIN_RATE_STEP + NOISE_MARGIN * np.sqrt(2.0) * noise
+    rate_noise = noise / (dt * np.sqrt((2 * half + 1) ** 3 / 12.0))
+    movement = MIN_RATE_STEP / 2 + NOISE_MARGIN * np.sqrt(2.0) * rate_noise
     steady = held_levels(rate, dt, movement, RATE_MOVING_SECS)
-    joined = _joined(steady, dt, movement, 2 * RATE_MOVING_SECS)
-    for chain in _chains(joined, dt, MIN_RATE_STEP, MIN_RATE_SIDE, 0.0):
+    steps = _Steps(
+        MIN_RATE_STEP, MIN_RATE_SIDE, 2 * (half * dt + RATE_MOVING_SECS) + MAX_PAUSE_SECS
+    )
+    joined = _joined(steady, dt, 0.75 * MIN_RATE_STEP, RATE_MOVING_SECS)
+    for chain in _chains(joined, dt, steps, 0.0):
         yield _spiral(ManoeuvreKind.REVERSE_SPIRAL, chain, neutral)
 
 
@@ -95,25 +111,32 @@ def _joined(levels: list[HeldLevel], dt: float, same: float, gap_secs: float) ->
     return joined
 
 
+@dataclass(frozen=True)
+class _Steps:
+    """The smallest step between two levels, the smallest end of both sides, the longest pause."""
+
+    step: float
+    side: float
+    pause_secs: float
+
+
 def _chains(
-    levels: list[HeldLevel], dt: float, step: float, side: float, neutral: float
+    levels: list[HeldLevel], dt: float, steps: _Steps, neutral: float
 ) -> Iterator[list[HeldLevel]]:
     """Yield the chains of long levels that go down and up, or up and down, on both sides."""
     chain: list[HeldLevel] = []
     for held in [*levels, None]:
         if held is not None and (held.last - held.first) * dt < MIN_SPIRAL_SECS:
             continue
-        near = held is not None and (
-            not chain
-            or (
-                (held.first - chain[-1].last) * dt <= MAX_PAUSE_SECS
-                and abs(held.level - chain[-1].level) >= step
-            )
-        )
-        if near and held is not None:
-            chain.append(held)
+        if held is not None and (
+            not chain or (held.first - chain[-1].last) * dt <= steps.pause_secs
+        ):
+            if chain and abs(held.level - chain[-1].level) < steps.step:
+                chain[-1] = max(chain[-1], held, key=lambda each: each.last - each.first)
+            else:
+                chain.append(held)
             continue
-        if _is_spiral([each.level - neutral for each in chain], side):
+        if _is_spiral([each.level - neutral for each in chain], steps.side):
             yield chain
         chain = [] if held is None else [held]
 
@@ -129,17 +152,27 @@ def _is_spiral(levels: list[float], side: float) -> bool:
 def is_steered(rudder: FloatArray, found: FoundManoeuvre, dt: float) -> bool:
     """Whether the rudder, (n,) rad, is moved to keep each rate, as in a reverse spiral.
 
-    In a direct spiral the rudder rests while the rate is steady; it only moves near the end of that
-    time, for the rate follows it with a delay.
+    It moves while the rate is steady, or goes beyond the next angle to bring about the next rate.
+    In a direct spiral it does neither; near the end of a steady rate it moves to the next angle,
+    for the rate follows it with a delay.
     """
     count = 1 + 2 * round(STEERING_SMOOTHING_SECS / 2 / dt)
     smooth = uniform_filter1d(rudder, count)
-    noise = noise_std(rudder) / np.sqrt(count)
-    moved = [
-        float(np.ptp(smooth[int(first) : int(last - DELAY_SHARE * (last - first)) + 1]))
+    least = MIN_BEYOND + NOISE_MARGIN * noise_std(rudder) / np.sqrt(count)
+    spans = [
+        (int(first), int(last - DELAY_SHARE * (last - first)) + 1)
         for first, last in found.levels[:, :2]
     ]
-    return bool(np.median(moved) > MIN_STEERING + 2 * NOISE_MARGIN * noise)
+    variances = [
+        float(np.var(rudder[first:last])) - noise_std(rudder) ** 2 for first, last in spans
+    ]
+    angles = [float(np.median(smooth[first:last])) for first, last in spans]
+    beyond = []
+    for k, (one, other) in enumerate(pairwise(angles)):
+        between = smooth[spans[k][1] : spans[k + 1][0] + 1]
+        low, high = min(one, other), max(one, other)
+        beyond.append(max(float(np.max(between)) - high, low - float(np.min(between))))
+    return bool(np.median(variances) > MIN_STEERING_STD**2 or np.median(beyond) > least)
 
 
 def _spiral(kind: ManoeuvreKind, chain: list[HeldLevel], neutral: float) -> FoundManoeuvre:

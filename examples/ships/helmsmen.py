@@ -94,5 +94,5 @@ class RateKeeper:
         error = rates[-1] - yaw_rate
         limited = abs(rudder - ship.neutral) >= MAX_HELM and error * rudder > 0
         self.integral += 0.0 if limited else error * step
-        order = pace * error + 0.6 * self.integral
+        order = 2.0 * pace * error + self.integral
         return ship.neutral + max(-MAX_HELM, min(MAX_HELM, order)) + self.weave(time)

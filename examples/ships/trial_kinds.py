@@ -23,8 +23,8 @@ Values = NDArray[np.float64]
 CIRCLE_SECS = {"mariner": 1100.0, "kvlcc2": 1400.0, "seiun-maru": 450.0}
 ZIGZAG_SECS = {"mariner": 500.0, "kvlcc2": 900.0, "seiun-maru": 400.0}
 SPIRAL_DEG = (15, 10, 5, 3, 1, -1, -3, -5, -10, -15, -10, -5, -3, -1, 1, 3, 5, 10, 15)
-SPIRAL_RATES = (0.45, 0.35, 0.25, 0.15, 0.05, -0.05, -0.15, -0.25, -0.35, -0.45)  # r L/U
-SPIRAL_PACE = 6.0  # of a level, in ship lengths travelled at the approach speed
+SPIRAL_RATES = (0.17, 0.12, 0.07, 0.02, -0.02, -0.07, -0.12, -0.17)  # r L/U
+DIRECT_PACE, REVERSE_PACE = 6.0, 9.0  # of a level, in ship lengths at the approach speed
 STEADY_SHARE = 0.4  # of a level's end, over which rudder and yaw rate are averaged
 WEAVE = radians(2.0)  # of a helmsman who steers to a yaw rate
 ASTERN_SHARE, REVERSING_SECS = 0.6, 20.0  # of the revolutions; for as many as those ahead
@@ -55,12 +55,15 @@ class TrialKind:
         Sails it from the approach given, to the side of the approach's angle.
     ships
         The ships that can sail it.
+    alternative
+        What may be found instead, where the log of both is the same.
     """
 
     expected: tuple[ManoeuvreKind, ...]
     sail: Callable[[Steering], Voyage]
     scored: int = 0
     ships: tuple[str, ...] = ("mariner", "kvlcc2", "seiun-maru")
+    alternative: tuple[ManoeuvreKind, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -187,7 +190,7 @@ def pull_out(approach: Steering) -> Voyage:
 
 def direct_spiral(approach: Steering) -> Voyage:
     """Hold rudder angles from 15° on one side to 15° on the other, and back."""
-    ship, secs = approach.ship, round(SPIRAL_PACE * _pace(approach.ship))
+    ship, secs = approach.ship, round(DIRECT_PACE * _pace(approach.ship))
     times = [approach.execute + k * secs for k in range(len(SPIRAL_DEG) + 1)]
     angles = [approach.side * radians(angle) for angle in SPIRAL_DEG]
     orders = Programme(approach, list(zip(times, angles, strict=False)))
@@ -197,7 +200,7 @@ def direct_spiral(approach: Steering) -> Voyage:
 
 def reverse_spiral(approach: Steering, *, weaving: bool) -> Voyage:
     """Steer to one yaw rate after another, from one side to the other and back."""
-    ship, secs = approach.ship, round(SPIRAL_PACE * _pace(approach.ship))
+    ship, secs = approach.ship, round(REVERSE_PACE * _pace(approach.ship))
     rates = (*SPIRAL_RATES, *SPIRAL_RATES[-2::-1])
     times = [approach.execute + k * secs for k in range(len(rates) + 1)]
     steps = [
@@ -332,7 +335,9 @@ KINDS = {
         (ManoeuvreKind.REVERSE_SPIRAL,), partial(reverse_spiral, weaving=True)
     ),
     "reverse spiral, steady rudder": TrialKind(
-        (ManoeuvreKind.REVERSE_SPIRAL,), partial(reverse_spiral, weaving=False)
+        (ManoeuvreKind.REVERSE_SPIRAL,),
+        partial(reverse_spiral, weaving=False),
+        alternative=(ManoeuvreKind.DIRECT_SPIRAL,),
     ),
     "full astern stop": TrialKind((ManoeuvreKind.STOPPING,), stopping, ships=MMG_SHIPS),
     "acceleration": TrialKind((ManoeuvreKind.ACCELERATION,), acceleration, ships=MMG_SHIPS),

@@ -9,6 +9,7 @@ import pytest
 from sailed_trials import EXECUTE_SECS, sailed_circle, sailed_zigzag, true_indices
 from ships.mariner import LENGTH, SPEED
 from ships.sea_trial import GOOD, POOR, SHIPS, Sensors, Steering, TrialShip, as_log, sail
+from ships.trial_kinds import KINDS
 
 from analysis import TrialAnalysis, analyse_trial
 from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreKind
@@ -202,6 +203,22 @@ def test_two_straight_runs_of_reciprocal_courses_are_a_double_run() -> None:
     current = trial.conditions.current
     assert current is not None
     assert current.north == pytest.approx(0.6, abs=3 * current.std + 0.02)
+
+
+@pytest.mark.parametrize(
+    ("kind", "ship"),
+    [
+        ("initial turning 10°", MARINER),
+        ("pull-out after a circle 20°", MARINER),
+        ("reverse spiral, moving rudder", SEIUN_MARU),
+        ("acceleration", SEIUN_MARU),
+    ],
+)
+def test_the_manoeuvre_sailed_is_found_and_no_other(kind: str, ship: TrialShip) -> None:
+    approach = Steering(ship, EXECUTE_SECS, -1.0, course=2.0, helm=radians(1.0))
+    sailed = KINDS[kind].sail(approach)
+    trial = analysed(as_log(sailed.trial, POOR, rng(7), (0.3, 0.2)), ship)
+    assert tuple(kinds(trial)) == KINDS[kind].expected
 
 
 def test_half_a_manoeuvre_is_named_with_its_reason() -> None:
