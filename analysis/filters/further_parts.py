@@ -1,6 +1,7 @@
 """The further states of a filter, part by part: dynamics, noise, and covariance at the start."""
 
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 from math import radians
 
 import numpy as np
@@ -207,3 +208,82 @@ def _wave_moment(name: str, unit: str, axis: int, frequency: float, R: float, st
     A = frequency * np.array([[0.0, 1.0], [-1.0, 0.0]])
     W = 2 * R * (WAVE_DECAY * frequency) ** 2 * np.eye(2)
     return Part(f"{name}_wave", unit, A, W, std**2 * np.eye(2), np.eye(2)[0], axis=axis)
+
+
+@dataclass(frozen=True)
+class FurtherParts:
+    """The further states of a filter, part by part.
+
+    Attributes
+    ----------
+    first
+        The number of the core's states, which are before them.
+    linear
+        Parts with linear dynamics of their own: waves, slow errors, forces that decay.
+    motion
+        Heading and position, which integrate the ship's states.
+    static
+        Parts that change by noise alone.
+    forces, wind
+        Those of the linear and static parts that act on the ship.
+    """
+
+    first: int
+    linear: list[Part]
+    motion: list[Part]
+    static: list[Part]
+    forces: list[Part]
+    wind: list[Part]
+
+    @property
+    def ordered(self) -> list[Part]:
+        """All parts in the order of their states."""
+        return [*self.linear, *self.motion, *self.static]
+
+    @property
+    def size(self) -> int:
+        """The number of all states, with those of the core."""
+        return self.first + sum(len(part.A) for part in self.ordered)
+
+    @property
+    def linear_end(self) -> int:
+        """The place after the last state of the linear parts."""
+        return self.first + sum(len(part.A) for part in self.linear)
+
+    @property
+    def places(self) -> dict[str, slice]:
+        """The places of the states of each part, by its name."""
+        ends = [*accumulate((len(part.A) for part in self.ordered), initial=self.first)]
+        named = zip(self.ordered, pairwise(ends), strict=True)
+        return {part.name: slice(*place) for part, place in named}
+
+
+def choose_parts(
+    first: int,
+    wave: WaveModel | None,
+    c: Coefficients,
+    noise: NoiseModel,
+    stats: SignalStats,
+) -> FurtherParts:
+    """Choose the parts by the model of the further states.
+
+    Parameters
+    ----------
+    first
+        The number of the core's states.
+    wave
+        The wave in the yaw rate; None for none.
+    c
+        The coefficients of the identification paper's model.
+    noise
+        The noise, and the further states.
+    stats
+        The statistics of the signals.
+    """
+    model = noise.further
+    forces, wind = force_parts(c, noise, stats), wind_parts(model, c, stats)
+    decaying = [part for part in forces if part.A.any()]
+    lasting = [part for part in forces if not part.A.any()]
+    linear = [*wave_parts(wave, stats.dt_secs), *heading_error_parts(model), *decaying]
+    static = [*constant_parts(model), *lasting, *wind]
+    return FurtherParts(first, linear, motion_parts(model, stats), static, forces, wind)

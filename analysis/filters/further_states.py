@@ -17,16 +17,7 @@ from shiplog.ships.paper import Coefficients
 from shiplog.types import FloatArray
 
 from .filter_loop import FilterState, System
-from .further_parts import (
-    Part,
-    WaveModel,
-    constant_parts,
-    force_parts,
-    heading_error_parts,
-    motion_parts,
-    wave_parts,
-    wind_parts,
-)
+from .further_parts import FurtherParts, Part, WaveModel, choose_parts
 from .further_steps import ABSENT, Further, NoFurther
 from .noise_model import NoiseModel
 from .wind_terms import WIND_TERMS
@@ -108,69 +99,84 @@ def arrange(
         The largest accepted innovation, in standard deviations.
     """
     model, dt = noise.further, stats.dt_secs
-    forces, wind = force_parts(c, noise, stats), wind_parts(model, c, stats)
-    linear = [
-        *wave_parts(wave, dt),
-        *heading_error_parts(model),
-        *(part for part in forces if part.A.any()),
-    ]
-    motion = motion_parts(model, stats)
-    static = [*constant_parts(model), *(part for part in forces if not part.A.any()), *wind]
-    parts = [*linear, *motion, *static]
-    places: dict[str, slice] = {}
-    size = len(core.A)
-    for part in parts:
-        places[part.name] = slice(size, size + len(part.A))
-        size += len(part.A)
-    A: FloatArray = block_diag(core.A, *(part.A for part in parts))
-    W = block_diag(core.W, *(part.W for part in parts))
-    count, linear_end = len(core.A), len(core.A) + sum(len(part.A) for part in linear)
-    for part in forces:
-        A[:count, places[part.name]] = np.outer(core.inputs[:, part.axis or 0], part.C)
+    parts = choose_parts(len(core.A), wave, c, noise, stats)
+    places, outputs = parts.places, 2 + len(model.outputs)
+    A, W = _dynamics(core, wave, parts)
+    blocks = [core.A, *(part.A for part in parts.ordered)]
+    F, Q = _discretised(A, W, blocks, dt, joint=bool(model))
+    shown = [part for part in parts.ordered if part.shown]
+    has_inputs = bool(model.yaw or model.surge or parts.wind or "rudder" in model.sensors)
+    system = System(
+        C=_output_matrix(core, wave, places, parts.size, outputs),
+        r=np.concatenate((noise.measurement_std**2, np.square(model.output_stds))),
+        gate=gate,
+        F=_constant_transition(core, parts, F),
+        Q=np.ascontiguousarray(Q),
+        B=_input_columns(core, 2 if has_inputs else 0, dt),
+        linear_end=parts.linear_end,
+        dynamic=parts.linear_end + len(parts.motion),
+        shown=len(shown),
+    )
+    further: Further | NoFurther = NoFurther(parts.first)
+    if model:
+        turn = np.zeros(parts.size)
+        if "heading" in places and wave is not None:
+            turn[places["wave"]] = F[places["heading"], places["wave"]]
+        rows = _force_rows([*parts.forces, *parts.wind], places, dt)
+        shown_at = np.array([places[part.name].start for part in shown], np.int64)
+        further = _places(core, places, rows, turn, shown_at, model.wind)
+    return Arrangement(
+        system, further, _initial_state(core, parts, outputs), _shown_states(shown), model.wind
+    )
+
+
+def _dynamics(
+    core: CoreModel, wave: WaveModel | None, parts: FurtherParts
+) -> tuple[FloatArray, FloatArray]:
+    """Return the dynamics (s, s) of all states, 1/s, and the intensity (s, s) of their noise."""
+    places = parts.places
+    A: FloatArray = block_diag(core.A, *(part.A for part in parts.ordered))
+    for part in parts.forces:
+        A[: parts.first, places[part.name]] = np.outer(core.inputs[:, part.axis or 0], part.C)
     if "heading" in places:
         A[places["heading"], 0] = 1.0
         if wave is not None:
             A[places["heading"], places["wave"]] = wave.C
-    F_all, Q = _discretised(A, W, [core.A, *(part.A for part in parts)], dt, joint=bool(model))
-    F: FloatArray = np.eye(size)
-    F[count:linear_end, count:linear_end] = F_all[count:linear_end, count:linear_end]
-    B: FloatArray = np.zeros(
-        (count, 2 if model.yaw or model.surge or wind or "rudder" in model.sensors else 0)
-    )
+    return A, block_diag(core.W, *(part.W for part in parts.ordered))
+
+
+def _constant_transition(core: CoreModel, parts: FurtherParts, F: FloatArray) -> FloatArray:
+    """Return the constant part of the transition matrix F (s, s); the loop computes the rest."""
+    constant: FloatArray = np.eye(parts.size)
+    linear, own = slice(parts.first, parts.linear_end), slice(parts.first)
+    constant[linear, linear] = F[linear, linear]
     if core.constant:
-        F[:count, :count] = F_all[:count, :count]
-        B = _input_step(core, dt)[:, : B.shape[1]].copy()
-    turn = np.zeros(size)
-    if "heading" in places and wave is not None:
-        turn[places["wave"]] = F_all[places["heading"], places["wave"]]
-    estimates = [part for part in parts if part.shown]
-    system = System(
-        C=_output_matrix(core, wave, places, size, 2 + len(model.outputs)),
-        r=np.concatenate((noise.measurement_std**2, np.square(model.output_stds))),
-        gate=gate,
-        F=F,
-        Q=np.ascontiguousarray(Q),
-        B=np.ascontiguousarray(B),
-        linear_end=linear_end,
-        dynamic=linear_end + len(motion),
-        shown=len(estimates),
+        constant[own, own] = F[own, own]
+    return constant
+
+
+def _input_columns(core: CoreModel, columns: int, dt: float) -> FloatArray:
+    """Return B of `System`, with as many columns of it as are used; zero where it varies."""
+    if not core.constant:
+        return np.zeros((len(core.A), columns))
+    return np.ascontiguousarray(_input_step(core, dt)[:, :columns])
+
+
+def _initial_state(core: CoreModel, parts: FurtherParts, outputs: int) -> FilterState:
+    further = [np.r_[part.x, np.zeros(len(part.A) - 1)] for part in parts.ordered]
+    return FilterState(
+        np.concatenate([core.x, *further]),
+        np.ascontiguousarray(block_diag(core.P, *(part.P for part in parts.ordered))),
+        np.zeros(outputs, np.int64),
     )
-    shown_at = np.array([places[part.name].start for part in estimates], np.int64)
-    further = (
-        _places(core, places, _force_rows([*forces, *wind], places, dt), turn, shown_at, model.wind)
-        if model
-        else NoFurther(count)
+
+
+def _shown_states(shown: list[Part]) -> tuple[ShownState, ...]:
+    """Return the further estimates, with their standard deviations at the start."""
+    stds = [float(np.sqrt(part.C @ part.P @ part.C)) for part in shown]
+    return tuple(
+        ShownState(part.name, part.unit, std) for part, std in zip(shown, stds, strict=True)
     )
-    state = FilterState(
-        np.concatenate([core.x, *(np.r_[part.x, np.zeros(len(part.A) - 1)] for part in parts)]),
-        np.ascontiguousarray(block_diag(core.P, *(part.P for part in parts))),
-        np.zeros(2 + len(model.outputs), np.int64),
-    )
-    stds = [float(np.sqrt(part.C @ part.P @ part.C)) for part in estimates]
-    shown = [
-        ShownState(part.name, part.unit, std) for part, std in zip(estimates, stds, strict=True)
-    ]
-    return Arrangement(system, further, state, tuple(shown), model.wind)
 
 
 def _discretised(
