@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shiplog.compiled import compiled, copy_vector
+from shiplog.compiled import compiled, copy_vector, inlined
 from shiplog.types import FloatArray
 
 from .core import StepInputs, advance, begin_instant, gain, output_row
@@ -80,7 +80,40 @@ class FilterState(NamedTuple):
     rejected_in_a_row: NDArray[np.int64]
 
 
-TraceArrays = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+class ShipInputs(NamedTuple):
+    """The inputs of a chunk of n instants.
+
+    Attributes
+    ----------
+    delta, n
+        (n + 1,): rudder angle, rad, and revolutions, rpm, the instant after the chunk included.
+    dt
+        The interval, s.
+    """
+
+    delta: FloatArray
+    n: FloatArray
+    dt: float
+
+
+class FilterInput(NamedTuple):
+    """What a filter takes of a chunk: the outputs (n, m), NaN where not measured, and inputs."""
+
+    measured: FloatArray
+    inputs: ShipInputs
+
+
+class TraceArrays(NamedTuple):
+    """The arrays of a `Trace` after its states; without rows where none is kept."""
+
+    covariances: FloatArray
+    transitions: FloatArray
+    rows: FloatArray
+    gains: FloatArray
+    innovations: FloatArray
+    variances: FloatArray
+
+
 FilterArrays = tuple[FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.bool_], TraceArrays]
 
 
@@ -90,13 +123,10 @@ def run_filter(
     further: Any,  # noqa: ANN401
     system: System,
     state: FilterState,
-    measured: FloatArray,
-    delta: FloatArray,
-    n: FloatArray,
-    dt: float,
+    chunk: FilterInput,
     keep: bool,
 ) -> FilterArrays:
-    """Filter a chunk of n instants; `delta` and `n` are one longer, `measured` is (n, m).
+    """Filter a chunk of n instants, and set the state to that after it.
 
     Returns
     -------
@@ -113,16 +143,14 @@ def run_filter(
     trace
         The arrays of `Trace` after the states; empty unless `keep`.
     """
-    x, P, (count, outputs), size = state.x, state.P, measured.shape, len(state.x)
+    measured, (delta, n, dt), x, P = chunk.measured, chunk.inputs, state.x, state.P
+    (count, outputs), size = measured.shape, len(x)
     xs, rows, innovations = (
         np.empty((count, size)), np.empty((count, 10)), np.empty((count, 2 * outputs)),
     )  # fmt: skip
     rejected = np.zeros((count, outputs), np.bool_)
     further_rows = np.empty((count, 2 * system.shown))
-    kept = count if keep else 0  # rows of the trace
-    Ps, Fs = np.empty((kept, size, size)), np.empty((kept, size, size))
-    Ks, cs = np.zeros((kept, outputs, size)), np.zeros((kept, outputs, size))
-    es, Ss = np.zeros((kept, outputs)), np.ones((kept, outputs))
+    trace = _trace_arrays(count if keep else 0, outputs, size)
     F, B, FP = system.F.copy(), system.B.copy(), np.empty((size, size))
     Pc, K = np.empty(size), np.empty(size)
     c, before, slopes = np.empty(size), np.empty(size), np.zeros((2, size))
@@ -145,26 +173,42 @@ def run_filter(
             gain(core, x, Pc, S, u, output, K)
             correct(x, P, K, Pc, innovation, S)
             if keep:
-                copy_vector(Ks[k, output], K)
-                copy_vector(cs[k, output], c)
-                es[k, output], Ss[k, output] = innovation, S
+                copy_vector(trace.gains[k, output], K)
+                copy_vector(trace.rows[k, output], c)
+                trace.innovations[k, output], trace.variances[k, output] = innovation, S
         copy_vector(xs[k], x)
         set_slopes(further, core, x, n[k], slopes)
         output_row(core, x, P, acting_at_instant(further, x, given), slopes, rows[k])
         show(further, x, P, further_rows[k])
         if keep:
-            copy_matrix(Ps[k], P)
+            copy_matrix(trace.covariances[k], P)
         copy_vector(before, x)
         advance(core, x, F, B, acting_during_step(further, x, given), dt)
-        for i in range(B.shape[0], system.linear_end):
-            x[i] = 0.0
-            for j in range(B.shape[0], system.linear_end):
-                x[i] += F[i, j] * before[j]
+        _advance_linear(x, before, F, len(B), system.linear_end)
         advance_further(further, core, x, before, F, B, n[k], dt)
         if keep:
-            copy_matrix(Fs[k], F)
+            copy_matrix(trace.transitions[k], F)
         propagate(P, F, system.Q, FP, system.dynamic)
-    return xs, rows, further_rows, innovations, rejected, (Ps, Fs, cs, Ks, es, Ss)
+    return xs, rows, further_rows, innovations, rejected, trace
+
+
+@inlined
+def _trace_arrays(count: int, outputs: int, size: int) -> TraceArrays:
+    """Return the arrays of the trace, as of measurements that were not used."""
+    return TraceArrays(
+        np.empty((count, size, size)), np.empty((count, size, size)),
+        np.zeros((count, outputs, size)), np.zeros((count, outputs, size)),
+        np.zeros((count, outputs)), np.ones((count, outputs)),
+    )  # fmt: skip
+
+
+@inlined
+def _advance_linear(x: FloatArray, before: FloatArray, F: FloatArray, first: int, end: int) -> None:
+    """Advance the states from `first` to `end`, which have linear dynamics of their own."""
+    for i in range(first, end):
+        x[i] = 0.0
+        for j in range(first, end):
+            x[i] += F[i, j] * before[j]
 
 
 @compiled
@@ -173,15 +217,14 @@ def output_rows(
     further: Any,  # noqa: ANN401
     states: FloatArray,
     covariances: FloatArray,
-    delta: FloatArray,
-    n: FloatArray,
-    dt: float,
+    inputs: ShipInputs,
     shown: int,
 ) -> tuple[FloatArray, FloatArray]:
     """Compute the outputs of states (n, s) of covariances (n, s, s): `rows` and `further_rows`.
 
     Both are as in `run_filter`, as are the other parameters; there are `shown` further estimates.
     """
+    delta, n, dt = inputs
     rows, further_rows = np.empty((len(states), 10)), np.empty((len(states), 2 * shown))
     slopes = np.zeros((2, states.shape[1]))
     for k in range(len(states)):

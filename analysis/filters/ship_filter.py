@@ -9,7 +9,7 @@ from shiplog.ships.paper import PAPER_INPUTS, PAPER_OUTPUTS
 from shiplog.types import FloatArray, Signals
 
 from .base import Estimates, FurtherStates, Trace
-from .filter_loop import output_rows, run_filter
+from .filter_loop import FilterInput, ShipInputs, output_rows, run_filter
 from .further_states import Arrangement
 from .further_steps import COMPASS, Further, NoFurther
 from .noise_model import FURTHER_OUTPUTS
@@ -62,10 +62,9 @@ class ShipFilter:
         covariances: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray | None, FurtherStates | None]:
         """Return w, w', w'', v, v' (n, 5), their standard deviations, the wave, and the others."""
-        delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
         rows, further_rows = output_rows(
-            self._core, self._in_wind(chunk), states, covariances, delta, n, chunk.dt_secs,
-            len(self._shown),
+            self._core, self._in_wind(chunk), states, covariances,
+            _ship_inputs(chunk, following), len(self._shown),
         )  # fmt: skip
         further = self._further(further_rows)
         return rows[:, :5], np.sqrt(rows[:, 5:]), self._wave_rate(states), further
@@ -73,11 +72,10 @@ class ShipFilter:
     def _run(
         self, chunk: Signals, following: Mapping[str, float], *, keep: bool
     ) -> tuple[Estimates, Trace]:
-        delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
+        given = FilterInput(self._measured(chunk), _ship_inputs(chunk, following))
         states, rows, further_rows, innovations, rejected, trace = run_filter(
-            self._core, self._in_wind(chunk), self._system, self._state, self._measured(chunk),
-            delta, n, chunk.dt_secs, keep,
-        )  # fmt: skip
+            self._core, self._in_wind(chunk), self._system, self._state, given, keep
+        )
         outputs = rejected.shape[1]
         estimates = Estimates(
             rows[:, :5], np.sqrt(rows[:, 5:]), innovations[:, :outputs],
@@ -124,3 +122,9 @@ class ShipFilter:
         first = len(self._system.B)
         wave: FloatArray = states[:, first : first + len(self._wave)] @ self._wave
         return wave
+
+
+def _ship_inputs(chunk: Signals, following: Mapping[str, float]) -> ShipInputs:
+    """Return the inputs of a chunk, of which those at the instant after it are given by name."""
+    delta, n = (np.append(chunk[name], following[name]) for name in PAPER_INPUTS)
+    return ShipInputs(delta, n, chunk.dt_secs)
