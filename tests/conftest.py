@@ -1,5 +1,6 @@
 import gc
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -28,11 +29,19 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 gc.set_threshold(RARE_COLLECTION)
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """Compile the loops of a replay once, before the workers of all tests each compile them.
+IN_MEMORY = Path("/dev/shm")  # noqa: S108 - pytest makes a folder of the user's own there
+MIN_FREE_BYTES = 4 << 30  # of which the tests use a tenth
 
-    A run of chosen tests compiles only what these need.
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Prepare a run: the files of the tests are in memory where the system has a folder for that.
+
+    A file that is written over, as by tests of damaged files, waits on a disk each time for its
+    last content to be written. Of a run of all tests the loops of a replay are compiled once,
+    before the workers would each compile them.
     """
+    if os.access(IN_MEMORY, os.W_OK) and shutil.disk_usage(IN_MEMORY).free > MIN_FREE_BYTES:
+        os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", os.fspath(IN_MEMORY))
     is_worker, chosen = hasattr(config, "workerinput"), pytest.Config.ArgsSource.ARGS
     if is_worker or config.args_source is chosen or is_compiled("analysis"):
         return
