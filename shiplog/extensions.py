@@ -79,18 +79,17 @@ def load_extension(group: str, name: str, kind: type[T], noun: str) -> T:
         message names the package.
     """
     entry = _entry(group, name, noun)
-    package = _package(entry)
     try:
         found = entry.load()
     except Exception as error:  # a foreign module may raise anything
         raise ShiplogError(
             f"the {noun} {name!r} cannot be loaded from {entry.value} "
             f"({type(error).__name__}: {' '.join(str(error).split())}); "
-            f"reinstall or remove the package {package}"
+            f"reinstall or remove the package {_package(entry)}"
         ) from error
     if not isinstance(found, kind):
         raise ShiplogError(
-            f"the {noun} {name!r} of the package {package} must be a {kind.__name__}, "
+            f"the {noun} {name!r} of the package {_package(entry)} must be a {kind.__name__}, "
             f"but {entry.value} is a {type(found).__name__}"
         )
     return found
@@ -109,4 +108,5 @@ def _entry(group: str, name: str, noun: str) -> EntryPoint:
 
 
 def _package(entry: EntryPoint) -> str:
+    """Name the package of an entry, for an error: its metadata take milliseconds to parse."""
     return entry.dist.name if entry.dist else entry.module.partition(".")[0]

@@ -26,7 +26,7 @@ def simulated_log(
     rates, rudders = [], []
     for step in range(int(secs / dt)):
         ordered = steering(step * dt, heading, rate)
-        rudder += np.clip(ordered - rudder, -0.04 * dt, 0.04 * dt)
+        rudder += min(max(ordered - rudder, -0.04 * dt), 0.04 * dt)
         swell += dt * (-swell / 5) + waves * rng.normal(0, np.sqrt(dt))
         rate += dt * ((0.05 * rudder - rate) / 40 + swell)
         heading += dt * rate
