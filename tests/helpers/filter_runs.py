@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -48,7 +49,7 @@ def rates(
     c: Coefficients, x: np.ndarray, delta: np.ndarray, delta_dot: np.ndarray, n: np.ndarray
 ) -> np.ndarray:
     """(..., 3) of w, w' and v, (..., 3): Burylin's (4)."""
-    w, w_dot, v = np.moveaxis(x, -1, 0)
+    w, w_dot, v = x[..., 0], x[..., 1], x[..., 2]
     hull = c.a * w_dot + c.b1 * w + c.b2 * w * np.abs(w) + c.b3 * w**3
     ks = c.alpha1 * v + c.alpha2 * n * np.exp(-c.alpha3 * v)
     turning = hull + ks * (c.d * delta + c.e * delta_dot)
@@ -68,9 +69,17 @@ def sailed(
     c: Coefficients, start: np.ndarray, delta: np.ndarray, n: np.ndarray, dt: float
 ) -> np.ndarray:
     """(n, 3) of the undisturbed ship, the inputs moving evenly from instant to instant."""
-    states = [np.asarray(start, float)]
+    return _sailed(c, tuple(start), tuple(delta), tuple(n), dt)
+
+
+@cache
+def _sailed(
+    c: Coefficients, start: tuple[float], delta: tuple[float], n: tuple[float], dt: float
+) -> np.ndarray:
+    """Integrate once for all filters that are compared with it."""
+    states = [np.array(start, float)]
     for k in range(len(delta) - 1):
-        delta_dot, n_dot = np.diff(delta)[k] / dt, np.diff(n)[k] / dt
+        delta_dot, n_dot = (delta[k + 1] - delta[k]) / dt, (n[k + 1] - n[k]) / dt
 
         def moving(t: float, x: np.ndarray, k: int = k, u: tuple = (delta_dot, n_dot)) -> object:
             return rates(c, x, delta[k] + u[0] * t, u[0], n[k] + u[1] * t)
@@ -78,7 +87,9 @@ def sailed(
         scale = np.array([1e-3, 1e-5, 1.0])
         done = solve_ivp(moving, (0, dt), states[-1], "DOP853", rtol=1e-13, atol=1e-13 * scale)
         states.append(done.y[:, -1])
-    return np.array(states)
+    path = np.array(states)
+    path.flags.writeable = False
+    return path
 
 
 def disturbed(

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from places import KVLCC2, PROJECT
 from scipy.integrate import solve_ivp
+from tanker_logs import tanker_log
 
 from analysis.disturbance.loop import observe_chunk
 from analysis.disturbance.observer import (
@@ -31,10 +32,8 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import Gust, WaveMoment
 from shiplog import Signals, TrialLog, UsageError, Vessel, read, resample
-from shiplog.layouts.layout import load_layout
 from shiplog.resampling import resample_chunks
 from shiplog.ships.paper import Coefficients
-from shiplog.tables.foreign import read_table
 from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import DISTURBANCES, DisturbanceSettings
 
@@ -633,11 +632,7 @@ SAMPLE_LOGS = [p for p in sorted(SAMPLES.glob("*.mcap")) if p.name.count(".") ==
     "path", [*SAMPLE_LOGS, *sorted(KVLCC2.glob("*/*.dat"))], ids=lambda path: path.stem
 )
 def test_every_log_is_observed_by_every_model(path: Path) -> None:
-    if path.suffix == ".dat":
-        layout = load_layout(SAMPLES / "layouts" / f"simman_{path.parent.name}.toml")
-        log = read_table(path, layout)
-    else:
-        log = read(path)
+    log = tanker_log(path) if path.suffix == ".dat" else read(path)
     plan = plan_replay(log)
     holding = InputHold(plan.clock)
     for chunk in log.chunks():

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from places import KVLCC2, PROJECT
+from places import KVLCC2
+from tanker_logs import tanker_log
 from trial_logs import as_log
 
 from analysis.identification.fit.output_error import OutputError, output_error
@@ -24,9 +25,7 @@ from analysis.manoeuvres.turning_circle import turning_circle
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, UsageError, load_vessel, resample
-from shiplog.layouts.layout import load_layout
 from shiplog.ships import ship_model
-from shiplog.tables.foreign import read_table
 
 LENGTH = 320.0
 CHANNELS, OPTIONAL = ("yaw_rate", "speed", "rudder", "rpm"), ("sway", "heading")
@@ -36,8 +35,7 @@ CHANNELS, OPTIONAL = ("yaw_rate", "speed", "rudder", "rpm"), ("sway", "heading")
 def recorded(path: Path) -> tuple[TrialLog, Segment]:
     if not path.is_file():
         pytest.skip(f"the real recordings are not here: {path}")
-    layout = load_layout(PROJECT / "sample_data" / "layouts" / f"simman_{path.parent.name}.toml")
-    log = read_table(path, layout)
+    log = tanker_log(path)
     return log, split_into_segments(resample(log, 1.0, CHANNELS, OPTIONAL), path.name)[0]
 
 

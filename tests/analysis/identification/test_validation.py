@@ -6,7 +6,8 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
-from places import KVLCC2, PROJECT
+from places import KVLCC2
+from tanker_logs import tanker_log
 from trial_logs import as_log
 
 from analysis.identification.fit.output_error import OutputError, output_error
@@ -18,9 +19,7 @@ from analysis.manoeuvres.zigzag import switch_heading
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, load_vessel
-from shiplog.layouts.layout import load_layout
 from shiplog.ships import ship_model
-from shiplog.tables.foreign import read_table
 
 VESSEL, TOML = load_vessel("table1")
 NOISE_DEG = 0.5
@@ -201,8 +200,7 @@ def tanker(path: str) -> dict[str, float]:
     file = KVLCC2 / path
     if not file.is_file():
         pytest.skip(f"the real recordings are not here: {file}")
-    layout = load_layout(PROJECT / "sample_data" / "layouts" / f"simman_{file.parent.name}.toml")
-    indices = indices_of(read_table(file, layout))
+    indices = indices_of(tanker_log(file))
     return {n: degrees(f.measured) if f.unit == "rad" else f.measured for n, f in indices.items()}
 
 

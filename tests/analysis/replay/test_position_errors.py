@@ -9,14 +9,13 @@ import pytest
 from filter_runs import signals_of
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
+from tanker_logs import tanker_log
 
 from analysis.replay.plan import plan_replay
 from analysis.replay.position_errors import position_noise
 from analysis.replay.replay import Replay
 from analysis.signals.signal_stats import SignalStats, signal_stats
 from shiplog import load_vessel
-from shiplog.layouts.layout import load_layout
-from shiplog.tables.foreign import read_table
 from shiplog.types import FloatArray
 
 PROJECT = Path(__file__).resolve().parents[3]
@@ -77,7 +76,7 @@ def test_a_few_fixes_keep_their_noise() -> None:
 @pytest.mark.skipif(not CIRCLE.is_file(), reason="the SIMMAN data are not in ../shared/data/kvlcc2")
 def test_the_gyro_bias_of_a_real_turning_circle_is_determined() -> None:
     """It is 0.0045 to 0.0058 deg/s in the free-running tests of the KVLCC2."""
-    log = read_table(CIRCLE, load_layout(PROJECT / "sample_data/layouts/simman_marin.toml"))
+    log = tanker_log(CIRCLE)
     settings = {"filter.kind": "extended", "filter.smooth": True, "filter.sensor_bias": "auto"}
     replay = Replay(log, plan_replay(log, settings=settings))
     for _ in replay.chunks():

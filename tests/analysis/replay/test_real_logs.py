@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from places import KVLCC2, LAYOUTS, SAMPLE_DATA
+from tanker_logs import tanker_log
 
 from analysis.check.compare import logs_in
 from analysis.replay.reading_options import ReadingOptions
@@ -26,8 +27,9 @@ LOGS = [*sorted(KVLCC2.glob("*/*.dat")), *logs_in(SAMPLE_DATA), SAMPLE_DATA / "b
 def log_of(path: Path) -> TrialLog:
     if path.suffix == ".mcap":
         return read(path)
-    layout = f"simman_{path.parent.name}.toml" if path.suffix == ".dat" else "bridge.toml"
-    return read_table(path, load_layout(LAYOUTS / layout))
+    if path.suffix == ".dat":
+        return tanker_log(path)
+    return read_table(path, load_layout(LAYOUTS / "bridge.toml"))
 
 
 def test_the_real_runs_are_here() -> None:

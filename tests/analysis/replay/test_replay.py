@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faults import bias, dropout, freeze, spike
-from places import KVLCC2, LAYOUTS
+from places import KVLCC2
+from tanker_logs import tanker_log
 from trial_logs import InChunks, as_log
 
 from analysis.regression.weak_form import weak_form
@@ -22,8 +23,6 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import START_NS, SimulatedTrial, simulate
 from shiplog import Channel, LogError, TrialLog, Vessel, VesselError, read, write
 from shiplog.errors import UsageError
-from shiplog.layouts.layout import load_layout
-from shiplog.tables.foreign import read_table
 from shiplog.units import GEOGRAPHIC
 
 
@@ -471,8 +470,7 @@ RUNS = sorted(KVLCC2.glob("*/*.dat"))
 @pytest.mark.skipif(not RUNS, reason="the SIMMAN data are not in ../shared/data/kvlcc2")
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
 def test_every_real_run_of_the_kvlcc2_replays(run: Path) -> None:
-    layout = load_layout(LAYOUTS / f"simman_{run.parent.name}.toml")
-    found = analyse(read_table(run, layout))
+    found = analyse(tanker_log(run))
     assert "fitted to this log" in found.findings.plan.model_origin
     # the fitted model explains most of the weak form's left-hand sides
     coefficients = found.findings.plan.vessel.coefficients

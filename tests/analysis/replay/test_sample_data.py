@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from filter_runs import FILTERS, SMOOTHABLE
 from places import KVLCC2, SAMPLE_DATA
+from tanker_logs import tanker_log
 
 from analysis.check.compare import compare, logs_in
 from analysis.replay.replay import analyse
 from shiplog import TrialLog, load_vessel, read
-from shiplog.layouts.layout import load_layout
-from shiplog.tables.foreign import read_table
 from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.settings import DISTURBANCES
 
@@ -91,17 +90,12 @@ def test_the_vessel_files_are_the_presets() -> None:
 RUNS = sorted(KVLCC2.glob("*/*.dat"))
 
 
-@cache
-def kvlcc2_log(run: Path) -> TrialLog:
-    return read_table(run, load_layout(SAMPLE_DATA / "layouts" / f"simman_{run.parent.name}.toml"))
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(not RUNS, reason="the SIMMAN data are not in ../shared/data/kvlcc2")
 @pytest.mark.parametrize(("kind", "smooth"), KINDS)
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
 def test_every_filter_replays_every_run_of_the_kvlcc2(run: Path, kind: str, smooth: bool) -> None:
-    found = analyse(kvlcc2_log(run), settings={"filter.kind": kind, "filter.smooth": smooth})
+    found = analyse(tanker_log(run), settings={"filter.kind": kind, "filter.smooth": smooth})
     assert np.isfinite(found.estimates.states).all()
     assert np.isfinite(found.estimates.stds).all()
     assert found.estimates.rejected.mean() < 0.01

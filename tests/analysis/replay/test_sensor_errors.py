@@ -7,9 +7,10 @@ from math import radians
 
 import numpy as np
 import pytest
-from places import KVLCC2, LAYOUTS, SAMPLE_DATA
+from places import KVLCC2, SAMPLE_DATA
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
+from tanker_logs import tanker_log
 from trial_logs import InChunks, as_log
 
 from analysis.replay.reading_options import ReadingOptions
@@ -20,8 +21,6 @@ from analysis.replay.sensor_errors import inconsistency_of
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, UsageError, load_vessel, read
-from shiplog.layouts.layout import load_layout
-from shiplog.tables.foreign import read_table
 
 BIASED = SAMPLE_DATA / "zigzag_10_10_dropouts.mcap"  # a gyro with a bias of 0.02 deg/s
 TRANSIENT_SECS = 60.0
@@ -283,7 +282,7 @@ def test_the_gyro_bias_of_a_real_zigzag_is_that_of_the_comparison_with_its_headi
     path = KVLCC2 / "marin" / f"MARIN_FREE_KVLCC2_{run}_m.dat"
     if not path.is_file():
         pytest.skip("the SIMMAN data are not in ../shared/data/kvlcc2")
-    log = read_table(path, load_layout(LAYOUTS / "simman_marin.toml"))
+    log = tanker_log(path)
     gyro, _ = analyse(log, settings=AUTO).findings.sensor_errors
     assert gyro.determined
     half = 1.96 * np.degrees(gyro.std)

@@ -7,7 +7,8 @@ from math import degrees
 
 import numpy as np
 import pytest
-from places import KVLCC2, LAYOUTS, PROJECT, SAMPLE_DATA
+from places import KVLCC2, PROJECT, SAMPLE_DATA
+from tanker_logs import tanker_log
 
 import shiplog
 from analysis import TrialAnalysis, TrialOptions, analyse_trial
@@ -28,8 +29,7 @@ def tanker(path: str) -> TrialAnalysis:
     file = KVLCC2 / path
     if not file.is_file():
         pytest.skip(f"the real recordings are not here: {file}")
-    layout = load_layout(LAYOUTS / f"simman_{file.parent.name}.toml")
-    return analyse_trial(read_table(file, layout), ReadingOptions(length=320.0), AT_ZERO)
+    return analyse_trial(tanker_log(file), ReadingOptions(length=320.0), AT_ZERO)
 
 
 def values(trial: TrialAnalysis) -> dict[str, float]:

@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from places import KVLCC2, LAYOUTS
+from places import KVLCC2
+from tanker_logs import tanker_log
 from trial_logs import as_log
 
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, Vessel
 from shiplog.checks.consistency.consistency_check import consistency_findings
-from shiplog.layouts.layout import load_layout
-from shiplog.tables.foreign import read_table
 
 
 def simulated_log(vessel: Vessel, seed: int = 0, **settings: float) -> TrialLog:
@@ -55,7 +54,6 @@ def test_without_a_heading_there_is_no_warning(vessel: Vessel) -> None:
 @pytest.mark.skipif(not KVLCC2.is_dir(), reason="the SIMMAN data are not in ../shared/data/kvlcc2")
 def test_the_gyros_of_hsva_agree_with_their_headings() -> None:
     """HSVA's headings have many digits; those of MARIN are themselves rebuilt from the yaw rate."""
-    layout = load_layout(LAYOUTS / "simman_hsva.toml")
     for run in sorted((KVLCC2 / "hsva").glob("*.dat")):
-        warning = gyro_bias_warning(read_table(run, layout))
+        warning = gyro_bias_warning(tanker_log(run))
         assert warning is None or abs(float(warning.split("bias of ")[1].split()[0])) < 0.01

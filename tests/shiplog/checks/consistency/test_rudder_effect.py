@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from channels import channel
 from places import KVLCC2, LAYOUTS
+from tanker_logs import tanker_log
 
 from shiplog.checks.consistency.consistency_check import consistency_findings
 from shiplog.layouts.layout import load_layout
@@ -150,7 +151,7 @@ RUNS = [pytest.param(path, id=path.stem) for path in sorted(KVLCC2.glob("*/*.dat
 @pytest.mark.parametrize("path", RUNS)
 def test_the_reversed_sign_of_every_kvlcc2_run_is_found(path: Path) -> None:
     layout = load_layout(LAYOUTS / f"simman_{path.parent.name}.toml")
-    assert rudder_sign_warning(read_table(path, layout)) is None
+    assert rudder_sign_warning(tanker_log(path)) is None
     as_printed = replace(layout.columns["rudder"], sign=1)
     reversed_layout = replace(layout, columns={**layout.columns, "rudder": as_printed})
     assert rudder_sign_warning(read_table(path, reversed_layout)) is not None
