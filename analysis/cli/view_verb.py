@@ -73,6 +73,8 @@ def _view(arguments: argparse.Namespace) -> ExitCode:
             infos.append(describe_log(log, drawings[-1].stats))
             if align == "execute":
                 drawings[-1] = _aligned(log, drawings[-1])
+            elif len(arguments.log) == 1:
+                drawings[-1] = _with_manoeuvres(log, drawings[-1])
         on_progress("review")
         warnings = _warnings(drawings)
         title = " and ".join(info.name for info in infos)
@@ -85,17 +87,27 @@ def _view(arguments: argparse.Namespace) -> ExitCode:
 
 def _aligned(log: "Log", drawing: "LogDrawing") -> "LogDrawing":
     """Return a drawing aligned at the first execute, or as it is with a warning of the reason."""
-    from analysis.trial.analyse_trial import analyse_trial
-    from analysis.view.execute_alignment import aligned_at_execute, trial_first_execute
+    from analysis.trial.log_manoeuvres import find_log_manoeuvres
+    from analysis.view.execute_alignment import aligned_at_execute, first_execute_of
 
     try:
-        execute, reason = trial_first_execute(analyse_trial(log)), "no manoeuvre was found"
+        execute, reason = first_execute_of(find_log_manoeuvres(log)), "no manoeuvre was found"
     except ShiplogError as error:
         execute, reason = None, f"no manoeuvre could be looked for ({error})"
     if execute is not None:
         return aligned_at_execute(drawing, execute)
     warning = f"{reason}; times and track count from the log's start"
     return replace(drawing, warnings=(*drawing.warnings, warning))
+
+
+def _with_manoeuvres(log: "Log", drawing: "LogDrawing") -> "LogDrawing":
+    """Return a drawing with the manoeuvres of its log; as it is where the log shows no steering."""
+    from analysis.trial.log_manoeuvres import find_log_manoeuvres
+
+    try:
+        return replace(drawing, manoeuvres=find_log_manoeuvres(log))
+    except ShiplogError:
+        return drawing
 
 
 def _output(arguments: argparse.Namespace) -> Path:

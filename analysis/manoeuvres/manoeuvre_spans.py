@@ -1,6 +1,6 @@
 """Spans of the manoeuvres in a trial, with the instants that a drawing marks, without indices."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees, pi
 
 import numpy as np
@@ -48,6 +48,15 @@ class ManoeuvreSpan:
     end_secs: float
     approach_heading: float
     marks: tuple[ManoeuvreMark, ...]
+
+    def later(self, secs: float) -> "ManoeuvreSpan":
+        """Return the span in times that count from another instant, `secs` earlier."""
+        return replace(
+            self,
+            start_secs=self.start_secs + secs,
+            execute_secs=self.execute_secs + secs,
+            end_secs=self.end_secs + secs,
+        )
 
 
 def manoeuvre_spans(signals: TrialSignals) -> tuple[ManoeuvreSpan, ...]:

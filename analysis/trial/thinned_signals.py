@@ -1,4 +1,4 @@
-"""Signals of a trial of any length, thinned while they come in chunks, and its manoeuvres."""
+"""Signals of a trial of any length, thinned while they come in chunks."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

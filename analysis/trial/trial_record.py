@@ -82,13 +82,8 @@ def read_trial(log: Log, options: ReadingOptions, on_progress: ProgressCallback)
 
     screened = screen_without_delays(log, options.sensor_delays, screen)
     stats = screened.screening.stats
-    vessel = options.vessel
-    if vessel is None and log.vessel_toml is not None:
-        vessel = parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}")
-    vessel = with_length(vessel, options.length)
-    clock = with_steering_gear(
-        _clock(stats, log.name), vessel.rudder_rate if vessel else Vessel("", None).rudder_rate
-    )
+    vessel = with_length(options.vessel or attached_vessel(log), options.length)
+    clock = trial_clock(stats, log.name, vessel)
     values, fixes, noise, heading_step = _read(screened, clock, stats, on_progress)
     count = len(values)
     absent = np.full(count, np.nan)
@@ -124,8 +119,30 @@ def read_trial(log: Log, options: ReadingOptions, on_progress: ProgressCallback)
     )
 
 
-def _clock(stats: LogStats, name: str) -> Clock:
-    """Return a clock over all that the log has of steering and motion."""
+def attached_vessel(log: Log) -> Vessel | None:
+    """Return the vessel that a log carries; None where it carries none."""
+    if log.vessel_toml is None:
+        return None
+    return parse_vessel(log.vessel_toml, f"vessel.toml in {log.name}")
+
+
+def trial_clock(stats: LogStats, name: str, vessel: Vessel | None) -> Clock:
+    """Return a clock over all that a log has of steering and motion.
+
+    Parameters
+    ----------
+    stats
+        The statistics of its channels, one source of each quantity.
+    name
+        Of the log, for messages.
+    vessel
+        Its steering gear turns a rudder whose orders are known; None is the usual gear.
+
+    Raises
+    ------
+    LogError
+        The log has neither rudder, heading, yaw rate nor speed over time.
+    """
     used = {
         channel: stats[channel]
         for channel in (*STEERING, *MOTION, *WIND)
@@ -144,7 +161,8 @@ def _clock(stats: LogStats, name: str) -> Clock:
     duration = (end - start) * 1e-9
     step = min((each.interval_secs for each in sampled), default=MAX_STEP_SECS)
     dt = max(float(np.clip(step, MIN_STEP_SECS, MAX_STEP_SECS)), duration / MAX_SAMPLES)
-    return Clock(start, dt, int(duration / dt + 1e-6) + 1, used)
+    clock = Clock(start, dt, int(duration / dt + 1e-6) + 1, used)
+    return with_steering_gear(clock, (vessel or Vessel("", None)).rudder_rate)
 
 
 def _read(

@@ -5,27 +5,25 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreKind
-from analysis.trial.trial_analysis import TrialAnalysis
+from analysis.trial.log_manoeuvres import LogManoeuvres
 from shiplog.types import FloatArray
 
 from .log_drawing import FirstExecute, LogDrawing
 from .series import Series
 
-WITHOUT_ORDER = (ManoeuvreKind.SPEED_RUN, ManoeuvreKind.STRAIGHT)
 
-
-def trial_first_execute(trial: TrialAnalysis) -> FirstExecute | None:
-    """Return the execute of the first manoeuvre; None where only straight runs were sailed.
+def first_execute_of(found: LogManoeuvres) -> FirstExecute | None:
+    """Return the execute of the first manoeuvre; None where only speed runs were sailed.
 
     Parameters
     ----------
-    trial
-        The analysis of a log.
+    found
+        The manoeuvres of a log.
     """
-    for manoeuvre in trial.manoeuvres:
-        if manoeuvre.kind not in WITHOUT_ORDER and np.isfinite(manoeuvre.execute_secs):
-            at = trial.start_ns + round(manoeuvre.execute_secs * 1e9)
-            return FirstExecute(manoeuvre.title, at, manoeuvre.approach_heading)
+    for span in found.spans:
+        if span.kind is not ManoeuvreKind.SPEED_RUN:
+            at = found.start_ns + round(span.execute_secs * 1e9)
+            return FirstExecute(span.title, at, span.approach_heading)
     return None
 
 

@@ -10,15 +10,15 @@ from analysis.identification.identified_ship import IdentifiedShip
 from shiplog.printable import printable
 
 from .panels import Panel
-from .replay_layout import (
+from .replay_layout import SUMMARY
+from .rerun_io import axis_between, chart_view, make_blueprint, plot_view
+from .review_tabs import (
     COLUMN_SHARES,
-    SUMMARY,
     gathered_tabs,
     manoeuvre_tab,
     panel_column,
     track_origin,
 )
-from .rerun_io import axis_between, chart_view, make_blueprint, plot_view
 from .run_sheets import RunSheet
 
 MAX_LARGE_PANELS = 12  # parameters; with more, the panels are in more columns

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.replay.track import RecordedTrack
+from analysis.trial.log_manoeuvres import LogManoeuvres
 from shiplog.checks.channel_stats import ChannelStats, LogStats
 from shiplog.checks.data_quality import defect_warnings, unusable_causes
 from shiplog.checks.log_stats import compute_log_stats
@@ -64,6 +65,8 @@ class LogDrawing:
         Problems of the file and of its channels, each in a sentence.
     execute
         From which the times of the series count; None where they count from the log's start.
+    manoeuvres
+        Those that are shown, and the signals that show them; None where none are looked for.
     """
 
     name: str
@@ -75,6 +78,7 @@ class LogDrawing:
     events: tuple[Event, ...]
     warnings: tuple[str, ...]
     execute: FirstExecute | None = None
+    manoeuvres: LogManoeuvres | None = None
 
     @property
     def zero_ns(self) -> int:

@@ -201,4 +201,5 @@ def _marked(
         series.insert(0, lines)
     if len(gaps):
         series.append(strokes("gaps", gaps, (low, low), Line("gap", np.zeros(0), RED, 5.0)))
-    return replace(panel, series=tuple(series))
+    has_names = panel.legend or len(series) > len(panel.series)
+    return replace(panel, series=tuple(series), legend=has_names)

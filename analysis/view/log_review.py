@@ -10,13 +10,22 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from analysis.manoeuvres.manoeuvre_spans import ManoeuvreSpan
 from shiplog.geodesy import GeographicPositions, LocalPositions
 from shiplog.printable import printable
-from shiplog.types import FloatArray
+from shiplog.types import Event, FloatArray
 
 from .execute_alignment import track_from_execute
 from .log_drawing import LogDrawing
+from .log_manoeuvre_sheets import log_manoeuvre_sheets
 from .log_panels import log_panels
+from .manoeuvre_sheets import (
+    MAX_NAMED,
+    ManoeuvreSheet,
+    manoeuvre_events,
+    with_executes,
+    with_manoeuvres,
+)
 from .panels import Panel
 from .quantity_panel import SOURCE_COLOURS
 from .rerun_io import (
@@ -32,16 +41,10 @@ from .rerun_io import (
     send_style,
     send_text,
 )
+from .review_tabs import gathered_tabs, manoeuvre_tab, track_origin
 from .series import GREY, PALE, Colour
 from .track_chart import TrackChart, make_chart
 
-LEGEND = """
-## Legend
-
-- **red bar** at the foot of a panel: a gap; the line is interrupted there
-- **grey vertical line**: a mark of a person; its text is in the list of events
-- values that cannot be used are not drawn
-"""
 FIRST_SHARE = 1.4  # of the height of other panels: the first one
 OTHERS_NAME = "other channels"
 TILE_PIXELS, MAP_PIXELS = 256, 500  # of a map's tile, and of the track on the map
@@ -61,7 +64,7 @@ def write_log_review(
     path
         The .rrd file to write.
     text
-        The page of text, in Markdown; a legend is added to it.
+        The page of text, in Markdown; from what times count is added to it.
 
     Raises
     ------
@@ -72,11 +75,16 @@ def write_log_review(
     main, others = log_panels(drawings)
     charts, maps = _charts(drawings), list(map(_geographic_track, drawings))
     starts = [each.zero_ns if len(drawings) == 1 else None for each in drawings]
-    events = main_log.events if len(drawings) == 1 else ()
+    spans, sheets = log_manoeuvre_sheets(main_log) if len(drawings) == 1 else ([], [])
+    events = _events(main_log, spans) if len(drawings) == 1 else ()
+    if spans:
+        main = [with_executes(main[0], spans, legend=len(spans) <= MAX_NAMED), *main[1:]]
+        charts = [with_manoeuvres(charts[0], spans)]
     blueprint = _blueprint(
         main,
         others,
         next((chart for chart in charts if chart is not None), None),
+        sheets,
         has_events=bool(events),
         map_zoom=_map_zoom([positions for positions in maps if positions is not None]),
     )
@@ -85,8 +93,12 @@ def write_log_review(
         recording.send_recording_name(printable(" ".join(each.name for each in drawings)))
         if len(drawings) == 1:
             rr.send_recording_start_time_nanos(main_log.stats.span_ns[0], recording=recording)
-        send_text(recording, "summary", text + LEGEND + _times_text(drawings))
+        send_text(recording, "summary", text + _times_text(drawings))
         _send_panels(recording, (*main, *others), starts[0])
+        for sheet in sheets:
+            _send_panels(recording, sheet.panels, starts[0])
+            if sheet.chart is not None:
+                send_chart(recording, track_origin(sheet.origin), sheet.chart, starts[0])
         for number, (chart, positions) in enumerate(zip(charts, maps, strict=True)):
             colours = _colours(number, len(drawings))
             if chart is not None:
@@ -97,21 +109,23 @@ def write_log_review(
             send_events(recording, "events", events, main_log.zero_ns)
 
 
+def _events(drawing: LogDrawing, spans: Sequence[ManoeuvreSpan]) -> tuple[Event, ...]:
+    """Return the events of a log and its manoeuvres, in the order of time."""
+    events = (*drawing.events, *manoeuvre_events(spans, drawing.zero_ns))
+    return tuple(sorted(events, key=lambda event: event.time_ns))
+
+
 def _times_text(drawings: Sequence[LogDrawing]) -> str:
-    """Return from what the times of each log count, as items of the legend."""
+    """Return from what the times of each log count, as the end of the page."""
     items = [
         f"- time of {each.name} counts from the execute of its {each.execute.manoeuvre}, "
-        f"{(each.zero_ns - each.stats.span_ns[0]) * 1e-9:.1f} s after its start\n"
+        f"{(each.zero_ns - each.stats.span_ns[0]) * 1e-9:.1f} s after its start"
         for each in drawings
         if each.execute is not None
     ]
-    if len(items) == len(drawings):
-        return "".join(items)
-    return (
-        "".join(items)
-        + "- time counts from the start of each "
-        + ("other log\n" if items else "log\n")
-    )
+    if len(items) < len(drawings):
+        items.append(f"- time counts from the start of each {'other ' if items else ''}log")
+    return "\n".join(("\n## Time\n", *items, ""))
 
 
 def _recording(drawings: Sequence[LogDrawing]) -> rr.RecordingStream:
@@ -213,11 +227,12 @@ def _blueprint(
     main: list[Panel],
     others: list[Panel],
     chart: TrackChart | None,
+    sheets: Sequence[ManoeuvreSheet],
     *,
     has_events: bool,
     map_zoom: float | None,
 ) -> rrb.Blueprint:
-    """Lay out the page of the main panels, and tabs of the other channels and the map."""
+    """Lay out the page of the main panels, and tabs of manoeuvres, other channels and the map."""
     side: list[rrb.View | rrb.Container] = []
     if chart is not None:
         side.append(chart_view("track", chart))
@@ -234,6 +249,7 @@ def _blueprint(
         name="log",
     )
     tabs: list[rrb.View | rrb.Container] = [page]
+    tabs += gathered_tabs([manoeuvre_tab(sheet) for sheet in sheets], "manoeuvres")
     if main and others:
         columns = 1 + (len(others) > 3) + (len(others) > 8)
         tabs.append(rrb.Grid(*map(plot_view, others), grid_columns=columns, name=OTHERS_NAME))

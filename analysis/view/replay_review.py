@@ -22,13 +22,13 @@ from .further_channels import FurtherChannels
 from .manoeuvre_sheets import (
     MAX_NAMED,
     ManoeuvreSheet,
-    MotionHistory,
     manoeuvre_events,
     manoeuvre_sheet,
     with_executes,
     with_manoeuvres,
 )
-from .replay_layout import SUMMARY, TRACK, ReplayPage, replay_blueprint, track_origin
+from .motion_panels import MotionHistory
+from .replay_layout import SUMMARY, ReplayPage, replay_blueprint
 from .replay_panels import equation_panels, history_panels, trial_panels
 from .rerun_io import (
     save_recording,
@@ -38,6 +38,7 @@ from .rerun_io import (
     send_style,
     send_text,
 )
+from .review_tabs import TRACK, track_origin
 from .sensor_panels import sensor_panels
 from .series import Series
 from .series_builder import SeriesBuilder

@@ -1,7 +1,7 @@
 """Sheets of the runs of an identified ship: measured against simulated, track, and residuals."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from analysis.identification.fit.segment import Segment
 from analysis.identification.identified_ship import IdentifiedShip
@@ -17,12 +17,11 @@ from shiplog.types import FloatArray
 from .manoeuvre_sheets import (
     COMPARED_TITLE,
     ManoeuvreSheet,
-    MotionHistory,
     manoeuvre_sheet,
-    motion_panels,
     with_executes,
     with_manoeuvres,
 )
+from .motion_panels import MotionHistory, motion_panels
 from .panels import Panel
 from .residual_panels import residual_panels
 from .series import GREY, Line, Series
@@ -179,15 +178,7 @@ def _spans(segment: Segment) -> list[ManoeuvreSpan]:
     signals = ThinnedSignals(len(segment), segment.dt_secs, SEARCHED)
     signals.add(0, segment.signals.values)
     start = float(segment.signals.time_secs[0])
-    return [
-        replace(
-            span,
-            start_secs=start + span.start_secs,
-            execute_secs=start + span.execute_secs,
-            end_secs=start + span.end_secs,
-        )
-        for span in manoeuvre_spans(signals.trial_signals())
-    ]
+    return [span.later(start) for span in manoeuvre_spans(signals.trial_signals())]
 
 
 def _manoeuvre_sheets(

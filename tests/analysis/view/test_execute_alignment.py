@@ -9,12 +9,12 @@ from places import SAMPLE_DATA
 from rrd_content import static_components, view_titles
 
 import shiplog
-from analysis import TrialAnalysis, analyse_trial
 from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreKind
+from analysis.trial.log_manoeuvres import LogManoeuvres, find_log_manoeuvres
 from analysis.view.execute_alignment import (
     aligned_at_execute,
+    first_execute_of,
     track_from_execute,
-    trial_first_execute,
 )
 from analysis.view.log_drawing import FirstExecute, LogDrawing, draw_log
 from analysis.view.log_panels import log_panels
@@ -23,8 +23,8 @@ from analysis.view.series import GREY, Line, Series
 
 
 @pytest.fixture(scope="module")
-def trial() -> TrialAnalysis:
-    return analyse_trial(shiplog.read(SAMPLE_DATA / "turning_circle_35.mcap"))
+def found() -> LogManoeuvres:
+    return find_log_manoeuvres(shiplog.read(SAMPLE_DATA / "turning_circle_35.mcap"))
 
 
 @pytest.fixture(scope="module")
@@ -33,10 +33,10 @@ def drawing() -> LogDrawing:
 
 
 @pytest.fixture(scope="module")
-def execute(trial: TrialAnalysis) -> FirstExecute:
-    found = trial_first_execute(trial)
-    assert found is not None
-    return found
+def execute(found: LogManoeuvres) -> FirstExecute:
+    first = first_execute_of(found)
+    assert first is not None
+    return first
 
 
 def test_the_execute_is_the_instant_at_which_the_rudder_was_ordered(
@@ -46,10 +46,10 @@ def test_the_execute_is_the_instant_at_which_the_rudder_was_ordered(
     assert execute.at_ns - drawing.zero_ns == pytest.approx(10e9, abs=0.1e9)
 
 
-def test_a_straight_run_has_no_execute(trial: TrialAnalysis) -> None:
-    straight = replace(trial.manoeuvres[0], kind=ManoeuvreKind.STRAIGHT)
-    assert trial_first_execute(replace(trial, manoeuvres=(straight,))) is None
-    assert trial_first_execute(replace(trial, manoeuvres=(straight, *trial.manoeuvres))) is not None
+def test_a_speed_run_has_no_execute(found: LogManoeuvres) -> None:
+    run = replace(found.spans[0], kind=ManoeuvreKind.SPEED_RUN)
+    assert first_execute_of(replace(found, spans=(run,))) is None
+    assert first_execute_of(replace(found, spans=(run, *found.spans))) is not None
 
 
 def test_times_count_from_the_execute(drawing: LogDrawing, execute: FirstExecute) -> None:

@@ -8,10 +8,11 @@ import pytest
 from channels import START, Values, channel
 from geographic import geographic_log
 from places import SAMPLE_DATA
-from rrd_content import static_components, view_titles
+from rrd_content import static_components, tab_names, view_titles
 from trial_logs import InChunks
 
 import shiplog
+from analysis.trial.log_manoeuvres import find_log_manoeuvres
 from analysis.view.log_drawing import LogDrawing, draw_log
 from analysis.view.log_panels import log_panels
 from analysis.view.log_review import write_log_review
@@ -200,6 +201,31 @@ def test_the_review_of_a_log_has_its_panels_its_track_its_events_and_a_map(
     (page,) = static_components(path, "TextDocument:text")["/summary"]
     assert page.startswith("# trial")
     assert capfd.readouterr().err == ""
+
+
+def test_the_manoeuvres_of_a_log_have_tabs_colours_and_events(
+    ship: LogDrawing, tmp_path: Path
+) -> None:
+    path = tmp_path / "trial.rrd"
+    found = find_log_manoeuvres(shiplog.read(SAMPLE_DATA / "zigzag_20_20.mcap"))
+    write_log_review([replace(ship, manoeuvres=found)], path, "")
+    assert "1 zig-zag 20°/20°" in tab_names(path)
+    assert static_components(path, "LineStrips2D:labels")["/track/0/manoeuvres"] == ["1"]
+    labels = static_components(path, "Points2D:labels")
+    assert labels["/manoeuvre_1/track/marks"][:2] == ["execute", "execute 2"]
+    names = static_components(path, "SeriesLines:names")
+    assert names["/channels_heading/00_execute_1"] == ["1 zig-zag 20°/20°"]
+    assert names["/manoeuvre_1/speed/0_measured"] == ["measured"]
+    without = [replace(ship, manoeuvres=replace(found, spans=()))]
+    write_log_review(without, path, "")
+    assert "/track/0/manoeuvres" not in static_components(path, "LineStrips2D:labels")
+
+
+def test_a_gap_and_a_mark_are_named_in_the_legend() -> None:
+    kept = np.r_[0:20, 45:101]
+    log = TrialLog("a", (channel(np.sin(TIMES[kept]), TIMES[kept], "speed"),))
+    assert log_panels([draw_log(log)])[0][0].legend
+    assert not log_panels([draw_log(TrialLog("a", (channel(TIMES, TIMES, "speed"),)))])[0][0].legend
 
 
 def test_the_review_of_several_logs_has_a_track_and_a_colour_for_each(

@@ -11,13 +11,12 @@ from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreKind, ManoeuvreMark
 from analysis.view.manoeuvre_sheets import (
     MANOEUVRE_COLOURS,
     ManoeuvreSheet,
-    MotionHistory,
     manoeuvre_colour,
     manoeuvre_events,
     manoeuvre_sheet,
-    motion_panels,
     with_manoeuvres,
 )
+from analysis.view.motion_panels import MotionHistory
 from analysis.view.series import GREY, Line, Series
 from analysis.view.track_chart import TrackChart, make_chart
 
@@ -97,23 +96,6 @@ def test_without_positions_a_sheet_has_no_track() -> None:
     ))  # fmt: skip
     assert manoeuvre_sheet(SPAN, HISTORY, [nowhere], None, "m").chart is None
     assert manoeuvre_sheet(SPAN, HISTORY, [], None, "m").chart is None
-
-
-def test_what_is_computed_is_drawn_over_what_is_measured_with_one_legend() -> None:
-    computed = {"yaw_rate": HISTORY.measured["yaw_rate"], "speed": np.full(len(TIMES), 6.0)}
-    history = replace(HISTORY, computed=computed, computed_name="estimated")
-    *_, yaw_rate, speed = motion_panels("m", history)
-    assert [line.name for each in speed.series for line in each.lines] == ["measured", "estimated"]
-    names = [series.name for series in speed.series]
-    assert names == sorted(names)  # Rerun's order: the last on top
-    assert (yaw_rate.legend, speed.legend) == (True, False)
-
-
-def test_what_is_not_measured_has_no_panel() -> None:
-    unknown = np.full(len(TIMES), np.nan)
-    measured = {**HISTORY.measured, "speed": unknown, "heading": unknown}
-    names = [panel.name for panel in motion_panels("m", replace(HISTORY, measured=measured))]
-    assert names == ["m/steering/rudder", "m/yaw_rate"]
 
 
 def test_on_the_track_of_the_trial_a_manoeuvre_has_its_number_its_colour_and_its_turns(
