@@ -10,10 +10,11 @@ from analysis.identification.identified_ship import IdentifiedShip
 from shiplog.printable import printable
 
 from .panels import Panel
-from .replay_layout import SUMMARY
 from .rerun_io import axis_between, chart_view, make_blueprint, plot_view
 from .review_tabs import (
+    CHART_SHARES,
     COLUMN_SHARES,
+    SUMMARY,
     gathered_tabs,
     manoeuvre_tab,
     panel_column,
@@ -67,7 +68,7 @@ def _run_tab(sheet: RunSheet) -> rrb.Container:
     right: rrb.View | rrb.Container = errors
     if sheet.chart is not None:
         chart = chart_view(track_origin(sheet.origin), sheet.chart)
-        right = rrb.Vertical(chart, errors, row_shares=[3, 2])
+        right = rrb.Vertical(chart, errors, row_shares=CHART_SHARES)
     left = panel_column(sheet.motion, axis_between(sheet.start_secs, sheet.end_secs))
     name = printable(sheet.title)
     if not sheet.manoeuvres:

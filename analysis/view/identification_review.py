@@ -15,9 +15,8 @@ from shiplog.printable import printable
 from .identification_layout import identification_blueprint, text_origin
 from .panels import Panel
 from .parameter_panels import parameter_panels
-from .replay_layout import SUMMARY
 from .rerun_io import save_recording, send_chart, send_points, send_style, send_text
-from .review_tabs import track_origin
+from .review_tabs import SUMMARY, track_origin
 from .run_sheets import run_sheets
 
 

@@ -10,17 +10,18 @@ from shiplog.units import CATALOGUE
 
 from .channel_series import DrawnQuantity
 from .log_drawing import LogDrawing
-from .panels import Panel, range_text, strokes, title_of, with_range, words
+from .panels import Panel, range_text, strokes, title_of, varies, with_range, words
 from .quantity_panel import SOURCE_COLOURS, entity_part, joined_panel, turned_together
 from .series import BLUE, GREEN, GREY, ORANGE, RED, Colour, Line, Series
+from .steering_panels import MAX_OVERLAID_TURN, RUDDER_COLOUR
 
 MAIN_PANELS = ("heading",), ("rudder",), ("yaw_rate",), ("speed", "speed_over_ground"), ("rpm",)
 COLOURS = {"heading": BLUE, "yaw_rate": BLUE, "speed": ORANGE, "speed_over_ground": ORANGE,
-           "rudder": GREEN, "rpm": GREEN}  # fmt: skip
-MAX_OVERLAID_TURN = 180.0  # deg: up to here the rudder can be read over the heading
+           "rudder": RUDDER_COLOUR, "rpm": GREEN}  # fmt: skip
 REFERENCE_SECS = (
     10.0  # of a heading, at its start or before the execute: its median is the reference
 )
+MARKS, GAPS = "00_marks", "gaps"  # series: marks are drawn below the others
 MAX_MARKS = 50  # of people, drawn as vertical lines
 
 
@@ -29,8 +30,9 @@ def log_panels(drawings: Sequence[LogDrawing]) -> tuple[list[Panel], list[Panel]
 
     Where the ship turns by less than `MAX_OVERLAID_TURN`, as in a zig-zag, the rudder is drawn over
     the heading, which counts from the one at the start, or before the execute where times count
-    from it. Several logs have a colour each. Gaps are
-    red bars at the foot of a panel, marks of people vertical lines.
+    from it. Several logs have a colour each. Gaps are red bars at the foot of a panel, marks of
+    people vertical lines. Constant revolutions have no panel beside that of the speed, whose title
+    gives them.
 
     Parameters
     ----------
@@ -49,9 +51,26 @@ def log_panels(drawings: Sequence[LogDrawing]) -> tuple[list[Panel], list[Panel]
         panels.append(_heading_from_execute(drawings, headings))
         main = main[1:]
     panels += [_panel(drawings, group) for group in main if group]
+    panels = _without_constant_rpm(panels)
+    if any(panel.series[0].name == MARKS for panel in panels):
+        panels[0] = replace(panels[0], legend=True)
     if len(drawings) > 1:  # the first legend serves all
         panels = [replace(panel, legend=panel is panels[0]) for panel in panels]
     return panels, [_panel(drawings, group) for group in others]
+
+
+def _without_constant_rpm(panels: list[Panel]) -> list[Panel]:
+    """Return panels without that of constant revolutions, if the one of the speed is before it."""
+    names = [panel.name for panel in panels[-2:]]
+    if len(names) < 2 or not names[0].startswith("channels_speed") or names[1] != "channels_rpm":
+        return panels
+    *others, speed, rpm = panels
+    measured = [each for each in rpm.series if each.name != MARKS]
+    values = np.concatenate([line.values for each in measured for line in each.lines])
+    if varies(values) or any(each.name == GAPS for each in measured):
+        return panels
+    title = f"{speed.title}; at {np.nanmedian(values):.4g} rpm"
+    return [*others, replace(speed, title=title)]
 
 
 def _is_usual(quantity: DrawnQuantity) -> bool:
@@ -197,9 +216,8 @@ def _marked(
     series = list(panel.series)
     if marks:
         spans = np.column_stack((marks, marks))
-        lines = strokes("00_marks", spans, (low, high), Line("mark", np.zeros(0), GREY, 0.8))
+        lines = strokes(MARKS, spans, (low, high), Line("mark", np.zeros(0), GREY, 0.8))
         series.insert(0, lines)
     if len(gaps):
-        series.append(strokes("gaps", gaps, (low, low), Line("gap", np.zeros(0), RED, 5.0)))
-    has_names = panel.legend or len(series) > len(panel.series)
-    return replace(panel, series=tuple(series), legend=has_names)
+        series.append(strokes(GAPS, gaps, (low, low), Line("gap", np.zeros(0), RED, 5.0)))
+    return replace(panel, series=tuple(series), legend=panel.legend or len(gaps) > 0)

@@ -29,8 +29,7 @@ from .manoeuvre_sheets import (
 from .panels import Panel
 from .quantity_panel import SOURCE_COLOURS
 from .rerun_io import (
-    chart_view,
-    events_view,
+    axis_between,
     make_blueprint,
     plot_view,
     save_recording,
@@ -41,11 +40,10 @@ from .rerun_io import (
     send_style,
     send_text,
 )
-from .review_tabs import gathered_tabs, manoeuvre_tab, track_origin
+from .review_tabs import SUMMARY, TRACK, gathered_tabs, manoeuvre_tab, overview_tab, track_origin
 from .series import GREY, PALE, Colour
 from .track_chart import TrackChart, make_chart
 
-FIRST_SHARE = 1.4  # of the height of other panels: the first one
 OTHERS_NAME = "other channels"
 TILE_PIXELS, MAP_PIXELS = 256, 500  # of a map's tile, and of the track on the map
 MAX_ZOOM = 18.0  # of the tiles that servers have
@@ -93,7 +91,7 @@ def write_log_review(
         recording.send_recording_name(printable(" ".join(each.name for each in drawings)))
         if len(drawings) == 1:
             rr.send_recording_start_time_nanos(main_log.stats.span_ns[0], recording=recording)
-        send_text(recording, "summary", text + _times_text(drawings))
+        send_text(recording, SUMMARY, text + _times_text(drawings))
         _send_panels(recording, (*main, *others), starts[0])
         for sheet in sheets:
             _send_panels(recording, sheet.panels, starts[0])
@@ -102,7 +100,7 @@ def write_log_review(
         for number, (chart, positions) in enumerate(zip(charts, maps, strict=True)):
             colours = _colours(number, len(drawings))
             if chart is not None:
-                send_chart(recording, f"track/{number}", chart, starts[number], colours)
+                send_chart(recording, f"{TRACK}/{number}", chart, starts[number], colours)
             if positions is not None:
                 send_map_track(recording, f"map/{number}", positions, colours[0])
         if events:
@@ -233,26 +231,24 @@ def _blueprint(
     map_zoom: float | None,
 ) -> rrb.Blueprint:
     """Lay out the page of the main panels, and tabs of manoeuvres, other channels and the map."""
-    side: list[rrb.View | rrb.Container] = []
-    if chart is not None:
-        side.append(chart_view("track", chart))
-    side.append(rrb.TextDocumentView(origin="summary", name="summary"))
-    if has_events:
-        side.append(events_view())
-    shares = ([3.0] if chart is not None else []) + [2.0, 1.0]
-    plots = main or others
-    right = rrb.Vertical(*side, row_shares=shares[: len(side)])
-    page: rrb.Container = rrb.Horizontal(
-        rrb.Vertical(*map(plot_view, plots), row_shares=[FIRST_SHARE, *[1] * (len(plots) - 1)]),
-        right,
-        column_shares=[3, 2],
-        name="log",
+    axis = _time_axis([*main, *others])
+    page = overview_tab(
+        "log", main or others, axis, chart, has_events=has_events, has_manoeuvres=bool(sheets)
     )
     tabs: list[rrb.View | rrb.Container] = [page]
     tabs += gathered_tabs([manoeuvre_tab(sheet) for sheet in sheets], "manoeuvres")
     if main and others:
         columns = 1 + (len(others) > 3) + (len(others) > 8)
-        tabs.append(rrb.Grid(*map(plot_view, others), grid_columns=columns, name=OTHERS_NAME))
+        views = (plot_view(panel, axis) for panel in others)
+        tabs.append(rrb.Grid(*views, grid_columns=columns, name=OTHERS_NAME))
     if map_zoom is not None:
         tabs.append(rrb.MapView(origin="map", name=MAP_NAME, zoom=map_zoom))
     return make_blueprint(rrb.Tabs(*tabs, active_tab=0) if len(tabs) > 1 else page)
+
+
+def _time_axis(panels: Sequence[Panel]) -> rrb.TimeAxis:
+    """Return an axis over all series of some panels."""
+    spans = [s.time_secs[[0, -1]] for panel in panels for s in panel.series if len(s.time_secs)]
+    if not spans:
+        return axis_between(0.0, 1.0)
+    return axis_between(float(np.min(spans)), float(np.max(spans)))

@@ -104,6 +104,8 @@ def _output_panel(origin: str, history: MotionHistory, name: str) -> Panel | Non
     lines = [line for line in lines if np.isfinite(line.values).any()]
     if not lines:
         return None
+    if len(lines) == 1:
+        lines = [replace(lines[0], colour=BLUE, width=WIDTH)]
     drawn = [  # the last one on top, by the alphabet
         _drawn(Series(f"{i}_{line.name}", history.time_secs, (line,), spiky=not i))
         for i, line in enumerate(lines)

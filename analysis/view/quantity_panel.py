@@ -12,7 +12,6 @@ from .panels import Panel, limits, title_of
 from .series import BLUE, CYAN, GREEN, GREY, ORANGE, RED, Colour, Series
 
 SOURCE_COLOURS = BLUE, ORANGE, GREEN, RED, CYAN, GREY
-LEGEND_SHARE = 0.15  # of an axis, above the values, for each name in the legend
 
 
 def quantity_panel(name: str, quantity: DrawnQuantity, drawn: list[Series]) -> Panel:
@@ -50,12 +49,11 @@ def joined_panel(
         A colour for each line, repeated where they are fewer; without any the lines keep theirs.
     """
     lines = [line for each in drawn for line in each.lines]
-    low, high = limits(*(line.values for line in lines))
     drawn = _coloured(drawn, list(colours))
-    if len(lines) > 1:
-        high += LEGEND_SHARE * len(lines) * (high - low)
     named = (replace(each, name=f"{i}_{entity_part(each.name)}") for i, each in enumerate(drawn))
-    return Panel(name, title, tuple(named), (low, high), legend=len(lines) > 1)
+    return Panel(
+        name, title, tuple(named), limits(*(line.values for line in lines)), legend=len(lines) > 1
+    )
 
 
 def turned_together(drawn: Sequence[Series], turn: float) -> list[Series]:

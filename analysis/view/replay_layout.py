@@ -7,11 +7,9 @@ import rerun.blueprint as rrb
 
 from .manoeuvre_sheets import ManoeuvreSheet
 from .panels import Panel
-from .rerun_io import axis_between, chart_view, events_view, make_blueprint, plot_view
-from .review_tabs import COLUMN_SHARES, TRACK, gathered_tabs, manoeuvre_tab, panel_column
+from .rerun_io import axis_between, make_blueprint, plot_view
+from .review_tabs import gathered_tabs, manoeuvre_tab, overview_tab
 from .track_chart import TrackChart
-
-SUMMARY = "summary"  # entity of the page of text
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +67,11 @@ def replay_blueprint(page: ReplayPage) -> rrb.Blueprint:
     def column(panels: list[Panel]) -> rrb.Vertical:
         return rrb.Vertical(*(plot_view(panel, axis) for panel in panels))
 
-    tabs: list[rrb.View | rrb.Container] = [_trial_tab(page, axis)]
+    trial = overview_tab(
+        "trial", page.motion, axis, page.chart,
+        has_events=page.has_events, has_manoeuvres=bool(page.manoeuvres),
+    )  # fmt: skip
+    tabs: list[rrb.View | rrb.Container] = [trial]
     manoeuvres = [manoeuvre_tab(sheet) for sheet in page.manoeuvres]
     tabs += gathered_tabs(manoeuvres, "manoeuvres")
     tabs.append(rrb.Horizontal(*map(column, page.equations), name="filter"))
@@ -84,17 +86,3 @@ def replay_blueprint(page: ReplayPage) -> rrb.Blueprint:
         views = (plot_view(panel, axis) for panel in page.further)
         tabs.append(rrb.Grid(*views, grid_columns=count, name="further channels"))
     return make_blueprint(rrb.Tabs(*tabs, active_tab=0))
-
-
-def _trial_tab(page: ReplayPage, axis: rrb.TimeAxis) -> rrb.Container:
-    """Return the panels of the trial beside the track, with summary and events below it."""
-    side: list[rrb.View | rrb.Container] = []
-    if page.chart is not None:
-        side.append(chart_view(TRACK, page.chart))
-    texts: list[rrb.View] = [rrb.TextDocumentView(origin=SUMMARY, name="summary")]
-    if page.has_events:
-        texts.append(events_view())
-    side.append(rrb.Tabs(*texts, active_tab=len(texts) - 1) if len(texts) > 1 else texts[0])
-    right = rrb.Vertical(*side, row_shares=[3, 2] if len(side) > 1 else [1])
-    left = panel_column(page.motion, axis)
-    return rrb.Horizontal(left, right, column_shares=COLUMN_SHARES, name="trial")

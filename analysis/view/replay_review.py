@@ -28,7 +28,7 @@ from .manoeuvre_sheets import (
     with_manoeuvres,
 )
 from .motion_panels import MotionHistory
-from .replay_layout import SUMMARY, ReplayPage, replay_blueprint
+from .replay_layout import ReplayPage, replay_blueprint
 from .replay_panels import equation_panels, history_panels, trial_panels
 from .rerun_io import (
     save_recording,
@@ -38,7 +38,7 @@ from .rerun_io import (
     send_style,
     send_text,
 )
-from .review_tabs import TRACK, track_origin
+from .review_tabs import SUMMARY, TRACK, track_origin
 from .sensor_panels import sensor_panels
 from .series import Series
 from .series_builder import SeriesBuilder

@@ -9,12 +9,47 @@ from shiplog.ships.paper import PAPER_INPUTS
 
 from .manoeuvre_sheets import ManoeuvreSheet
 from .panels import Panel
-from .rerun_io import axis_between, chart_view, plot_view
+from .rerun_io import axis_between, chart_view, events_view, plot_view
+from .track_chart import TrackChart
 
-TRACK = "track"  # the last part of the entity of a track
+SUMMARY, TRACK = "summary", "track"  # entities: of the page of text, and the end of a track's
 FIRST_SHARE, INPUT_SHARE = 1.3, 0.7  # heights of the first panel and of inputs, over others
 COLUMN_SHARES = [3, 2]  # widths: panels over time, and track
+CHART_SHARES = [3, 2]  # heights: track, and text
 MAX_TABS = 5  # of a kind among the other tabs; more are in a tab of their own
+
+
+def overview_tab(
+    name: str,
+    panels: Sequence[Panel],
+    axis: rrb.TimeAxis,
+    chart: TrackChart | None,
+    *,
+    has_events: bool,
+    has_manoeuvres: bool,
+) -> rrb.Container:
+    """Return panels beside the track, and below this one the summary and the events.
+
+    Parameters
+    ----------
+    name
+        Of the tab.
+    panels, axis
+        The panels, and their time axis.
+    chart
+        The track; None where no position is known.
+    has_events, has_manoeuvres
+        Whether there are events, and whether manoeuvres are among them: then they are shown first.
+    """
+    texts: list[rrb.View] = [rrb.TextDocumentView(origin=SUMMARY, name="summary")]
+    if has_events:
+        texts.append(events_view())
+    right: rrb.View | rrb.Container = texts[0]
+    if len(texts) > 1:
+        right = rrb.Tabs(*texts, active_tab=int(has_manoeuvres))
+    if chart is not None:
+        right = rrb.Vertical(chart_view(TRACK, chart), right, row_shares=CHART_SHARES)
+    return rrb.Horizontal(panel_column(panels, axis), right, column_shares=COLUMN_SHARES, name=name)
 
 
 def manoeuvre_tab(sheet: ManoeuvreSheet) -> rrb.Container:

@@ -28,7 +28,8 @@ def test_a_log_becomes_a_review_with_its_content_and_no_viewer_opens(
     assert main(["view", LOG, "-o", "out.rrd"]) == ExitCode.OK
     titles = view_titles(folder / "out.rrd")
     assert any(title.startswith("heading from 0.0°") for title in titles)
-    assert {"yaw rate [deg/min]: -41.21 to 38.58", "rpm: 80", "summary"} <= set(titles)
+    assert {"yaw rate [deg/min]: -41.21 to 38.58", "summary", "events"} <= set(titles)
+    assert any(title.endswith("; at 80 rpm") for title in titles)
     (page,) = static_components(folder / "out.rrd", "TextDocument:text")["/summary"]
     assert "| /rudder/simulated | 6001 | 10 |" in page
     assert "out.rrd" in capsys.readouterr().err

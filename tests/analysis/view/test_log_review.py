@@ -75,10 +75,19 @@ def test_speeds_through_the_water_and_over_the_ground_share_a_panel() -> None:
     water = channel(np.full(101, 9.0), TIMES, "speed")
     titles = [panel.title for panel in panels_of(TrialLog("a", (*speeds, ground, water)))]
     assert titles == [
-        "speed and speed over ground [kn]: 15.55 to 17.49",
-        "rpm: 0",
+        "speed and speed over ground [kn]: 15.55 to 17.49; at 0 rpm",
         "heel [deg]: 57.3",
     ]
+
+
+def test_revolutions_have_a_panel_where_they_vary_or_have_a_gap_or_stand_alone() -> None:
+    kept = np.r_[0:20, 45:101]
+    speed = channel(np.full(101, 5.0), TIMES, "speed")
+    for times, values in ((TIMES, 60 + TIMES / 10), (TIMES[kept], np.full(76, 80.0))):
+        rpm = channel(values, times, "rpm")
+        assert panels_of(TrialLog("a", (speed, rpm)))[-1].name == "channels_rpm"
+    alone = channel(np.full(101, 80.0), TIMES, "rpm")
+    assert [panel.title for panel in panels_of(TrialLog("a", (alone,)))] == ["rpm: 80"]
 
 
 def test_a_quantity_in_an_unknown_unit_is_drawn_in_it_alone() -> None:
