@@ -3,10 +3,11 @@
 from math import radians
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from shiplog.types import FloatArray
+
+from .smoothing import moving_median
 
 REST_TOLERANCE = radians(0.5)  # a rudder within it is at rest, or held at one angle
 REST_SECS = 3.0  # at the start of a run, whose median rudder is the rest position
@@ -62,10 +63,7 @@ def first_execute(rudder: FloatArray, dt: float) -> int | None:
 
 def remove_spikes(rudder: FloatArray, dt: float) -> FloatArray:
     """Remove deflections shorter than `MAX_SPIKE_SECS` by a running median."""
-    half = round(MAX_SPIKE_SECS / 2 / dt)
-    # a replay, which looks for manoeuvres, starts without scipy's slow filters
-    windows = sliding_window_view(np.pad(rudder, half, "symmetric"), 1 + 2 * half)
-    return np.asarray(np.median(windows, axis=1))
+    return moving_median(rudder, round(MAX_SPIKE_SECS / 2 / dt))
 
 
 def smooth_heading(heading: FloatArray, half_width: int) -> FloatArray:

@@ -9,6 +9,7 @@ from .execute import remove_spikes
 from .found_manoeuvre import FoundManoeuvre
 from .rudder_levels import HeldLevel, held_levels
 from .sailed_manoeuvre import ManoeuvreKind
+from .smoothing import moving_mean
 from .trial_signals import TrialSignals, noise_std
 
 MIN_RPM_CHANGE = 0.02  # of the largest revolutions, within ten seconds: they are changed
@@ -59,13 +60,11 @@ def find_speed_manoeuvres(signals: TrialSignals) -> Iterator[FoundManoeuvre]:
 def _stop(
     signals: TrialSignals, levels: list[HeldLevel], before: HeldLevel
 ) -> FoundManoeuvre | None:
-    from scipy.ndimage import uniform_filter1d  # noqa: PLC0415 - slow to import
-
     execute, speed = before.last, signals.speed
     initial = float(np.median(speed[max(0, execute - round(5 / signals.dt_secs)) : execute + 1]))
     later = [held for held in levels if held.first > execute and held.level > before.level / 3]
     end = later[0].first if later else len(signals)
-    mean = uniform_filter1d(speed[execute:end], 1 + 2 * round(MEAN_SECS / signals.dt_secs))
+    mean = moving_mean(speed[execute:end], 1 + 2 * round(MEAN_SECS / signals.dt_secs))
     stopped = np.flatnonzero(mean <= (0.0 if np.min(mean) <= 0 else SLOW_SHARE * initial))
     if len(stopped):
         end = min(end, execute + int(stopped[0]) + 1 + round(MEAN_SECS / signals.dt_secs))

@@ -10,14 +10,13 @@ from itertools import pairwise
 from math import radians
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
-from scipy.signal import savgol_filter
 
 from shiplog.types import FloatArray
 
 from .found_manoeuvre import FoundManoeuvre
 from .rudder_levels import MIN_HELD_SECS, NOISE_MARGIN, HeldLevel, held_levels
 from .sailed_manoeuvre import ManoeuvreKind
+from .smoothing import fitted_slope, moving_mean
 from .trial_signals import TrialSignals, noise_std
 
 MIN_SPIRAL_LEVELS = 5
@@ -54,7 +53,7 @@ def find_direct_spirals(rudder: FloatArray, neutral: float, dt: float) -> Iterat
         return
     noise = noise_std(rudder) / np.sqrt(count)
     movement = max(0.8 * MIN_SPIRAL_STEP, NOISE_MARGIN * np.sqrt(2.0) * noise)
-    levels = held_levels(uniform_filter1d(rudder, count), dt, movement, RUDDER_SMOOTHING_SECS / 2)
+    levels = held_levels(moving_mean(rudder, count), dt, movement, RUDDER_SMOOTHING_SECS / 2)
     joined = _joined(levels, dt, MIN_SPIRAL_STEP / 2, 2 * MIN_HELD_SECS)
     steps = _Steps(MIN_SPIRAL_STEP, MIN_SIDE, MAX_PAUSE_SECS)
     for chain in _chains(joined, dt, steps, neutral):
@@ -81,7 +80,7 @@ def find_reverse_spirals(
     half = round(float(np.clip(samples * dt / 2, *RATE_SMOOTHING_SECS)) / dt)
     if not 2 <= half < len(heading) // 2 or not np.isfinite(heading).all():
         return
-    rate = savgol_filter(heading, 2 * half + 1, 2, deriv=1, delta=dt)
+    rate = fitted_slope(heading, half, dt)
     if np.ptp(rate) < 2 * MIN_RATE_SIDE:
         return
     rate_noise = noise / (dt * np.sqrt((2 * half + 1) ** 3 / 12.0))
@@ -157,7 +156,7 @@ def is_steered(rudder: FloatArray, found: FoundManoeuvre, dt: float) -> bool:
     for the rate follows it with a delay.
     """
     count = 1 + 2 * round(STEERING_SMOOTHING_SECS / 2 / dt)
-    smooth = uniform_filter1d(rudder, count)
+    smooth = moving_mean(rudder, count)
     least = MIN_BEYOND + NOISE_MARGIN * noise_std(rudder) / np.sqrt(count)
     spans = [
         (int(first), int(last - DELAY_SHARE * (last - first)) + 1)
