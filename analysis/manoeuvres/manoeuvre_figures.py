@@ -69,7 +69,7 @@ def manoeuvre_marks(
 ) -> tuple[ManoeuvreMark, ...]:
     """Return the instants that the figures mark."""
     dt = case.signals.dt_secs
-    marks = execute_marks(part, case.execute)
+    marks = execute_marks(part.found, case.execute, dt)
     marks += [
         ManoeuvreMark(index.name.removeprefix("time to "), index.value)
         for index in indices
@@ -88,18 +88,20 @@ def manoeuvre_marks(
     return tuple(sorted(marks, key=lambda mark: mark.time_secs))
 
 
-def execute_marks(part: ManoeuvrePart, execute: float) -> list[ManoeuvreMark]:
+def execute_marks(found: FoundManoeuvre, execute: float, dt: float) -> list[ManoeuvreMark]:
     """Return the marks of the executes; a manoeuvre without an order has none.
 
     Parameters
     ----------
-    part
-        The part of the trial with the manoeuvre.
+    found
+        The manoeuvre.
     execute
         The sample of the first execute, from which their times count.
+    dt
+        Sample interval, s.
     """
-    dt, found = part.filled.dt_secs, part.found
-    marks = [ManoeuvreMark("execute", 0.0)] if part.side or found.kind in EXECUTED else []
+    has_order = np.isfinite(found.level) or found.kind in EXECUTED
+    marks = [ManoeuvreMark("execute", 0.0)] if has_order else []
     return marks + [
         ManoeuvreMark(f"execute {k}", (at - execute) * dt)
         for k, at in enumerate(found.reversals, 2)

@@ -81,24 +81,27 @@ def manoeuvre_spans(signals: TrialSignals) -> tuple[ManoeuvreSpan, ...]:
 
 def _span(signals: TrialSignals, found: FoundManoeuvre, number: int) -> ManoeuvreSpan:
     part = ManoeuvrePart(signals, found, RuleSettings())
-    dt, execute = part.filled.dt_secs, part.execute.sample
-    approach = approach_heading(part.filled.heading, round(execute), dt)
-    marks = execute_marks(part, execute)
-    change = part.filled.heading - approach
+    # the part of a long manoeuvre is thinned; times are those of the signals
+    dt = signals.dt_secs
+    execute_secs = part.offset_secs + part.execute.sample * part.filled.dt_secs
+    execute = execute_secs / dt
+    approach = approach_heading(signals.heading, round(execute), dt)
+    marks = execute_marks(found, execute, dt)
+    change = signals.heading - approach
     if found.kind is ManoeuvreKind.TURNING_CIRCLE:
-        marks += _turn_marks(np.abs(change), execute, dt)
+        marks += _turn_marks(np.abs(change[: found.end]), execute, dt)
     if found.kind is ManoeuvreKind.ZIGZAG:
         marks += [
             ManoeuvreMark(f"overshoot {k}", (at - execute) * dt)
-            for k, at in enumerate(overshoot_samples(part.found, change), 1)
+            for k, at in enumerate(overshoot_samples(found, change), 1)
         ]
     return ManoeuvreSpan(
         number=number,
         kind=found.kind,
         title=part.title(),
         start_secs=part.offset_secs,
-        execute_secs=part.offset_secs + execute * dt,
-        end_secs=part.offset_secs + part.found.end * dt,
+        execute_secs=execute_secs,
+        end_secs=min(found.end, len(signals) - 1) * dt,
         approach_heading=approach,
         marks=tuple(sorted(marks, key=lambda mark: mark.time_secs)),
     )

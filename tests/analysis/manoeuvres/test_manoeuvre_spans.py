@@ -50,3 +50,15 @@ def test_a_log_of_random_rudder_or_of_a_straight_course_has_no_manoeuvre() -> No
     assert spans("pseudo_random") == ()
     signals = trial_signals("zigzag_20_20").part(0, 90)  # before the execute
     assert manoeuvre_spans(signals) == ()
+
+
+def test_the_marks_of_a_long_manoeuvre_are_as_exact_as_its_signals(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    signals = trial_signals("zigzag_20_20")
+    (whole,) = manoeuvre_spans(signals)
+    monkeypatch.setattr("analysis.manoeuvres.manoeuvre_part.MAX_PART_SAMPLES", 60)
+    (thinned,) = manoeuvre_spans(signals)
+    assert len(thinned.marks) == len(whole.marks)
+    for mark, exact in zip(thinned.marks, whole.marks, strict=True):
+        assert mark.time_secs == pytest.approx(exact.time_secs, abs=1e-6)
