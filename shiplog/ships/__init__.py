@@ -31,8 +31,8 @@ def model_names() -> tuple[str, ...]:
 
     Examples
     --------
-    >>> model_names()
-    ('burylin', 'burylin-tied', 'drift-lag', 'nomoto', 'norrbin', 'slipstream', 'three-dof')
+    >>> {"burylin", "nomoto", "three-dof"} <= set(model_names())  # packages may add others
+    True
     """
     return extension_names(GROUP)
 
