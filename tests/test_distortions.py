@@ -42,19 +42,23 @@ def test_the_undistorted_trial_is_right_without_a_warning() -> None:
     assert (outcome.kind, outcome.messages) == ("right", ())
 
 
+@pytest.mark.slow
 def test_no_wrong_result_is_silent(outcomes: list[Outcome]) -> None:
     assert of_kind(outcomes, SILENT) == [], counts_by_family(outcomes)
 
 
+@pytest.mark.slow
 def test_every_wrong_result_has_a_warning_that_names_the_cause(outcomes: list[Outcome]) -> None:
     for kind in (OTHER_WARNING, OTHER_REFUSAL):
         assert of_kind(outcomes, kind) == [], counts_by_family(outcomes)
 
 
+@pytest.mark.slow
 def test_no_distortion_ends_in_a_traceback(outcomes: list[Outcome]) -> None:
     assert of_kind(outcomes, TRACEBACK) == []
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("fit_alone")
 def test_an_identification_of_a_distorted_trial_is_right_or_names_the_cause() -> None:
     chosen = identified_cases()[::3]  # the benchmark runs all
