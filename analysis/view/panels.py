@@ -109,6 +109,17 @@ def with_range(title: str, *arrays: FloatArray) -> str:
     return f"{title}: {text}" if text else title
 
 
+def with_bounds(axis: tuple[float, float], bound: float) -> tuple[float, float]:
+    """Return the limits of an axis, widened to twice a bound that is drawn on both sides of zero.
+
+    Examples
+    --------
+    >>> with_bounds((-0.1, 7.0), 2.0)
+    (-4.0, 7.0)
+    """
+    return min(axis[0], -2 * bound), max(axis[1], 2 * bound)
+
+
 def free_corner(panel: Panel) -> Corner:
     """Return a corner of a panel that its lines cross hardly more than any other, for its legend.
 

@@ -20,6 +20,7 @@ from .panels import (
     thousands,
     title_of,
     varies,
+    with_bounds,
     with_range,
     words,
 )
@@ -114,7 +115,7 @@ def _innovation(findings: Findings, drawn: Drawn, name: str) -> Panel:
         f"innovation_{name}",
         f"{words(name)} innovation / expected σ",
         (normalised, _guides(findings, "±2σ", BAND_STDS, "sigma_limits")),
-        limits(normalised.lines[0].values, np.array([-2.0, 2.0]) * BAND_STDS),
+        with_bounds(limits(normalised.lines[0].values), BAND_STDS),
         legend=True,
     )
 

@@ -8,7 +8,7 @@ from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
 from .decimation import decimated
-from .panels import Panel, limits, words
+from .panels import Panel, limits, with_bounds, words
 from .series import BLUE, CYAN, GREEN, GREY, ORANGE, Line, Series, measured_line
 
 COLOURS = dict(zip(MODEL_OUTPUTS, (BLUE, ORANGE, CYAN, GREEN), strict=True))
@@ -62,7 +62,7 @@ def _residual_panel(origin: str, segment: Segment, name: str, normalised: FloatA
     at, values = _samples(segment, normalised)
     drawn = Series("normalised", at, (Line("residual", values, COLOURS[name]),), spiky=True)
     bounds = _bounds(segment.signals.time_secs[[0, -1]], BAND_SIGMAS, "±2σ")
-    axis = limits(values, np.array([-2.0, 2.0]) * BAND_SIGMAS)
+    axis = with_bounds(limits(values), BAND_SIGMAS)
     title = f"{segment.name}: {words(name)} residual / σ"
     return Panel(f"{origin}/residual_{name}", title, (decimated(drawn), bounds), axis, legend=True)
 

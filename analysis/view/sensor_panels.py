@@ -1,6 +1,7 @@
 """Series and panels of sensor errors, heading, position, current and wind, as far as states."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from analysis.report.display import BAND_STDS
 from shiplog.checks.channel_stats import gap_threshold_secs
 from shiplog.resampling import Clock
 
-from .panels import Panel, limits, rounded, title_of
+from .panels import Panel, limits, rounded, title_of, with_bounds
 from .series import BLUE, CYAN, GREY, ORANGE, RED, Colour, Line, MeasuredSamples, Series, banded
 
 SETTLED_SHARE = 0.25  # of a trial: the band before it is that of the prior, and sets no axis
@@ -114,11 +115,14 @@ def sensor_panels(
         for name in INNOVATIONS
         if f"innovation_{name}/normalised" in drawn
     ]
+    # the first legend of a kind serves all
+    histories = [replace(panel, legend=panel is histories[0]) for panel in histories]
+    innovations = [replace(panel, legend=panel is innovations[0]) for panel in innovations]
     if "sensor_heading/state" not in drawn:
         return histories, innovations
     measured, state = drawn["sensor_heading/measured"], drawn["sensor_heading/state"]
     axis = limits(measured.lines[0].values, state.lines[-1].values)
-    heading = Panel("sensor_heading", "heading [deg]", (measured, state), axis)
+    heading = Panel("sensor_heading", "heading [deg]", (measured, state), axis, legend=True)
     return histories, [heading, *innovations]
 
 
@@ -144,5 +148,6 @@ def _innovation(name: str, series: Series) -> Panel:
         f"innovation_{name}",
         f"{INNOVATIONS[name]} innovation / expected σ",
         (series, Series("sigma_limits", span, tuple(guides))),
-        limits(series.lines[0].values, np.array([-2.0, 2.0]) * BAND_STDS),
+        with_bounds(limits(series.lines[0].values), BAND_STDS),
+        legend=True,
     )

@@ -74,6 +74,13 @@ def test_innovations_of_heading_and_position_are_over_their_std(
         normalised = estimates.innovations[:, i] / estimates.innovation_stds[:, i]
         drawn = panels[f"innovation_{name}"].series[0].lines[0].values
         np.testing.assert_allclose(drawn, normalised[np.isfinite(normalised)])
+        low, high = panels[f"innovation_{name}"].limits
+        assert low <= -4 < 4 <= high  # ±2σ are seen, however small the innovations
+
+
+def test_the_first_panel_of_a_kind_has_the_legend(panels: dict[str, Panel]) -> None:
+    named = [name for name, panel in panels.items() if panel.legend]
+    assert named == ["sensor_gyro", "sensor_heading", "innovation_compass"]
 
 
 def test_smoothed_disturbances_have_bands(
