@@ -158,7 +158,8 @@ def _sensors(sensors: Sensors, condition: Condition) -> Sensors:
 
 def is_found(kind: TrialKind, analysis: TrialAnalysis) -> bool:
     """Whether the manoeuvres sailed were found, and no other."""
-    return tuple(each.kind for each in analysis.manoeuvres) in (kind.expected, kind.alternative)
+    found = tuple(each.kind for each in analysis.manoeuvres)
+    return bool(found) and found in (kind.expected, kind.alternative)
 
 
 def scored(

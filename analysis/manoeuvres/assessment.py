@@ -21,7 +21,7 @@ from .manoeuvre_figures import manoeuvre_marks, manoeuvre_series
 from .manoeuvre_part import ManoeuvrePart
 from .manoeuvre_values import IndexCase, mean_before
 from .sailed_manoeuvre import NotComputed, SailedManoeuvre
-from .spirals import spiral_curve
+from .spiral_curve import spiral_curve
 from .start_rules import RuleSettings
 from .trial_index import TrialIndex
 from .trial_signals import TrialSignals

@@ -11,7 +11,7 @@ from .rudder_levels import HeldLevel, merged_levels, neutral_rudder, rudder_leve
 from .sailed_manoeuvre import ManoeuvreKind, NotComputed
 from .speed_manoeuvres import find_speed_manoeuvres
 from .spirals import find_direct_spirals, find_reverse_spirals, is_steered
-from .start_rules import ramp_start
+from .start_rules import SPARSE_SECS, ramp_start, sparse_start
 from .straight_runs import find_straight_runs
 from .trial_signals import TrialSignals, filled_signals, noise_std
 
@@ -29,6 +29,7 @@ PULL_OUT_HELM = radians(1.0)  # of the rudder held midships, noise aside
 FULL_TURN = radians(210.0)  # with less rudder than `HARD_RUDDER`, a shorter turn changes course
 HARD_RUDDER = radians(25.0)
 MAX_RETURN = radians(30.0)  # beyond twice the heading of a zig-zag's reversal, with no reversal
+MIN_SWITCH, MIN_SWITCH_SHARE = radians(1.0), 0.4  # of the heading at a reversal; of the first one
 MIN_RETURN = 0.5  # of the heading at the last reversal, that a zig-zag goes back from it
 MAX_RECOVERY_SECS = 150.0
 INITIAL_TURN = radians(10.0)
@@ -124,7 +125,8 @@ class _RudderScan:
             zigzag = self._zigzag(chain) if len(chain) > 1 else None
             if zigzag is not None:
                 yield zigzag
-                k += len(chain)
+                while k < len(self._levels) and self._levels[k].first < zigzag.end:
+                    k += 1
                 self._recovery = k
             else:
                 for each in self._single(k):
@@ -147,7 +149,10 @@ class _RudderScan:
     def _leaves(self, held: HeldLevel) -> int:
         """Return the sample at which the rudder leaves its angle for the other side."""
         side = -1.0 if held.level > self._neutral else 1.0
-        start, _ = ramp_start(self._signals.rudder, held.last, side, self._dt)
+        if self._signals.interval("rudder") > SPARSE_SECS:
+            start, _ = sparse_start(self._signals, held.last, side)
+        else:
+            start, _ = ramp_start(self._signals.rudder, held.last, side, self._dt)
         return round(start)
 
     def _approach_level(self, k: int) -> float:
@@ -180,19 +185,31 @@ class _RudderScan:
             heading[max(0, execute - round(30 / self._dt)) : execute + 1]
         )
         sides = np.sign([held.level - self._neutral for held in chain[:-1]])
-        if not np.isfinite(changes).all() or np.any(changes * sides < radians(1.0)):
+        beyond = changes * sides
+        if not np.isfinite(beyond).all() or beyond[0] < MIN_SWITCH:
             return None
-        last = chain[-1]
-        returned = -sides[-1] * (heading[last.last] - heading[reversals[-1]])
-        if np.max(np.abs(changes)) > MIN_TURN or returned > 3 * abs(changes[-1]) + MAX_RETURN:
+        # like rudder with which the ship is steadied at the end is no reversal of the zig-zag
+        early = np.flatnonzero(beyond < max(MIN_SWITCH, MIN_SWITCH_SHARE * beyond[0]))
+        count = int(early[0]) if len(early) else len(beyond)
+        changes, sides, reversals = changes[:count], sides[:count], reversals[:count]
+        chain, last = chain[: count + 1], chain[count]
+        end = last.last
+        back = -sides[-1] * (heading[reversals[-1] : end + 1] - heading[reversals[-1]])
+        returned = float(back[-1])
+        if np.max(np.abs(changes)) > MIN_TURN:
             return None
-        is_cut = last.last >= len(heading) - 2
+        if returned > 3 * abs(changes[-1]) + MAX_RETURN:
+            if count == 1:
+                return None
+            # the last angle is kept to turn to another course
+            end = reversals[-1] + int(np.argmax(back > 2 * abs(changes[-1])))
+        is_cut = end >= len(heading) - 2
         if len(chain) == 2 and not is_cut and returned < MIN_RETURN * abs(changes[-1]):
             return None  # the ship is steadied on another course
         return FoundManoeuvre(
             ManoeuvreKind.ZIGZAG,
             execute,
-            last.last + 1,
+            end + 1,
             chain[0].level - self._neutral,
             self._approach_level(k),
             reversals,
@@ -250,8 +267,14 @@ class _RudderScan:
         return (
             f"held for {secs:.0f} s, in which the heading changes by {degrees(turned):.0f}°: a "
             f"turning circle needs {degrees(MIN_TURN):.0f}°, a zig-zag an equal angle to the "
-            "other side"
+            f"other side{self._sparse()}"
         )
+
+    def _sparse(self) -> str:
+        """Return a remark on a rudder that is recorded too seldom for reversals; else nothing."""
+        interval = self._signals.interval("rudder")
+        remark = f"; the rudder is recorded every {interval:.0f} s, too seldom for quick reversals"
+        return remark if interval > SPARSE_SECS else ""
 
     def _rejected(self, held: HeldLevel, reason: str) -> NotComputed:
         at, level = held.first * self._dt, degrees(held.level - self._neutral)

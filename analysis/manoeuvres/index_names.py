@@ -22,6 +22,7 @@ UNITS = {
     "revolutions": "rpm", "period": "s", "reach": "s", "transfer": "m",
     "advance": "m", "lateral deviation": "m",
 }  # fmt: skip
+NO_LOOP = "the rudder is neutral at one yaw rate: a course-stable ship has no loop"
 UNIT_WORDS = (
     ("overshoot", "rad"), ("yaw rate", "rad/s"), ("diameter", "m"), ("distance", "m"),
     ("track reach", "m"), ("head reach", "m"), ("time", "s"), ("speed", "m/s"),
@@ -66,5 +67,6 @@ def unreached_reason(name: str, case: IndexCase) -> str:
     if found.kind is ManoeuvreKind.STOPPING:
         return f"the speed falls to {float(np.min(case.signals.speed)):.1f} m/s, not to zero"
     if name.startswith("loop"):
-        return "the spiral was not sailed both ways"
+        is_reverse = found.kind is ManoeuvreKind.REVERSE_SPIRAL
+        return NO_LOOP if is_reverse else "the spiral was not sailed both ways"
     return f"the heading changes by {most:.1f}°"

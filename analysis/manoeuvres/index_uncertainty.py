@@ -24,9 +24,9 @@ MIN_DRAWN_SHARE = 0.5  # of the draws that reach an index: fewer give no bias of
 DRAWS = 40  # of the noise and the sampling instants
 SEED = 1
 COVERAGE_FACTOR = 1.959963984540054  # of 95 %, normal distribution
-NOISE, VELOCITY, START, APPROACH, COMPASS, GYRO = (
+NOISE, VELOCITY, START, APPROACH, COMPASS, GYRO, NEUTRAL = (
     "sensor noise and sampling", "current, log and compass", "start rule", "approach heading",
-    "slow error of the compass", "gyro bias",
+    "slow error of the compass", "gyro bias", "neutral rudder",
 )  # fmt: skip
 GYRO_BIAS_STD = np.radians(0.005)  # rad/s, of a heading that is the integral of the yaw rate
 WANDER_SECS = 60.0  # before the execute, over which the wander of the heading is taken
@@ -139,6 +139,8 @@ def index_stds(
         APPROACH: [_heading_change(inputs, values, approach_std(inputs))],
         VELOCITY: _velocity_changes(inputs, values),
     }
+    if len(inputs.found.levels):
+        changes[NEUTRAL] = [_neutral_change(inputs, values)]
     if inputs.compass_change_std is None:
         changes[GYRO] = [_gyro_change(inputs, values)]
     else:
@@ -216,6 +218,23 @@ def approach_std(inputs: IndexInputs) -> float:
     return float(np.sqrt(WANDER_SHARE * wander + heading_noise**2 / samples))
 
 
+def _neutral_change(inputs: IndexInputs, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the changes of the indices where the neutral rudder of a spiral has an error."""
+    signals, base = inputs.signals, inputs.case()
+    window = signals.rudder[max(0, base.first - round(WANDER_SECS / signals.dt_secs)) : base.first]
+    if len(window) < 3:
+        return {}
+    noise = signals.noise.get("rudder", 0.0)
+    std = float(np.sqrt(WANDER_SHARE * max(0.0, float(np.var(window)) - noise**2)))
+    found = inputs.found
+
+    def shifted(sign: float) -> IndexCase:
+        level = found.approach_level + sign * std
+        return replace(base, found=replace(found, approach_level=level))
+
+    return _difference(values, shifted)
+
+
 def _velocity_changes(inputs: IndexInputs, values: Mapping[str, float]) -> list[dict[str, float]]:
     sizes, directions = np.linalg.eigh(inputs.errors.covariance)
     mean = inputs.errors.mean
@@ -242,16 +261,21 @@ def noise_draws(inputs: IndexInputs) -> NoiseDraws:
     """Compute the indices of signals with other noise and other sampling instants."""
     rng = np.random.default_rng(SEED)
     base = smoothed(inputs.signals, inputs.half_secs)
-    drawn = [index_values(inputs.case(signals=_sampled_anew(base, rng))) for _ in range(DRAWS)]
+    names = (*SAMPLED, "rudder") if len(inputs.found.levels) else SAMPLED
+    drawn = [
+        index_values(inputs.case(signals=_sampled_anew(base, rng, names))) for _ in range(DRAWS)
+    ]
     return NoiseDraws(index_values(inputs.case(signals=base)), drawn)
 
 
-def _sampled_anew(signals: TrialSignals, rng: np.random.Generator) -> TrialSignals:
-    """Return signals sampled at other instants, with other noise, on the same clock."""
+def _sampled_anew(
+    signals: TrialSignals, rng: np.random.Generator, names: Sequence[str]
+) -> TrialSignals:
+    """Return signals of which some are sampled at other instants, with other noise."""
     dt, count = signals.dt_secs, len(signals)
     grid = np.arange(count) * dt
     changed: dict[str, Any] = {}
-    for name in SAMPLED:
+    for name in names:
         key = "position" if name == "positions" else name
         values = getattr(signals, name)
         columns = values.reshape(count, -1)

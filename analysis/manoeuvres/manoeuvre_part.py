@@ -9,19 +9,21 @@ import numpy as np
 from .found_manoeuvre import FoundManoeuvre
 from .manoeuvre_values import IndexCase, mean_before
 from .sailed_manoeuvre import ManoeuvreKind, NotComputed
-from .start_rules import RuleSettings, find_executes
+from .start_rules import SPARSE_SECS, RuleSettings, find_executes
 from .trial_signals import SIGNAL_NAMES, TrialSignals, filled_signals, longest_gap
 from .zigzag import FINE_SWITCH_STEP, SWITCH_STEP
 
 MARGIN_SECS = 90.0  # of the approach, before the execute
 TAIL_SECS = 10.0
 MAX_PART_SAMPLES = 2400  # of a manoeuvre, from which its indices are computed
-# half widths of a heading's smoothing: of the shortest time from side to side, of a quarter turn
-ZIGZAG_SMOOTHING, CIRCLE_SMOOTHING = 1 / 10, 1 / 16
+# half widths of the smoothing: of the shortest time from side to side, of a quarter turn, of a
+# change of speed
+ZIGZAG_SMOOTHING, CIRCLE_SMOOTHING, SPEED_SMOOTHING = 1 / 10, 1 / 16, 1 / 16
 OTHER_HALF_SECS = 5.0  # half width of the smoothing where nothing else determines it
 MAX_HALF_SECS = 30.0
 NOTED_GAP_SECS = 5.0
 UNSTEADY_YAW_RATE = radians(0.1)  # rad/s, of an approach
+MIN_SPAN_SAMPLES = 4.0  # of the rudder between two reversals, that show its angles
 MAX_EARLY_SWITCH = radians(1.5)
 MAX_LATE_SWITCH = radians(4.0)  # of a reversal beyond the nominal switch heading
 SCATTERED_SWITCH = radians(2.0)
@@ -77,7 +79,7 @@ class ManoeuvrePart:
             reversals=tuple((at - first) // step for at in found.reversals),
             levels=np.column_stack(((found.levels[:, :2] - first) // step, found.levels[:, 2])),
         )
-        self.blocked: list[NotComputed] = []
+        self.blocked = self._too_sparse()
         self.rudder = _nominal_rudder(self.filled, self.found)
         self.switch, self.switch_note = self._switch()
         self.half_secs = self._half_secs()
@@ -89,6 +91,21 @@ class ManoeuvrePart:
             return ""
         return "starboard" if self.found.level > 0 else "port"
 
+    def _too_sparse(self) -> list[NotComputed]:
+        """Return why a zig-zag has no indices whose rudder is recorded too seldom; else none."""
+        interval = self.filled.interval("rudder")
+        if not self.found.reversals or interval <= SPARSE_SECS:
+            return []
+        spans = np.diff([self.found.execute, *self.found.reversals]) * self.filled.dt_secs
+        shortest = float(np.min(spans))
+        if shortest >= MIN_SPAN_SAMPLES * interval:
+            return []
+        reason = (
+            f"the rudder is reversed after {shortest:.0f} s, and recorded every {interval:.0f} s: "
+            "neither its angle nor the headings at the reversals are determined"
+        )
+        return [NotComputed("all indices", reason)]
+
     def _switch(self) -> tuple[float, str]:
         """Return the nominal switch heading of a zig-zag, and a note where it is uncertain."""
         if self.found.kind is not ManoeuvreKind.ZIGZAG:
@@ -99,9 +116,19 @@ class ManoeuvrePart:
         # the mean of both sides does not depend on the approach heading
         sides = [np.median(side) for side in (changes[::2], changes[1::2]) if len(side)]
         typical = float(np.mean(sides))
-        switch = nominal_switch(typical, self.rudder)
+        # between two samples of a rudder the heading goes on
+        rate = float(np.median(np.abs(self.filled.yaw_rate[list(self.found.reversals)])))
+        interval = self.filled.interval("rudder")
+        unknown = rate * interval / 2 if interval > SPARSE_SECS else 0.0
+        switch = nominal_switch(typical, self.rudder, unknown)
         scatter = float(np.max(np.abs(changes - typical)))
-        if scatter <= SCATTERED_SWITCH:
+        if unknown > abs(self.rudder) / 8:
+            return switch, (
+                f"the rudder is recorded every {interval:.0f} s, in which the heading changes by "
+                f"{degrees(2 * unknown):.0f}°: that it was reversed at {degrees(switch):.0f}° is "
+                "assumed"
+            )
+        if scatter <= SCATTERED_SWITCH + unknown:
             return switch, ""
         listed = ", ".join(f"{degrees(change):.1f}°" for change in changes)
         return switch, (
@@ -117,6 +144,9 @@ class ManoeuvrePart:
             spans = np.diff(ends)
             shortest = min(float(np.min(spans)), 2.0 * (found.reversals[0] - found.execute))
             return min(ZIGZAG_SMOOTHING * shortest * dt, MAX_HALF_SECS)
+        if found.kind in (ManoeuvreKind.STOPPING, ManoeuvreKind.ACCELERATION):
+            secs = (found.end - found.execute) * dt
+            return float(np.clip(SPEED_SMOOTHING * secs, OTHER_HALF_SECS, MAX_HALF_SECS))
         turned = np.abs(self.filled.heading - self.filled.heading[found.execute])
         quarter = np.flatnonzero(turned[found.execute :] >= np.pi / 2)
         if found.kind is ManoeuvreKind.TURNING_CIRCLE and len(quarter):
@@ -199,7 +229,7 @@ def _nominal_rudder(signals: TrialSignals, found: FoundManoeuvre) -> float:
     return found.side * (rounded if abs(rounded - nearest) < radians(0.9) else held[-1])
 
 
-def nominal_switch(typical: float, rudder: float) -> float:
+def nominal_switch(typical: float, rudder: float, unknown: float = 0.0) -> float:
     """Return the switch heading that was meant, from where the rudder was reversed.
 
     A helmsman is late rather than early. The rudder angle and half of it are the usual choices.
@@ -210,6 +240,8 @@ def nominal_switch(typical: float, rudder: float) -> float:
         Median change of heading at the reversals, rad.
     rudder
         Rudder angle, rad.
+    unknown
+        Half the change of heading between two samples of the rudder, rad.
 
     Examples
     --------
@@ -217,7 +249,8 @@ def nominal_switch(typical: float, rudder: float) -> float:
     10.0
     """
     for usual in (abs(rudder), abs(rudder) / 2):
-        if -MAX_EARLY_SWITCH < typical - usual < min(MAX_LATE_SWITCH, 0.3 * usual):
+        late = min(MAX_LATE_SWITCH, 0.3 * usual)
+        if -MAX_EARLY_SWITCH - unknown < typical - usual < late + unknown:
             return usual
     coarse = np.floor((typical + FINE_SWITCH_STEP) / SWITCH_STEP) * SWITCH_STEP
     if coarse > 0 and typical - coarse < 0.5 * MAX_LATE_SWITCH:

@@ -12,7 +12,7 @@ from .execute import approach_heading, first_crossing, smooth_heading
 from .found_manoeuvre import FoundManoeuvre
 from .manoeuvre import ManoeuvreMotion
 from .sailed_manoeuvre import ManoeuvreKind
-from .spirals import spiral_curve, spiral_loop
+from .spiral_curve import spiral_curve, spiral_loop, steered_loop
 from .trial_signals import TrialSignals, chord_ends, slope
 from .turning_circle import COURSE_SECS, turning_circle
 from .zigzag import zigzag_values
@@ -212,7 +212,9 @@ def pull_out_values(case: IndexCase) -> dict[str, float]:
 def spiral_values(case: IndexCase) -> dict[str, float]:
     """Compute height and width of the loop of a spiral."""
     points = spiral_curve(case.signals, case.found.levels)
-    height, width = spiral_loop(points - [case.found.approach_level, 0.0])
+    is_reverse = case.found.kind is ManoeuvreKind.REVERSE_SPIRAL
+    loop = steered_loop if is_reverse else spiral_loop
+    height, width = loop(points - [case.found.approach_level, 0.0])
     return {"loop height": height, "loop width": width}
 
 

@@ -19,7 +19,10 @@ STOP_RPM = 0.05  # of the largest revolutions: below it the propeller does not d
 MIN_STOP_SPEED = 1.0  # m/s, from which a ship can be stopped
 MIN_SPEED_GAIN = 1.15  # of an acceleration: speed at its end over that before
 MIN_STOP_SHARE = 0.5  # of the speed, that a stopping manoeuvre takes off at least
-MEAN_SECS = 5.0  # to either side, over which the speed is averaged, and beyond the stop
+MEAN_SECS = 5.0  # to either side, over which the speed is averaged
+AFTER_STOP_SECS = (
+    60.0  # noise makes the stop seem early, and its instant is smoothed with both sides
+)
 SLOW_SHARE = 0.02  # of the speed at the execute: the ship is stopped
 
 
@@ -67,7 +70,7 @@ def _stop(
     mean = moving_mean(speed[execute:end], 1 + 2 * round(MEAN_SECS / signals.dt_secs))
     stopped = np.flatnonzero(mean <= (0.0 if np.min(mean) <= 0 else SLOW_SHARE * initial))
     if len(stopped):
-        end = min(end, execute + int(stopped[0]) + 1 + round(MEAN_SECS / signals.dt_secs))
+        end = min(end, execute + int(stopped[0]) + 1 + round(AFTER_STOP_SECS / signals.dt_secs))
     if initial < MIN_STOP_SPEED or end - execute < 3:
         return None
     if float(np.min(speed[execute:end])) > MIN_STOP_SHARE * initial:

@@ -1,11 +1,11 @@
-"""Direct and reverse spirals: steady yaw rate against rudder, and the loop of an unstable ship.
+"""Direct and reverse spirals: levels of the rudder, or of the yaw rate, from side to side.
 
 Source: ITTC Recommended Procedure 7.5-04-02-01, full scale manoeuvring trials; IMO
 MSC/Circ.1053, explanatory notes, section 3.4.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import radians
 
@@ -17,7 +17,7 @@ from .found_manoeuvre import FoundManoeuvre
 from .rudder_levels import MIN_HELD_SECS, NOISE_MARGIN, HeldLevel, held_levels
 from .sailed_manoeuvre import ManoeuvreKind
 from .smoothing import fitted_slope, moving_mean
-from .trial_signals import TrialSignals, noise_std
+from .trial_signals import noise_std
 
 MIN_SPIRAL_LEVELS = 5
 MIN_SPIRAL_SECS = 30.0  # of each level
@@ -33,7 +33,6 @@ MIN_BEYOND = radians(1.0)  # of the rudder beyond the next level's angle
 STEERING_SMOOTHING_SECS = 4.0
 RUDDER_SMOOTHING_SECS = 10.0  # of the rudder of a direct spiral, whose steps may be small
 DELAY_SHARE = 0.25  # of a level of the yaw rate, at whose end the rudder may move to the next one
-STEADY_SHARE = 0.4  # of a level's end, over which yaw rate and rudder are averaged
 
 
 def find_direct_spirals(rudder: FloatArray, neutral: float, dt: float) -> Iterator[FoundManoeuvre]:
@@ -55,6 +54,9 @@ def find_direct_spirals(rudder: FloatArray, neutral: float, dt: float) -> Iterat
     movement = max(0.8 * MIN_SPIRAL_STEP, NOISE_MARGIN * np.sqrt(2.0) * noise)
     levels = held_levels(moving_mean(rudder, count), dt, movement, RUDDER_SMOOTHING_SECS / 2)
     joined = _joined(levels, dt, MIN_SPIRAL_STEP / 2, 2 * MIN_HELD_SECS)
+    # the mean moves before the rudder does, and is compared with the one ahead of it
+    margin = round(0.8 * RUDDER_SMOOTHING_SECS / dt)
+    joined = [replace(each, last=min(each.last + margin, len(rudder) - 1)) for each in joined]
     steps = _Steps(MIN_SPIRAL_STEP, MIN_SIDE, MAX_PAUSE_SECS)
     for chain in _chains(joined, dt, steps, neutral):
         yield _spiral(ManoeuvreKind.DIRECT_SPIRAL, chain, neutral)
@@ -103,11 +105,16 @@ def _joined(levels: list[HeldLevel], dt: float, same: float, gap_secs: float) ->
             and abs(held.level - joined[-1].level) < same
             and (held.first - joined[-1].last) * dt < gap_secs
         ):
-            longer = max(joined[-1], held, key=lambda each: each.last - each.first)
-            joined[-1] = HeldLevel(joined[-1].first, held.last, longer.level)
+            joined[-1] = _union(joined[-1], held)
         else:
             joined.append(held)
     return joined
+
+
+def _union(one: HeldLevel, other: HeldLevel) -> HeldLevel:
+    """Return both stretches of one level as one."""
+    longer = max(one, other, key=lambda each: each.last - each.first)
+    return HeldLevel(one.first, other.last, longer.level)
 
 
 @dataclass(frozen=True)
@@ -131,7 +138,7 @@ def _chains(
             not chain or (held.first - chain[-1].last) * dt <= steps.pause_secs
         ):
             if chain and abs(held.level - chain[-1].level) < steps.step:
-                chain[-1] = max(chain[-1], held, key=lambda each: each.last - each.first)
+                chain[-1] = _union(chain[-1], held)
             else:
                 chain.append(held)
             continue
@@ -183,77 +190,3 @@ def _spiral(kind: ManoeuvreKind, chain: list[HeldLevel], neutral: float) -> Foun
     levels = np.array([(held.first, held.last, held.level) for held in sailed])
     level = sailed[0].level - straight
     return FoundManoeuvre(kind, execute, sailed[-1].last + 1, level, neutral, levels=levels)
-
-
-def spiral_curve(signals: TrialSignals, levels: FloatArray) -> FloatArray:
-    """Compute the points of a spiral: mean rudder and yaw rate at the end of each level.
-
-    Parameters
-    ----------
-    signals
-        Without NaN.
-    levels
-        (k, 3) first and last sample, and level, of each stretch.
-
-    Returns
-    -------
-    (k, 2)
-        Rudder, rad, and yaw rate, rad/s.
-    """
-    points = np.empty((len(levels), 2))
-    for row, (first, last) in enumerate(levels[:, :2].astype(int)):
-        late = slice(int(last - STEADY_SHARE * (last - first)), int(last) + 1)
-        duration = (late.stop - 1 - late.start) * signals.dt_secs
-        turned = signals.heading[late.stop - 1] - signals.heading[late.start]
-        points[row] = np.mean(signals.rudder[late]), turned / max(duration, signals.dt_secs)
-    return points
-
-
-def spiral_loop(points: FloatArray) -> tuple[float, float]:
-    """Compute the height and the width of the loop of a spiral.
-
-    The height is the difference of the yaw rates at neutral rudder on the way down and on the way
-    up; the width is the difference of the rudder angles at which the yaw rate changes its sign.
-
-    Parameters
-    ----------
-    points
-        (k, 2) rudder, rad, and yaw rate, rad/s, in the order sailed.
-
-    Returns
-    -------
-    height, width
-        In rad/s and rad; NaN where the spiral was not sailed both ways.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> down = [(0.2, 2.0), (0.0, 1.0), (-0.1, -1.0), (-0.2, -2.0)]
-    >>> up = [(0.0, -1.0), (0.1, 1.0), (0.2, 2.0)]
-    >>> [round(x, 6) for x in spiral_loop(np.array(down + up))]
-    [2.0, 0.1]
-    """
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(points[:, 0])))) + 1
-    if not len(turns):
-        return np.nan, np.nan
-    branches = [
-        points[: turns[0] + 1],
-        points[turns[0] : (turns[1] + 1 if len(turns) > 1 else None)],
-    ]
-    if len(turns) > 1 and len(branches[0]) < 4:  # the first steps only lead to the largest angle
-        after = points[turns[1] : (turns[2] + 1 if len(turns) > 2 else None)]
-        branches = [branches[1], after]
-    if min(len(branch) for branch in branches) < 3:
-        return np.nan, np.nan
-    rates = [_at_zero(branch[:, 0], branch[:, 1]) for branch in branches]
-    angles = [_at_zero(branch[:, 1], branch[:, 0]) for branch in branches]
-    return abs(rates[0] - rates[1]), abs(angles[0] - angles[1])
-
-
-def _at_zero(x: FloatArray, y: FloatArray) -> float:
-    """Return y where x changes its sign, by linear interpolation; NaN where it does not."""
-    k = np.flatnonzero(np.diff(np.sign(x)))
-    if not len(k):
-        return np.nan
-    at = int(k[0])
-    return float(y[at] - x[at] * (y[at + 1] - y[at]) / (x[at + 1] - x[at]))

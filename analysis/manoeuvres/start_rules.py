@@ -26,6 +26,11 @@ MIN_ORDER_CHANGE = radians(1.5)
 EXECUTE_WORD = "execute"
 HELM_LINE_SECS = 5.0  # before the movement, over which a line is laid through the helm
 ORDER_SECS = (20.0, 3.0)  # about the rudder's movement, in which its order is looked for
+SPARSE_SECS = 4.0  # between samples of the rudder: more is more than many movements take
+MIN_FIRST_SHARE = 0.12  # of the whole movement, that shows before the sample of most of it
+HELM_SCATTER_SECS = 60.0  # before a movement, over which the scatter of the helm is taken
+POSSIBLE_SECS = 1.0  # beyond the time in which a movement may begin, for noise and helm
+FASTEST_GEAR = radians(5.0)  # rad/s
 BY_RUDDER = (
     ManoeuvreKind.TURNING_CIRCLE, ManoeuvreKind.ZIGZAG, ManoeuvreKind.INITIAL_TURNING,
     ManoeuvreKind.PULL_OUT,
@@ -132,8 +137,56 @@ def _order_execute(signals: TrialSignals, found: FoundManoeuvre) -> Execute:
 
 def _rudder_start(signals: TrialSignals, found: FoundManoeuvre) -> tuple[float, float]:
     """Return where the rudder begins to move, and the uncertainty of the instant, s."""
-    noise = signals.noise.get("rudder", 0.0)
-    return ramp_start(signals.rudder, found.execute, found.movement, signals.dt_secs, noise)
+    noise, dt = signals.noise.get("rudder", 0.0), signals.dt_secs
+    if signals.interval("rudder") > SPARSE_SECS:
+        return sparse_start(signals, found.execute, found.movement)
+    return ramp_start(signals.rudder, found.execute, found.movement, dt, noise)
+
+
+def sparse_start(signals: TrialSignals, leaves: int, side: float) -> tuple[float, float]:
+    """Return where a rudder begins to move that is recorded more seldom than it moves.
+
+    It does so after the last sample at its old angle, and so long before the next one as a gear
+    needs for the angle reached there: one that is not faster than `FASTEST_GEAR`, and not slower
+    than the movement between samples. Any instant between has the same probability.
+
+    Parameters
+    ----------
+    signals
+        Without NaN, interpolated between the samples.
+    leaves
+        A sample of the clock close to the beginning.
+    side
+        1 for a movement to starboard, -1 to port.
+
+    Returns
+    -------
+    sample
+        Of the clock, with its fraction: the middle of the time that is possible.
+    std_secs
+        Standard uncertainty of that instant, s.
+    """
+    dt, interval = signals.dt_secs, signals.interval("rudder")
+    width = max(1, round(interval / dt))
+    first = max(0, leaves - 2 * width)
+    part = side * signals.rudder[first : leaves + 2 * width + 1]
+    if len(part) < 2 * width:
+        return float(leaves), interval / np.sqrt(12.0)
+    slopes = np.diff(part)  # constant between two samples
+    start = int(np.argmax(slopes > 0.98 * np.max(slopes)))
+    helm = signals.rudder[max(0, first - round(HELM_SCATTER_SECS / dt)) : first + 1]
+    least = max(
+        2.5 * float(np.std(helm)), MIN_FIRST_SHARE * (part[start + 1 :].max() - part[start])
+    )
+    if start >= width and part[start] - part[start - width] > least:
+        start -= width  # it moved a little before the sample from which it moved most
+    at = np.minimum(start + width * np.arange(3), len(part) - 1)
+    moved, later = np.maximum(np.diff(part[at]), 0.0)
+    slowest = max(moved, later, 1e-9) / interval
+    earliest = max(0.0, interval - moved / slowest - POSSIBLE_SECS)
+    latest = min(interval, max(interval - moved / FASTEST_GEAR, earliest) + POSSIBLE_SECS)
+    std = (latest - earliest) / float(np.sqrt(12.0))
+    return first + start + (earliest + latest) / 2 / dt, std
 
 
 def _other_execute(signals: TrialSignals, found: FoundManoeuvre) -> Execute:

@@ -1,14 +1,14 @@
 """The signals of a log as the analysis of manoeuvres takes them, and what the log states."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.manoeuvres.trial_signals import TrialSignals, noise_std, printed_step
 from analysis.replay.position_fixes import PositionFixes
 from analysis.replay.reading_options import ReadingOptions
-from shiplog.checks.channel_stats import LogStats
+from shiplog.checks.channel_stats import ChannelStats, LogStats
 from shiplog.errors import LogError
 from shiplog.progress import ProgressCallback
 from shiplog.resampling import Clock, resample_chunks, with_steering_gear
@@ -22,6 +22,7 @@ MOTION = ("speed", "sway", "rpm", "power")
 WIND = ("wind_speed", "wind_direction")
 MIN_STEP_SECS, MAX_STEP_SECS = 0.1, 1.0
 MAX_SAMPLES = 250_000  # of the clock: a longer log has a coarser one
+MAX_INTERVAL_RATIO = 1.2  # of the longest interval of a regularly sampled channel
 MAX_NOISE_SAMPLES = 100_000  # of a channel, from which its noise is estimated
 
 
@@ -97,7 +98,7 @@ def read_trial(log: Log, options: ReadingOptions, on_progress: ProgressCallback)
     intervals = {
         name: stats[name].interval_secs
         for name in (*used, "position")
-        if name in stats and not stats[name].hold
+        if name in stats and not _as_sampled(stats[name]).hold
     }
     return TrialRecord(
         name=log.name,
@@ -144,7 +145,7 @@ def trial_clock(stats: LogStats, name: str, vessel: Vessel | None) -> Clock:
         The log has neither rudder, heading, yaw rate nor speed over time.
     """
     used = {
-        channel: stats[channel]
+        channel: _as_sampled(stats[channel])
         for channel in (*STEERING, *MOTION, *WIND)
         if channel in stats
         and not stats[channel].fields
@@ -163,6 +164,18 @@ def trial_clock(stats: LogStats, name: str, vessel: Vessel | None) -> Clock:
     dt = max(float(np.clip(step, MIN_STEP_SECS, MAX_STEP_SECS)), duration / MAX_SAMPLES)
     clock = Clock(start, dt, int(duration / dt + 1e-6) + 1, used)
     return with_steering_gear(clock, (vessel or Vessel("", None)).rudder_rate)
+
+
+def _as_sampled(channel: ChannelStats) -> ChannelStats:
+    """Return a rudder that is recorded at one interval as sampled, however few samples there are.
+
+    The few samples of a trial at 20 s may look like steps that were written on change.
+    """
+    hold = channel.hold
+    if channel.name != "rudder" or hold is None or hold.stated:
+        return channel
+    is_regular = hold.longest_secs < MAX_INTERVAL_RATIO * channel.interval_secs
+    return replace(channel, hold=None) if is_regular else channel
 
 
 def _read(

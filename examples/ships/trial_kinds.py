@@ -212,27 +212,52 @@ def reverse_spiral(approach: Steering, *, weaving: bool) -> Voyage:
         return WEAVE * sin(2 * pi * time / period) if weaving else 0.0
 
     trial = sail(ship, RateKeeper(approach, steps, weave), times[-1], course=approach.course)
-    return Voyage(trial, lambda _found: _loop(trial, times))
+    return Voyage(trial, lambda _found: _steered_loop(trial, times))
 
 
-def _loop(trial: SailedTrial, times: Sequence[float]) -> dict[str, float]:
-    """Return height and width of the loop of a spiral from side to side and back."""
+def _points(trial: SailedTrial, times: Sequence[float]) -> Values:
+    """Return rudder from neutral and yaw rate at the end of each level, (k, 2)."""
     points = []
     for start, stop in pairwise(times):
         late = slice(round((stop - STEADY_SHARE * (stop - start)) / STEP), round(stop / STEP) + 1)
         turned = trial.heading[late][-1] - trial.heading[late][0]
         rate = turned / ((late.stop - 1 - late.start) * STEP)
         points.append((float(np.mean(trial.rudder[late])) - trial.ship.neutral, rate))
+    return np.array(points)
+
+
+def _loop(trial: SailedTrial, times: Sequence[float]) -> dict[str, float]:
+    """Return height and width of the loop of a direct spiral from side to side and back."""
+    points = _points(trial, times)
     turn = len(points) // 2
-    ways = [np.array(points[: turn + 1]), np.array(points[turn:])]
-    rates = [_where_zero(way[:, 0], way[:, 1]) for way in ways]
-    angles = [_where_zero(way[:, 1], way[:, 0]) for way in ways]
+    ways = [points[: turn + 1], points[turn:]]
+    rates = [_where_zero(way[:, 0], way[:, 1])[0] for way in ways]
+    angles = [_where_zero(way[:, 1], way[:, 0])[0] for way in ways]
     return {"loop height": abs(rates[0] - rates[1]), "loop width": abs(angles[0] - angles[1])}
 
 
-def _where_zero(x: Values, y: Values) -> float:
-    k = int(np.flatnonzero(x[:-1] * x[1:] <= 0)[0])
-    return float(y[k] - x[k] * (y[k + 1] - y[k]) / (x[k + 1] - x[k]))
+def _steered_loop(trial: SailedTrial, times: Sequence[float]) -> dict[str, float]:
+    """Return height and width of the loop of a reverse spiral; none of a stable ship."""
+    points = _points(trial, times)
+    count = len(points) // 2
+    curve = (points[:count] + points[: -count - 1 : -1]) / 2
+    curve = np.vstack((curve, points[count]))
+    rates = _where_zero(curve[:, 0], curve[:, 1])
+    if len(rates) < 2:
+        return {}
+    inside = (curve[:, 1] > min(rates)) & (curve[:, 1] < max(rates))
+    return {
+        "loop height": max(rates) - min(rates),
+        "loop width": float(np.ptp(curve[inside, 0])),
+    }
+
+
+def _where_zero(x: Values, y: Values) -> list[float]:
+    """Return y wherever x changes its sign."""
+    return [
+        float(y[k] - x[k] * (y[k + 1] - y[k]) / (x[k + 1] - x[k]))
+        for k in np.flatnonzero(x[:-1] * x[1:] <= 0)
+    ]
 
 
 def stopping(approach: Steering) -> Voyage:
@@ -281,8 +306,9 @@ def acceleration(approach: Steering) -> Voyage:
         raised = (1 - SLOW_SHARE) * max(0.0, time - execute) / RAISING_SECS
         return min(1.0, SLOW_SHARE + raised) * ship.rpm
 
+    orders = NewCourse(approach, approach.course)
     trial = sail(
-        ship, replace(approach, execute=inf), execute + 40 * _pace(ship), course=approach.course,
+        ship, orders, execute + 40 * _pace(ship), course=approach.course,
         revolutions=revolutions, speed=_slow_speed(ship),
     )  # fmt: skip
 
