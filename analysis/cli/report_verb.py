@@ -52,8 +52,8 @@ def _configure_report(parser: argparse.ArgumentParser) -> None:
         "--compass-error",
         type=float,
         metavar="DEG",
-        help="standard uncertainty of the compass in a change of heading, ° (default: 0.25, of "
-        "IMO A.821(19), 4.1.2)",
+        help="standard uncertainty of the compass in a change of heading, ° (default: that of "
+        "the vessel file, or else 0.25 times the secant of the latitude, of IMO A.821(19), 4.1.2)",
     )
     parser.add_argument(
         "--model",

@@ -23,7 +23,9 @@ OTHER_HALF_SECS = 5.0  # half width of the smoothing where nothing else determin
 MAX_HALF_SECS = 30.0
 NOTED_GAP_SECS = 5.0
 UNSTEADY_YAW_RATE = radians(0.1)  # rad/s, of an approach
-MIN_SPAN_SAMPLES = 4.0  # of the rudder between two reversals, that show its angles
+# samples of the rudder from the execute to the first reversal, and between two reversals, that show
+# its angles
+MIN_FIRST_SAMPLES, MIN_SPAN_SAMPLES = 2.5, 4.0
 MAX_EARLY_SWITCH = radians(1.5)
 MAX_LATE_SWITCH = radians(4.0)  # of a reversal beyond the nominal switch heading
 SCATTERED_SWITCH = radians(2.0)
@@ -98,7 +100,8 @@ class ManoeuvrePart:
             return []
         spans = np.diff([self.found.execute, *self.found.reversals]) * self.filled.dt_secs
         shortest = float(np.min(spans))
-        if shortest >= MIN_SPAN_SAMPLES * interval:
+        enough = np.array([MIN_FIRST_SAMPLES] + [MIN_SPAN_SAMPLES] * (len(spans) - 1)) * interval
+        if np.all(spans >= enough):
             return []
         reason = (
             f"the rudder is reversed after {shortest:.0f} s, and recorded every {interval:.0f} s: "

@@ -8,10 +8,11 @@ import numpy as np
 
 from shiplog.types import FloatArray
 
+from .spirals import MIN_RATE_STEP
 from .trial_signals import TrialSignals
 
 STEADY_SHARE = 0.4  # of a level's end, over which yaw rate and rudder are averaged
-SAME_RATE_SHARE = 0.5  # of the largest step between yaw rates: smaller ones are at one level
+SAME_RATE = 0.75 * MIN_RATE_STEP  # between yaw rates that are at one level
 
 
 def spiral_curve(signals: TrialSignals, levels: FloatArray) -> FloatArray:
@@ -114,7 +115,7 @@ def steered_loop(points: FloatArray) -> tuple[float, float]:
     """
     order = np.argsort(points[:, 1])
     steps = np.diff(points[order, 1])
-    group = np.concatenate(([0], np.cumsum(steps > SAME_RATE_SHARE * np.max(steps, initial=0.0))))
+    group = np.concatenate(([0], np.cumsum(steps > SAME_RATE)))
     counts = np.bincount(group)
     angles, rates = (np.bincount(group, column) / counts for column in points[order].T)
     crossed = np.flatnonzero(angles[:-1] * angles[1:] <= 0)

@@ -1,6 +1,7 @@
 """Position fixes of a log, interpolated at the instants of signals."""
 
 from collections.abc import Iterable
+from math import radians
 
 import numpy as np
 
@@ -56,6 +57,14 @@ class PositionFixes:
         if frame is None:
             return none
         return channel.measured_ns[measured], frame.north_east(positions)[measured]
+
+    def latitude(self) -> float:
+        """Return the latitude of the first fix, rad; 0 where fixes are local or there is none."""
+        if not self._parts:
+            return 0.0
+        channel = concatenate_channels(self._parts)
+        frame = LocalFrame.at_first(positions_of(channel.fields, channel.values))
+        return radians(frame.datum[0]) if frame is not None and frame.geographic else 0.0
 
 
 def _interpolated(

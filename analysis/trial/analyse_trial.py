@@ -1,7 +1,7 @@
 """Analysis of a trial: its manoeuvres, their indices, and the verdict of the norm."""
 
 from collections.abc import Sequence
-from math import nan
+from math import nan, radians
 
 import numpy as np
 
@@ -27,6 +27,8 @@ from .trial_record import TrialRecord, read_trial
 CONDITION_PREFIX = "condition."
 GROUND_SPEED_SECS = 30.0  # of an approach, over which a speed over the ground is taken
 STOPPED_SPEED = 0.5  # m/s: a ship that is never faster does not move
+PERMITTED_COMPASS_ERROR = radians(0.25)  # at the equator, IMO A.821(19), 4.1.2
+MAX_COMPASS_LATITUDE = radians(70.0)  # up to which the norm holds
 NOT_TESTED = {
     "advance": "no turning circle at 35° or the largest angle",
     "tactical diameter": "no turning circle at 35° or the largest angle",
@@ -89,7 +91,7 @@ def analyse_trial(
     settings = AssessmentSettings(
         rules,
         (trial_options.antenna_forward, trial_options.antenna_starboard),
-        trial_options.compass_change_std,
+        _compass_change_std(record, trial_options),
         {"length": conditions.length, "test_speed": conditions.test_speed},
     )
     manoeuvres = []
@@ -112,6 +114,16 @@ def analyse_trial(
         ),
         warnings=record.warnings,
     )
+
+
+def _compass_change_std(record: TrialRecord, options: TrialOptions) -> float:
+    """Return the standard uncertainty of the compass in a change of heading, rad."""
+    if options.compass_change_std is not None:
+        return options.compass_change_std
+    if record.vessel is not None and record.vessel.compass_error is not None:
+        return record.vessel.compass_error
+    latitude = min(abs(record.latitude), MAX_COMPASS_LATITUDE)
+    return PERMITTED_COMPASS_ERROR / float(np.cos(latitude))
 
 
 def _unused_executes(

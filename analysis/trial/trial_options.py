@@ -28,8 +28,9 @@ class TrialOptions:
         Assumed standard deviation of a constant error of the heading, rad.
     compass_change_std
         Assumed standard deviation of the compass's error in a change of heading from the approach,
-        rad. IMO A.821(19), 4.1.2, permits 0.25°, times the secant of the latitude, as the root
-        mean square of the differences of ten settled headings, 20 minutes apart, from their mean.
+        rad; None takes that of the vessel file or, without one, the 0.25° times the secant of the
+        latitude that IMO A.821(19), 4.1.2, permits as the root mean square of the differences of
+        ten settled headings, 20 minutes apart, from their mean.
     speed_scale_std
         Assumed standard deviation of the scale error of the speed through the water.
     current_std
@@ -44,7 +45,7 @@ class TrialOptions:
     antenna_starboard: float = 0.0
     test_speed: float | None = None
     compass_bias_std: float = radians(0.5)
-    compass_change_std: float = radians(0.25)
+    compass_change_std: float | None = None
     speed_scale_std: float = 0.02
     current_std: float = 0.25
 

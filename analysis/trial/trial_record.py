@@ -38,6 +38,8 @@ class TrialRecord:
         The first instant, ns since 1970-01-01 UTC.
     signals
         On a uniform clock.
+    latitude
+        Of the first fix, rad; 0 where the log has none or only local positions.
     wind_speed, wind_direction
         Means of the true wind, m/s and rad; NaN where not measured.
     vessel
@@ -51,6 +53,7 @@ class TrialRecord:
     name: str
     start_ns: int
     signals: TrialSignals
+    latitude: float
     wind_speed: float
     wind_direction: float
     vessel: Vessel | None
@@ -112,6 +115,7 @@ def read_trial(log: Log, options: ReadingOptions, on_progress: ProgressCallback)
             events=events,
             **used,
         ),
+        latitude=fixes.latitude(),
         wind_speed=_mean(values, "wind_speed"),
         wind_direction=_mean_direction(values),
         vessel=vessel,

@@ -46,6 +46,9 @@ class Vessel:
     gear_given
         Keys of the steering gear that the file gives, ``max`` and ``rate``; the others have their
         defaults.
+    compass_error
+        Standard uncertainty of the compass in a change of heading, rad; None where the file does
+        not give it.
     filter, disturbance, identifier
         Settings of a replay.
     angle_unit
@@ -61,6 +64,7 @@ class Vessel:
     rudder_max: float = 35 * pi / 180
     rudder_rate: float = 2.5 * pi / 180
     gear_given: tuple[str, ...] = ()
+    compass_error: float | None = None
     filter: FilterSettings = field(default_factory=FilterSettings)
     disturbance: DisturbanceSettings = field(default_factory=DisturbanceSettings)
     identifier: IdentifierSettings = field(default_factory=IdentifierSettings)

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping
 from dataclasses import replace
-from math import inf, nan, pi
+from math import inf, nan, pi, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,7 @@ LIMITS: dict[str, dict[str, tuple[float, float]]] = {
     | {"T1": (1e-3, 1e6), "T2": (1e-3, 1e6)},
     "rudder": dict.fromkeys(ALPHAS, ANY) | {"max": (0.0, inf), "rate": (0.0, inf)},
     "surge": dict.fromkeys(SURGE_KEYS, ANY),
+    "compass": {"error_deg": (0.0, 5.0)},
 }
 
 Numbers = Mapping[str, Mapping[str, float]]  # by section and key
@@ -256,6 +257,7 @@ def _vessel(
 ) -> Vessel:
     """Vessel with its steering gear, and without its settings."""
     rudder, top, defaults = numbers["rudder"], numbers[""], Vessel(name, coefficients)
+    compass = numbers["compass"]
     return Vessel(
         name,
         coefficients,
@@ -264,4 +266,5 @@ def _vessel(
         rudder_max=rudder["max"] / per_rad if "max" in rudder else defaults.rudder_max,
         rudder_rate=rudder["rate"] / per_rad if "rate" in rudder else defaults.rudder_rate,
         gear_given=tuple(key for key in GEAR_KEYS if key in rudder),
+        compass_error=radians(compass["error_deg"]) if "error_deg" in compass else None,
     )

@@ -36,10 +36,17 @@ def assumptions(options: TrialOptions) -> Iterator[str]:
         )
     else:
         yield "The antenna of the positions is at the midship point."
+    given = options.compass_change_std
+    compass = (
+        "that of the vessel file or else 0.25° times the secant of the latitude (IMO A.821(19), "
+        "4.1.2)"
+        if given is None
+        else f"{degrees(given):g}°"
+    )
     yield (
         "Standard uncertainties that the log does not show: constant error of the heading "
         f"{degrees(options.compass_bias_std):g}°, slow error of the compass in a change of heading "
-        f"{degrees(options.compass_change_std):g}° (IMO A.821(19), 4.1.2), scale of the speed "
+        f"{compass}, scale of the speed "
         f"{options.speed_scale_std * 100:g} %, each component of a current that the log does not "
         f"determine {options.current_std:g} m/s. Where the log has no orders, the time from an "
         "order to the rudder's movement is not known and counts as none."

@@ -11,7 +11,10 @@ import shiplog
 from analysis import TrialOptions, analyse_trial
 from analysis.manoeuvres.index_uncertainty import COMPASS, GYRO
 from analysis.manoeuvres.sailed_manoeuvre import SailedManoeuvre
+from analysis.replay.reading_options import ReadingOptions
 from shiplog import TrialLog
+from shiplog.geodesy import LocalFrame, LocalPositions
+from shiplog.vessel.vessel_parser import parse_vessel
 
 OVERSHOOTS = ("overshoot 1", "overshoot 2", "overshoot 3")
 
@@ -24,6 +27,32 @@ def log() -> TrialLog:
 def analysed(log: TrialLog, **options: float) -> SailedManoeuvre:
     (found,) = analyse_trial(log, trial_options=TrialOptions(**options)).manoeuvres  # type: ignore[arg-type]
     return found
+
+
+def from_log(log: TrialLog, vessel: str = "") -> SailedManoeuvre:
+    options = ReadingOptions(vessel=parse_vessel(vessel, "ship.toml") if vessel else None)
+    (found,) = analyse_trial(log, options).manoeuvres
+    return found
+
+
+def test_the_vessel_file_states_the_compass_s_error(log: TrialLog) -> None:
+    found = from_log(log, "[compass]\nerror_deg = 0.4\n")
+    assert sources(found, COMPASS) == pytest.approx([radians(0.4)] * 3)
+
+
+def test_the_error_grows_with_the_secant_of_the_latitude(log: TrialLog) -> None:
+    position = log["position"]
+    fixes = LocalFrame((60.0, 20.0), geographic=True).to_geographic(
+        LocalPositions(position.values[:, 0], position.values[:, 1])
+    )
+    moved = replace(
+        position,
+        unit="deg",
+        fields=("latitude", "longitude"),
+        values=np.column_stack((fixes.latitude, fixes.longitude)),
+    )
+    far = replace(log, channels=tuple(moved if c is position else c for c in log.channels))
+    assert sources(from_log(far), COMPASS) == pytest.approx([radians(0.5)] * 3, rel=1e-3)
 
 
 def sources(found: SailedManoeuvre, source: str) -> list[float]:

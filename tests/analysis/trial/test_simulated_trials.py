@@ -221,6 +221,57 @@ def test_the_manoeuvre_sailed_is_found_and_no_other(kind: str, ship: TrialShip) 
     assert tuple(kinds(trial)) == KINDS[kind].expected
 
 
+def test_a_zigzag_sampled_every_ten_seconds_has_its_switch_heading_and_wider_intervals() -> None:
+    sailed, steering = sailed_zigzag("mariner", 20.0, -1.0, helm_deg=0.8)
+    (found,) = analysed(as_log(sailed, replace(GOOD, interval=10.0), rng(8)), MARINER).manoeuvres
+    assert degrees(found.switch_heading) == pytest.approx(20.0)
+    assert any("is assumed" in note for note in found.notes)
+    time = found.index("initial turning time")
+    assert time is not None
+    assert time.std > 1.0
+    for name, true in true_indices(sailed, steering).items():
+        index = found.index(name)
+        assert index is None or abs(index.value - true) < 3.3 * index.std, name
+
+
+def test_a_zigzag_with_too_few_samples_of_the_rudder_has_no_indices() -> None:
+    sailed, _ = sailed_zigzag("mariner", 20.0, -1.0, helm_deg=0.8)
+    log = as_log(sailed, replace(GOOD, interval=20.0), rng(9))
+    (found,) = analysed(log, sailed.ship).manoeuvres
+    assert found.indices == ()
+    assert "recorded every 20 s" in found.not_computed[0].reason
+
+
+def test_a_zigzag_whose_last_angle_is_kept_for_a_turn_is_no_initial_turning() -> None:
+    zigzag = Steering(SEIUN_MARU, EXECUTE_SECS, radians(10.0), radians(10.0))
+
+    def helmsman(time: float, heading: float, yaw_rate: float, rudder: float) -> float:
+        if len(zigzag.executes) < 3:
+            return zigzag(time, heading, yaw_rate, rudder)
+        return (
+            radians(-10.0)
+            if heading > -pi / 2
+            else keeping(SEIUN_MARU, -pi / 2)(time, heading, yaw_rate, rudder)
+        )
+
+    trial = analysed(as_log(sail(SEIUN_MARU, helmsman, 420.0), GOOD, rng()), SEIUN_MARU)
+    assert kinds(trial) == [ManoeuvreKind.ZIGZAG]
+
+
+def test_like_counter_rudder_after_a_zigzag_is_none_of_its_reversals() -> None:
+    zigzag = Steering(SEIUN_MARU, EXECUTE_SECS, radians(10.0), radians(10.0))
+
+    def helmsman(time: float, heading: float, yaw_rate: float, rudder: float) -> float:
+        if len(zigzag.executes) < 2 or heading < radians(-1.0):
+            return zigzag(time, heading, yaw_rate, rudder)
+        zigzag.executes.append(time)
+        counter = yaw_rate > radians(0.05)
+        return radians(-10.0) if counter else keeping(SEIUN_MARU)(time, heading, yaw_rate, rudder)
+
+    trial = analysed(as_log(sail(SEIUN_MARU, helmsman, 420.0), GOOD, rng()), SEIUN_MARU)
+    assert kinds(trial) == [ManoeuvreKind.ZIGZAG]
+
+
 def test_half_a_manoeuvre_is_named_with_its_reason() -> None:
     steering = Steering(KVLCC2, EXECUTE_SECS, radians(35.0))
     trial = analysed(as_log(sail(KVLCC2, steering, 160.0), GOOD, rng()), KVLCC2)
