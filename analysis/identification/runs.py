@@ -31,6 +31,7 @@ from shiplog.types import (
     Log,
     concatenate_signals,
 )
+from shiplog.vessel.hull import Hull
 from shiplog.vessel.settings import DisturbanceSettings, FilterSettings, IdentifierSettings
 from shiplog.vessel.vessel import Vessel
 from shiplog.vessel.vessel_parser import parse_vessel
@@ -210,7 +211,7 @@ def common_vessel(runs: Sequence[Run], given: Vessel | None) -> Vessel | None:
     Raises
     ------
     LogError
-        The logs have vessel files of different models, lengths or steering gears.
+        The logs have vessel files of different models, lengths, steering gears or hulls.
     """
     if given is not None:
         return given
@@ -223,15 +224,28 @@ def common_vessel(runs: Sequence[Run], given: Vessel | None) -> Vessel | None:
                 f"{first.name!r}, {name} another model, {vessel.name!r}; identify each ship "
                 "separately, or choose the vessel file with --vessel"
             )
-    return embedded[0][1] if embedded else None
+    return _with_known_hull(embedded) if embedded else None
+
+
+def _with_known_hull(embedded: Sequence[tuple[str, Vessel]]) -> Vessel:
+    """Return the vessel of the first log with the hull of the first one that has any."""
+    known = [(name, vessel.hull) for name, vessel in embedded if vessel.hull != Hull()]
+    for name, hull in known[1:]:
+        if hull != known[0][1]:
+            raise LogError(
+                f"the logs are of different hulls: [hull] of {name} differs from that of "
+                f"{known[0][0]}; identify each loading separately, or choose the vessel file with "
+                "--vessel"
+            )
+    return replace(embedded[0][1], hull=known[0][1]) if known else embedded[0][1]
 
 
 def _physical(vessel: Vessel) -> Vessel:
-    """Return the vessel with name, approach, unit and estimator settings set to defaults."""
+    """Return the vessel with name, approach, unit, hull and estimator settings set to defaults."""
     return replace(
         vessel, name="", approach_rpm=1.0, angle_unit="rad", gear_given=(),
         filter=FilterSettings(), disturbance=DisturbanceSettings(),
-        identifier=IdentifierSettings(),
+        identifier=IdentifierSettings(), hull=Hull(),
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model, ship_model
 from shiplog.ships.paper import COEFFICIENT_UNITS, YAW_COEFFICIENTS, Coefficients, rudder_effect
 from shiplog.toml_output import toml_string
+from shiplog.vessel.hull import hull_dict
 from shiplog.vessel.model_section import PAPER_MODELS
 from shiplog.vessel.vessel import Vessel
 
@@ -159,6 +160,16 @@ def _head(ship: IdentifiedShip) -> Iterator[str]:
         yield f"length = {DEFAULT_LENGTH!r}  # m, ASSUMED, as none was given: the scale of [model]"
     yield f"approach_rpm = {round(initial_level(segments, 'rpm'), 3)!r}"
     yield f'angle_unit = "{_angle_unit(vessel)}"'
+    yield from _hull(vessel)
+
+
+def _hull(vessel: Vessel | None) -> Iterator[str]:
+    """Yield `[hull]`, where anything of it is known."""
+    known = hull_dict(vessel.hull) if vessel is not None else {}
+    if known:
+        yield "\n[hull]"
+    for key, value in known.items():
+        yield f"{key} = {toml_string(value) if isinstance(value, str) else repr(value)}"
 
 
 def _angle_unit(vessel: Vessel | None) -> str:

@@ -20,6 +20,7 @@ from analysis.replay.reading_options import DEFAULT_OPTIONS, ReadingOptions
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.types import Log
 
+from .hull_conditions import with_hull_conditions
 from .trial_analysis import CriterionFinding, CurrentEstimate, TrialAnalysis, TrialConditions
 from .trial_options import DEFAULT_TRIAL_OPTIONS, TrialOptions
 from .trial_record import TrialRecord, read_trial
@@ -154,6 +155,7 @@ def _conditions(
         for key, text in record.metadata.items()
         if key.startswith(CONDITION_PREFIX)
     }
+    stated = with_hull_conditions(stated, record.vessel)
     length = record.vessel.length if record.vessel is not None else None
     speed, origin = _test_speed(filled, detection, stated, options)
     current = None

@@ -43,8 +43,8 @@ class TrialConditions:
     test_speed_origin
         Where `test_speed` came from.
     stated
-        What the log's metadata state, by the name of the condition, such as
-        ``{"water_depth": "60 m"}``; see `recorders.trial.conditions.CONDITIONS`.
+        What the log's metadata state, or else `[hull]` of the vessel file, by the name of the
+        condition, such as ``{"water_depth": "60 m"}``; see `recorders.trial.conditions.CONDITIONS`.
     wind_speed, wind_direction
         Means of the log's true wind, m/s and rad, from which it blows; NaN without a sensor.
     current

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from shiplog.errors import UsageError, VesselError
 
+from .hull import Hull
 from .model_section import ModelSection
 from .settings import (
     DisturbanceSettings,
@@ -55,6 +56,8 @@ class Vessel:
         Unit of the angles in the file, "deg" or "rad"; here all angles are in radians.
     model
         Ship model of a simulation, where it is not the paper's.
+    hull
+        Main dimensions of hull, rudder and propeller.
     """
 
     name: str
@@ -70,6 +73,7 @@ class Vessel:
     identifier: IdentifierSettings = field(default_factory=IdentifierSettings)
     angle_unit: str = "rad"
     model: ModelSection | None = None
+    hull: Hull = field(default_factory=Hull)
 
     @property
     def paper_coefficients(self) -> "Coefficients":

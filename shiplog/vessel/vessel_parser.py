@@ -11,6 +11,7 @@ from shiplog.errors import VesselError
 from shiplog.toml_text import list_errors, parse_toml, read_toml_text, unknown_key
 from shiplog.units import did_you_mean
 
+from .hull import Hull, parse_hull
 from .model_section import parse_model_section
 from .presets import PRESETS
 from .settings import (
@@ -110,7 +111,7 @@ def parse_vessel(text: str, where: str) -> Vessel:
             f"the vessel file is empty; give what is known, such as length = 320: {where}"
         )
     errors: list[str] = []
-    model_table = table.pop("model", None)
+    model_table, hull_table = table.pop("model", None), table.pop("hull", {})
     sections = {key: _section(key, table.pop(key, {}), errors) for key in SECTIONS}
     filtering = parse_settings(FilterSettings, sections["filter"], errors)
     observing = parse_settings(DisturbanceSettings, sections["disturbance"], errors)
@@ -119,6 +120,7 @@ def parse_vessel(text: str, where: str) -> Vessel:
     # a length with an error is nan: it must not be reported as missing, too
     length = numbers[""].get("length", nan if "length" in table else None)
     model = None if model_table is None else parse_model_section(model_table, length, errors)
+    hull = parse_hull(hull_table, numbers[""].get("length"), errors)
     has_paper_model = _has_paper_model(table)
     if has_paper_model:
         _require(numbers, _yaw_keys(numbers["yaw"], errors), errors)
@@ -135,6 +137,7 @@ def parse_vessel(text: str, where: str) -> Vessel:
         identifier=identifying,
         angle_unit=angle_unit,
         model=model,
+        hull=hull or Hull(),
     )
 
 
@@ -166,7 +169,7 @@ def _parse_number(
     """Add one number of a section to `numbers`."""
     label = f"{section}.{key}" if section else key
     if key not in LIMITS[section]:
-        sections = (*TEXT_KEYS, *filter(None, LIMITS), *SECTIONS, "model")
+        sections = (*TEXT_KEYS, *filter(None, LIMITS), *SECTIONS, "model", "hull")
         allowed = [*LIMITS[section], *(() if section else sections)]
         errors.append(unknown_key(key, allowed, section=section))
         return

@@ -103,7 +103,19 @@ def _length_over_speed(conditions: TrialConditions) -> str:
 
 
 def _mean_draught(conditions: TrialConditions) -> float:
+    if "draught" in conditions.stated:
+        return _number(conditions, "draught")
     return (_number(conditions, "draught_forward") + _number(conditions, "draught_aft")) / 2
+
+
+def _mean_draught_text(conditions: TrialConditions) -> str:
+    draught = _mean_draught(conditions)
+    return f"{draught:.4g} m" if isfinite(draught) else ""
+
+
+def _propeller_turning(conditions: TrialConditions) -> str:
+    turning = conditions.stated.get("propeller_turning", "")
+    return f"{turning}-handed" if turning else ""
 
 
 def _length_over_breadth(conditions: TrialConditions) -> str:
@@ -182,8 +194,12 @@ FORM: tuple[tuple[str, tuple[Line, ...]], ...] = (
             ("Rudder: number", _stated("rudders")),
             ("Rudder: total area", _stated("rudder_area")),
             ("Rudder: area / (L·T)", _rudder_area_share),
+            ("Rudder: aspect ratio", _stated("rudder_aspect_ratio")),
             ("Propeller: type", _stated("propeller_type")),
             ("Propeller: number", _stated("propellers")),
+            ("Propeller: diameter", _stated("propeller_diameter")),
+            ("Propeller: pitch / diameter", _stated("propeller_pitch_ratio")),
+            ("Propeller: turning ahead", _propeller_turning),
             ("Engine", _stated("engine")),
         ),
     ),
@@ -195,6 +211,7 @@ FORM: tuple[tuple[str, tuple[Line, ...]], ...] = (
             ("Displacement", _stated("displacement")),
             ("Draught forward", _stated("draught_forward")),
             ("Draught aft", _stated("draught_aft")),
+            ("Mean draught T", _mean_draught_text),
             ("Trim", _trim),
             ("Test speed V", _test_speed),
             ("V is", lambda each: each.test_speed_origin),

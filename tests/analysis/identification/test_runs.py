@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from trial_logs import as_log
 
-from analysis.identification.runs import run_from_log
+from analysis.identification.runs import Run, common_vessel, run_from_log
 from analysis.replay.plan import plan_replay
 from recorders.simulated.simulate import simulate
-from shiplog import TrialLog, Vessel
+from shiplog import LogError, TrialLog, Vessel
+from shiplog.vessel.hull import Hull
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +59,23 @@ def test_contradictions_are_kept_to_explain_an_error_of_the_fit(trial: TrialLog)
     channels = tuple(reversed_rate if c.name == "yaw_rate" else c for c in trial.channels)
     (contradiction, *_) = run_from_log(replace(trial, channels=channels)).contradictions
     assert "yaw_rate" in contradiction
+
+
+def run_of(name: str, vessel: Vessel) -> Run:
+    return Run(name, (), (), vessel, (), data_lost=False)
+
+
+def test_a_hull_that_one_log_states_holds_for_all(vessel: Vessel) -> None:
+    stated = replace(vessel, hull=Hull(breadth=32.0))
+    runs = [run_of("a", vessel), run_of("b", stated), run_of("c", stated)]
+    assert common_vessel(runs, None) == stated
+    assert common_vessel(runs, vessel) == vessel
+
+
+def test_logs_of_two_loadings_are_refused(vessel: Vessel) -> None:
+    runs = [
+        run_of(name, replace(vessel, hull=Hull(draught=draught)))
+        for name, draught in (("laden", 10.0), ("ballast", 6.0))
+    ]
+    with pytest.raises(LogError, match=r"\[hull\] of ballast differs from that of laden"):
+        common_vessel(runs, None)

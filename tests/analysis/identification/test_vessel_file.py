@@ -25,6 +25,7 @@ from recorders.simulated.simulate import simulate
 from recorders.simulated.trajectory import compute_trajectory
 from shiplog import LogError, TrialLog, Vessel
 from shiplog.types import FloatArray
+from shiplog.vessel.hull import Hull
 from shiplog.vessel.presets import PRESETS
 from shiplog.vessel.ship import ship_from_vessel
 from shiplog.vessel.vessel_parser import parse_vessel
@@ -204,6 +205,14 @@ def test_length_gear_and_alphas_come_from_the_file_a_log_carries() -> None:
     assert identify([log]).fixed["alpha3"] == 0.05
     bare = identify([logs_of("three-dof")[0]])  # its file has a [model] alone
     assert bare.fixed["alpha3"] == 0.0654
+
+
+def test_the_hull_of_the_logs_is_written_on() -> None:
+    ship, _ = identified("three-dof")
+    assert ship.vessel is not None
+    hull = Hull(breadth=32.0, draught=10.0, propeller_turning="left")
+    text = vessel_toml(replace(ship, vessel=replace(ship.vessel, hull=hull)))
+    assert parse_vessel(text, "v.toml").hull == hull
 
 
 # ---- undetermined values
