@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 
 from analysis.identification.fit.initial_guess import initial_guesses
 from analysis.identification.fit.least_squares import OUTLIER_STDS
+from analysis.identification.fit.nuisance import Nuisance
 from analysis.identification.fit.output_error import (
     OutputError,
     fit_problem,
@@ -16,7 +17,6 @@ from analysis.identification.fit.output_error import (
     make_problem,
     output_error,
 )
-from analysis.identification.fit.problem import Nuisance
 from analysis.identification.fit.segment import Segment
 from shiplog.ships import ship_model
 from shiplog.types import FloatArray

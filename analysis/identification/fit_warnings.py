@@ -7,7 +7,6 @@ import numpy as np
 from analysis.identification.fit.output_error import OutputError
 from analysis.identification.fit.problem import residuals
 from analysis.identification.fit.uncertainty import Uncertainty
-from shiplog.ships.motion import MODEL_OUTPUTS
 
 from .prior_sensitivity import PriorSensitivity
 from .validation import Validation, nan_rms
@@ -43,11 +42,12 @@ def fit_warnings(
 def _large_residuals(fit: OutputError) -> Iterator[str]:
     """Yield the runs that the fit does not explain, white noise excepted."""
     problem = fit.problem
-    for segment, residual, stds in zip(
-        problem.segments, residuals(problem, fit.minimum.unknowns), fit.residual_stds, strict=True
+    all_residuals = residuals(problem, fit.minimum.unknowns)
+    for i, (segment, residual, stds) in enumerate(
+        zip(problem.segments, all_residuals, fit.residual_stds, strict=True)
     ):
         for c, output in enumerate(problem.outputs):
-            measured = segment.measured[:, MODEL_OUTPUTS.index(output)]
+            measured = problem.measured(i)[:, c]
             white = max(float(np.mean(stds.typical[:, c] ** 2)) - fit.noises[c].slow ** 2, 0.0)
             rms = np.sqrt(max(nan_rms(residual[:, c]) ** 2 - white, 0.0))
             size = float(np.nanstd(measured)) if np.isfinite(measured).any() else 0.0

@@ -15,6 +15,7 @@ from shiplog.vessel.vessel import Vessel
 
 from .advice import TieCheck
 from .model_selection import Candidate
+from .predicted_indices import PredictedManoeuvre
 from .prior_sensitivity import PriorSensitivity
 from .validation import Validation, nan_rms
 
@@ -68,7 +69,12 @@ class IdentifiedShip:
     validations
         The segments that were predicted.
     candidates
-        The models compared, the best first; empty where the model was named.
+        The models compared on held-out runs, the best first: all of them, or the one that was
+        named; empty for a single run.
+    predictions
+        The standard manoeuvres as the models predict them, each by its weight.
+    no_predictions
+        Why there are none; else empty.
     ties
         Whether the ties of the paper's model hold; None for another model.
     vessel
@@ -93,6 +99,8 @@ class IdentifiedShip:
     runs: tuple[RunFit, ...]
     validations: tuple[Validation, ...]
     candidates: tuple[Candidate, ...]
+    predictions: tuple[PredictedManoeuvre, ...]
+    no_predictions: str
     ties: TieCheck | None
     vessel: Vessel | None
     length_given: bool
@@ -121,21 +129,16 @@ def run_fits(fit: OutputError) -> Iterator[RunFit]:
     """Yield of each segment of a fit its residuals and the unknowns of its own."""
     problem, z = fit.problem, fit.minimum.unknowns
     residual = residuals(problem, z)
-    has_offset = problem.nuisance.rudder_std > 0
-    offset = len(problem.model.state)
-    biases = offset + has_offset
-    waves = biases + len(problem.biases)
     for i, segment in enumerate(problem.segments):
-        own = z[problem.own_slice(i)]
-        frequencies = own[waves :: 1 + 2 * len(problem.outputs)]
+        own = problem.own(z, i)
         yield RunFit(
             name=segment.name,
             duration_secs=(len(segment) - 1) * segment.dt_secs,
             rms={name: nan_rms(residual[i][:, c]) for c, name in enumerate(problem.outputs)},
-            rudder_offset=float(own[offset]) if has_offset else 0.0,
+            rudder_offset=problem.rudder_zero(z) + own.rudder,
             biases={
-                problem.outputs[c]: float(own[biases + k])
-                for k, (c, _) in enumerate(problem.biases)
+                problem.outputs[c]: float(bias)
+                for (c, _), bias in zip(problem.biases, own.biases, strict=True)
             },
-            wave_secs=tuple(float(2 * np.pi / abs(omega)) for omega in frequencies),
+            wave_secs=tuple(float(2 * np.pi / abs(wave[0])) for wave in own.waves),
         )

@@ -28,6 +28,7 @@ from .fixed_parameters import check_fixed, fixed_values
 from .identified_ship import IdentifiedShip, run_fits
 from .model_selection import Candidate, rank_models, require_two_runs
 from .parallel import single_blas_thread
+from .predicted_indices import PredictedManoeuvre, approach_of, predict_manoeuvres
 from .prior_sensitivity import PriorSensitivity, prior_sensitivity
 from .runs import Run, common_vessel, consistency_warnings, distinct_runs
 from .validation import validate
@@ -100,12 +101,14 @@ def identify(
     ship = with_length(common_vessel([*runs, *held_out], options.vessel), options.length)
     steps.begin("fit")
     with naming_contradictions([text for run in runs for text in run.contradictions]):
-        candidates, fit = _fit(runs, models, fixed, ship, steps, ranked=model == AUTO)
+        candidates, fit = _fit(runs, models, fixed, ship, steps)
     estimates, sensitivity = _estimates(fit, steps)
     steps.begin("other methods")
     histories = _histories(fit, estimates)
     steps.begin("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
+    steps.begin("predictions")
+    predictions, no_predictions = _predictions(candidates, runs, ship)
     all_runs = [*runs, *held_out]
     warnings += [warning for run in all_runs for warning in run.warnings]
     warnings += consistency_warnings(all_runs)
@@ -121,6 +124,8 @@ def identify(
         runs=tuple(run_fits(fit)),
         validations=tuple(validations),
         candidates=tuple(candidates),
+        predictions=predictions,
+        no_predictions=no_predictions,
         ties=check_ties(fit),
         vessel=ship,
         length_given=ship is not None and ship.length is not None,
@@ -131,9 +136,11 @@ def identify(
     )
 
 
-STEPS = ("read", "fit", "uncertainty", "prior sensitivity", "other methods", "validation")
-NAMED_STARTS = (0.0, 0.03, 0.25, 0.5, 0.6, 0.97)  # of each step, as a share of the duration
-AUTO_STARTS = (0.0, 0.01, 0.8, 0.88, 0.9, 0.99)
+STEPS = (
+    "read", "fit", "uncertainty", "prior sensitivity", "other methods", "validation", "predictions",
+)  # fmt: skip
+NAMED_STARTS = (0.0, 0.03, 0.25, 0.5, 0.6, 0.9, 0.92)  # of each step, as a share of the duration
+AUTO_STARTS = (0.0, 0.01, 0.75, 0.84, 0.86, 0.94, 0.95)
 
 
 class _Steps:
@@ -172,14 +179,12 @@ def _fit(
     fixed: Mapping[str, float],
     ship: Vessel | None,
     steps: _Steps,
-    *,
-    ranked: bool,
 ) -> tuple[list[Candidate], OutputError]:
-    """Return the candidates, if models are to be ranked, and the fit that is taken."""
+    """Return the models compared on held-out runs, if there are two runs, and the fit taken."""
     segments = [segment for run in runs for segment in run.segments]
     length = ship.length if ship else None
     given = {model.name: fixed_values(model, fixed, ship) for model in models}
-    if not ranked:
+    if len(runs) < 2:
         (model,) = models
         return [], output_error(segments, model, fixed=given[model.name], length=length)
     make_problem(segments, models[0], length=length)  # rejects logs that are useless to any model
@@ -213,6 +218,18 @@ def _histories(fit: OutputError, estimates: Uncertainty) -> tuple[ParameterHisto
     priors = two_priors(estimates, fit.problem.bounds)
     histories = parameter_ekf(fit, priors), window_estimates(fit), paper_scheme(fit, priors)
     return tuple(history for history in histories if history is not None)
+
+
+def _predictions(
+    candidates: Sequence[Candidate], runs: Sequence[Run], ship: Vessel | None
+) -> tuple[tuple[PredictedManoeuvre, ...], str]:
+    """Return the predicted standard manoeuvres, or why there are none."""
+    if len(runs) < 2:
+        return (), (
+            "one run does not show how well the model predicts another; give two or more, such as "
+            "zig-zags 10/10 and 20/20"
+        )
+    return predict_manoeuvres(candidates, approach_of(runs, ship)), ""
 
 
 def _assumed_length(fit: OutputError, ship: Vessel | None) -> Iterator[str]:

@@ -10,29 +10,24 @@ Stone, "Cross-validatory choice and assessment of statistical predictions", 1974
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from analysis.identification.fit.least_squares import minimise
-from analysis.identification.fit.output_error import (
-    OutputError,
-    initial_residual_stds,
-    output_error,
-    reweighted_fit,
-)
+from analysis.identification.fit.output_error import OutputError, output_error
 from analysis.identification.fit.segment import Segment
 from shiplog.errors import LogError, UsageError
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model
-from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
+from .held_out import JUDGED_COLUMNS, PREDICTED, HeldOutErrors, predict_without
 from .parallel import parallel_map
-from .prediction import SCORED_OUTPUTS, misfit
 
-JUDGED_COLUMNS = [MODEL_OUTPUTS.index(name) for name in SCORED_OUTPUTS]  # the same for all models
 MAX_MISFIT = 10.0  # relative error that a diverging simulation counts with
+RUN_NUMBERS = 4  # independent numbers of a run: its error is slow, and yaw, speed and track differ
+HARD_SHARE = 0.75  # of the largest rudder angle: from it a run is one of the hardest
+LEAST_WEIGHT = 0.05  # of the best model's: below it a model is not averaged
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,17 +41,33 @@ class Candidate:
     fit
         The fit to all runs; None where its simulation diverges.
     misfits
-        (r, 4) of each segment, held out with its run: rms of predicted minus measured over the
-        standard deviation of the measured, in the order of `MODEL_OUTPUTS`.
+        (r, 5) of each segment, held out with its run and again with all of the hardest runs: the
+        error of each of `PREDICTED`, as in `HeldOutErrors`.
+    hard_misfits
+        (5,) of them the mean over the hardest runs, predicted from the others together.
+    hard_ratio
+        The largest rudder angle over that of the runs from which the hardest ones are predicted.
+    excess
+        The mean square of those errors over that predicted; at least 1.
+    fault
+        Why the model is not to be chosen: it has not converged, or a parameter is at its limit;
+        empty for none.
+    weight
+        Its share in predictions that average over the models, 0 to 1.
     """
 
     model: Model
     fit: OutputError | None
     misfits: FloatArray
+    hard_misfits: FloatArray = field(default_factory=lambda: np.full(len(PREDICTED), np.nan))
+    hard_ratio: float = 1.0
+    excess: float = 1.0
+    fault: str = ""
+    weight: float = 0.0
 
     @property
     def score(self) -> float:
-        """The mean misfit of yaw rate, speed and heading; the smaller, the better."""
+        """The mean misfit of yaw rate, speed, heading and track; the smaller, the better."""
         judged = np.minimum(self.misfits[:, JUDGED_COLUMNS], MAX_MISFIT)
         return float(np.nanmean(judged)) if np.isfinite(judged).any() else MAX_MISFIT
 
@@ -103,7 +114,7 @@ def rank_models(
     require_two_runs(len(runs))
     # the models with the most parameters take longest, and are begun first
     order = sorted(range(len(models)), key=lambda i: -_free_count(models[i]))
-    progress = _RankingProgress(models, order, len(runs), on_progress)
+    progress = _RankingProgress(models, order, len(held_out_sets(segments)), on_progress)
 
     def fit_all(i: int) -> OutputError | None:
         given = (fixed or {}).get(models[i].name)
@@ -114,21 +125,94 @@ def rank_models(
 
     done = parallel_map(fit_all, order, progress.reporter([(i, None) for i in order]), threads)
     fits = dict(zip(order, done, strict=True))
-    held_out = [(i, k) for i in order if fits[i] is not None for k in range(len(runs))]
+    sets = held_out_sets(segments)
+    held_out = [(i, k) for i in order if fits[i] is not None for k in range(len(sets))]
 
-    def fit_others(pair: tuple[int, int]) -> list[FloatArray]:
+    def fit_others(pair: tuple[int, int]) -> HeldOutErrors:
         whole = fits[pair[0]]
         assert whole is not None  # noqa: S101 - for the type checker
-        return _leave_out(whole, runs[pair[1]])
+        return predict_without(whole, sets[pair[1]])
 
-    rows = parallel_map(fit_others, held_out, progress.reporter(held_out), threads)
-    misfits = dict(zip(held_out, rows, strict=True))
-    candidates = []
-    for i, model in enumerate(models):
-        own = [row for k in range(len(runs)) for row in misfits.get((i, k), [])]
-        diverged = np.full((len(segments), len(MODEL_OUTPUTS)), np.inf)
-        candidates.append(Candidate(model, fits[i], np.array(own) if own else diverged))
-    return sorted(candidates, key=lambda c: (c.fit is None, c.score))
+    errors = parallel_map(fit_others, held_out, progress.reporter(held_out), threads)
+    by_model: dict[int, list[HeldOutErrors]] = {i: [] for i in range(len(models))}
+    for (i, _), each in zip(held_out, errors, strict=True):
+        by_model[i].append(each)
+    candidates = [_candidate(model, fits[i], sets, by_model[i]) for i, model in enumerate(models)]
+    ranked = sorted(candidates, key=lambda c: (c.fit is None, bool(c.fault), c.score))
+    return _weighted(ranked, len(runs))
+
+
+def _candidate(
+    model: Model,
+    fit: OutputError | None,
+    sets: Sequence[tuple[int, ...]],
+    errors: Sequence[HeldOutErrors],
+) -> Candidate:
+    if fit is None:
+        return Candidate(model, None, np.full((1, len(PREDICTED)), np.inf))
+    angles = [largest_rudder(segment) for segment in fit.problem.segments]
+    # the hardest set is the one after which the others have the smallest angles
+    left = [max(a for i, a in enumerate(angles) if i not in each) for each in sets]
+    hardest = min(range(len(sets)), key=lambda k: (left[k], -len(sets[k])))
+    excess = errors[hardest].excess
+    return Candidate(
+        model,
+        fit,
+        np.concatenate([each.misfits for each in errors]),
+        np.minimum(np.mean(errors[hardest].misfits, axis=0), MAX_MISFIT),
+        max(angles) / left[hardest],
+        max(1.0, excess) if np.isfinite(excess) else 1.0,
+        fault_of(fit),
+    )
+
+
+def largest_rudder(segment: Segment) -> float:
+    """Return the largest rudder angle of a segment, rad, outliers aside."""
+    return float(np.quantile(np.abs(segment.signals["rudder"]), 0.9))
+
+
+def fault_of(fit: OutputError) -> str:
+    """Return why a fit is not to be trusted; empty for none."""
+    if not fit.minimum.converged:
+        return "not converged"
+    lowest, highest = fit.problem.bounds
+    z = fit.minimum.unknowns
+    at_limit = np.flatnonzero((z <= lowest) | (z >= highest))
+    names = [fit.problem.free_names[i] for i in at_limit]
+    return f"at its limit: {', '.join(names)}" if names else ""
+
+
+def _weighted(ranked: Sequence[Candidate], runs: int) -> list[Candidate]:
+    """Return candidates with their weights in averages.
+
+    The likelihood of held-out runs by a model whose error they state falls with the power of the
+    score that is the number of independent numbers in them. A model with a fault has no weight
+    unless all have one.
+    """
+    sound = [c for c in ranked if c.fit is not None and not c.fault]
+    eligible = sound or [c for c in ranked if c.fit is not None]
+    if not eligible:
+        return list(ranked)
+    best = min(c.score for c in eligible)
+    power = -RUN_NUMBERS * runs
+    weights = {id(c): (max(c.score, 1e-9) / max(best, 1e-9)) ** power for c in eligible}
+    kept = {key: weight for key, weight in weights.items() if weight >= LEAST_WEIGHT}
+    total = sum(kept.values())
+    return [replace(c, weight=kept.get(id(c), 0.0) / total) for c in ranked]
+
+
+def held_out_sets(segments: Sequence[Segment]) -> tuple[tuple[int, ...], ...]:
+    """List the segments to hold out together: each run, and all of the hardest runs.
+
+    A run to one side is predicted well from its like to the other side. The runs with the largest
+    rudder angles show how a model does beyond what it was fitted to.
+    """
+    runs = _runs_of(segments)
+    angles = [max(largest_rudder(segments[i]) for i in run) for run in runs]
+    hard = [k for k, angle in enumerate(angles) if angle >= HARD_SHARE * max(angles)]
+    if len(hard) < 2 or len(hard) == len(runs):
+        return runs
+    return (*runs, tuple(i for k in hard for i in runs[k]))
 
 
 def require_two_runs(count: int) -> None:
@@ -189,21 +273,3 @@ class _RankingProgress:
             self._on_progress(step, self._done / self._whole)
 
         return report
-
-
-def _leave_out(whole: OutputError, run: Sequence[int]) -> list[FloatArray]:
-    """Return the misfits, (4,) each, of a run's segments under a fit to the other runs.
-
-    The search starts from the fit to all runs. The noise is estimated again without the run, and
-    a swell counts as noise.
-    """
-    kept = [i for i in range(len(whole.problem.segments)) if i not in run]
-    calm = replace(whole.problem, waves=())
-    rest, _ = calm.select_segments(kept, calm.start())
-    start = rest.start()
-    start[: len(rest.free)] = whole.minimum.unknowns[: len(rest.free)]
-    minimum = minimise(rest, start, initial_residual_stds(rest))
-    if not np.isfinite(minimum.cost):
-        return [np.full(len(MODEL_OUTPUTS), np.inf)] * len(run)
-    others = reweighted_fit(rest, minimum)
-    return [misfit(others, whole.problem.segments[i]) for i in run]

@@ -4,17 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.identification.fit.least_squares import minimise
-from analysis.identification.fit.output_error import OutputError, initial_residual_stds
+from analysis.identification.fit.output_error import OutputError
 from analysis.identification.fit.segment import Segment
 from analysis.manoeuvres.indices import manoeuvre_indices
 from analysis.manoeuvres.manoeuvre import ManoeuvreIndex, ManoeuvreMotion
 from analysis.manoeuvres.zigzag import overshoots
-from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.ships.path import input_path
 from shiplog.types import FloatArray, Signals
 
-SCORED_OUTPUTS = ("yaw_rate", "speed", "heading")  # every model predicts them
 ZIGZAG_STEP_SECS = 0.5  # of the simulation of a zig-zag
 
 
@@ -34,50 +31,11 @@ def predict(fit: OutputError, segment: Segment) -> FloatArray:
         (n, 4) in the order of `MODEL_OUTPUTS`, SI; NaN from where the simulation diverges.
     """
     problem = replace(fit.problem, segments=(segment,), waves=())
-    state = problem.start()[len(problem.free) :][: len(problem.model.state)]
+    state = problem.start()[problem.common :][: len(problem.model.state)]
+    zero = fit.problem.rudder_zero(fit.minimum.unknowns)
     return problem.model.simulate(
-        fit.parameters, state, segment.path, len(segment), scale=problem.scale
+        fit.parameters, state, segment.path, len(segment), offset=zero, scale=problem.scale
     )
-
-
-def misfit(fit: OutputError, segment: Segment) -> FloatArray:
-    """Compute how far a fit is from a segment that was not fitted.
-
-    The segment's own unknowns (initial state, rudder offset, sensor biases) are fitted to it, the
-    parameters are not: one run's rudder offset and biases are not known from another run.
-
-    Parameters
-    ----------
-    fit
-        The fitted model.
-    segment
-        A segment of another run.
-
-    Returns
-    -------
-    misfit
-        (4,) rms residual of each output over the standard deviation of its measurement. Besides
-        the fitted outputs it covers `SCORED_OUTPUTS`. NaN for outputs that were not measured or
-        that the model does not predict; inf where the simulation diverges.
-    """
-    whole = fit.problem
-    outputs = tuple(
-        o for o in MODEL_OUTPUTS if o in (*whole.outputs, *SCORED_OUTPUTS) and segment.has(o)
-    )
-    problem = replace(
-        whole, segments=(segment,), outputs=outputs, values=fit.parameters, free=(), waves=()
-    )
-    minimum = minimise(problem, problem.start(), initial_residual_stds(problem))
-    ratios = np.full(len(MODEL_OUTPUTS), np.nan)
-    measured = problem.measured(0)
-    residual = measured - problem.predicted(minimum.unknowns, 0)
-    for at, column in enumerate(problem.columns):
-        valid = np.isfinite(measured[:, at])
-        if valid.sum() > 1:
-            size = float(np.std(measured[valid, at]))
-            rms = float(np.sqrt(np.mean(residual[valid, at] ** 2)))
-            ratios[column] = rms / size if np.isfinite(rms) else np.inf
-    return ratios
 
 
 def dead_reckoning(outputs: FloatArray, dt: float) -> FloatArray:

@@ -129,10 +129,13 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
         *(finding.text for finding in findings),
         *end_warnings(stats, clock, REQUIRED_CHANNELS),
     ]
+    positions = fixes.at_samples(segment.signals for segment in segments)
     return Run(
         name=log.name,
-        segments=segments,
-        positions=fixes.at_samples(segment.signals for segment in segments),
+        segments=tuple(
+            replace(segment, fixes=each) for segment, each in zip(segments, positions, strict=True)
+        ),
+        positions=positions,
         vessel=vessel,
         warnings=tuple(text if log.name in text else f"{log.name}: {text}" for text in warnings),
         data_lost=log.data_lost,

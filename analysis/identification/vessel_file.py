@@ -130,7 +130,7 @@ def _paper_model(ship: IdentifiedShip) -> tuple[OutputError, Uncertainty] | None
     ship's: for a ship of first order a second pole may lie anywhere, and the rudder's effect may
     have the wrong sign.
     """
-    segments = ship.fit.problem.segments
+    segments = ship.fit.problem.recorded
     fits = [c.fit for c in ship.candidates if c.model.name == "burylin" and c.fit is not None]
     try:
         if fits:
@@ -149,7 +149,7 @@ def _paper_model(ship: IdentifiedShip) -> tuple[OutputError, Uncertainty] | None
 
 def _head(ship: IdentifiedShip) -> Iterator[str]:
     """Yield the lines before the first section."""
-    vessel, segments = ship.vessel, ship.fit.problem.segments
+    vessel, segments = ship.vessel, ship.fit.problem.recorded
     logs = ", ".join(dict.fromkeys(segment.name for segment in segments))
     name = f"{vessel.name if vessel else 'ship'}, identified"
     yield f"# {ship.model.title}, identified from {logs}"

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from analysis.identification.held_out import JUDGED_COLUMNS, PREDICTED
 from analysis.identification.identified_ship import IdentifiedShip
-from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
+from analysis.identification.model_selection import Candidate
 from analysis.identification.validation import Validation
 from shiplog import __version__
-from shiplog.ships.motion import MODEL_OUTPUTS
 
 from .identification_tables import mean_misfits, prior_shares_by_method
 
@@ -136,10 +136,12 @@ def _validation(validation: Validation) -> dict[str, Any]:
 
 
 def _candidate(candidate: Candidate) -> dict[str, Any]:
-    names = [MODEL_OUTPUTS[i] for i in JUDGED_COLUMNS]
+    names = [PREDICTED[i] for i in JUDGED_COLUMNS]
     return {
         "name": candidate.model.name,
         "score": candidate.score if candidate.fit is not None else None,
+        "fault": candidate.fault,
+        "weight": candidate.weight,
         "misfits": dict(zip(names, mean_misfits(candidate), strict=True)),
     }
 

@@ -6,8 +6,9 @@ from math import isfinite
 import numpy as np
 
 from analysis.identification.comparison.history import PRIOR_OFFSET
+from analysis.identification.held_out import JUDGED_COLUMNS, PREDICTED
 from analysis.identification.identified_ship import IdentifiedShip
-from analysis.identification.model_selection import JUDGED_COLUMNS, Candidate
+from analysis.identification.model_selection import Candidate
 from analysis.identification.validation import Validation
 from analysis.manoeuvres.manoeuvre import ManoeuvreIndex
 from shiplog.ships.motion import MODEL_OUTPUTS
@@ -46,7 +47,7 @@ def identification_tables(ship: IdentifiedShip) -> tuple[TextTable, ...]:
 
 def parameter_tables(ship: IdentifiedShip) -> tuple[TextTable, ...]:
     """Return the tables of the models compared, of the parameters, and of the share of prior."""
-    models = (_model_table(ship),) if ship.candidates else ()
+    models = (_model_table(ship),) if len(ship.candidates) > 1 else ()
     return (*models, _parameter_table(ship), _prior_table(ship))
 
 
@@ -88,7 +89,7 @@ def _transposed(table: TextTable, number: int, title: str) -> TextTable:
 
 
 def _model_table(ship: IdentifiedShip) -> TextTable:
-    names = [MODEL_OUTPUTS[i].replace("_", " ") for i in JUDGED_COLUMNS]
+    names = [PREDICTED[i].replace("_", " ") for i in JUDGED_COLUMNS]
     columns = ("model", "free\nparameters", "score\n[%]", *(f"{name}\n[%]" for name in names))
     remark = (
         "Each run in turn is predicted by the model fitted to the other runs; only its initial "

@@ -261,6 +261,24 @@ class Model:
         )
         return np.asarray(out[0].real * scale.outputs)
 
+    def simulate_many(
+        self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
+        *, offsets: FloatArray, scale: Scale = SI,
+    ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+        """Simulate k ships under the same inputs, (k, p) parameters and (k, s) initial states.
+
+        `offsets`, (k,) rad, are added to the rudder. The other arguments are those of `simulate`.
+
+        Returns
+        -------
+        outputs
+            (k, count, 4) in SI; NaN from where a run diverges.
+        end
+            (k, s) the states at the end of the path, in the units of the equations.
+        """
+        out, ends = self._integrate(parameters, initial, offsets, scale.scaled(path), count)
+        return np.asarray(out.real * scale.outputs), ends.real.copy()
+
     def sensitivities(
         self, parameters: FloatArray, initial: FloatArray, path: InputPath, count: int,
         directions: FloatArray, *, offset: float = 0.0, scale: Scale = SI,

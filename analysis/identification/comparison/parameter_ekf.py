@@ -71,7 +71,7 @@ def _pass(
     fit: OutputError, prior: FloatArray, prior_std: FloatArray
 ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
     """Yield instants, parameters and their standard deviations, (p,) each."""
-    problem, p = fit.problem, len(prior)
+    problem, p = _local_problem(fit.problem), len(prior)
     values, covariance = prior, np.diag(prior_std**2)
     stride = max(STRIDE_SECS, total_duration_secs(problem.segments) / MAX_STRIDES)
     for i, start in enumerate(start_times_secs(problem.segments)):
@@ -86,20 +86,29 @@ def _pass(
 
 
 def _data_without_waves(fit: OutputError, i: int) -> tuple[FloatArray, FloatArray]:
-    """Return segment i's outputs less the swell the fit found, and their weights: (n, c) each."""
+    """Return segment i's outputs less swell and speed scale, and their weights: (n, c) each."""
     problem, z = fit.problem, fit.minimum.unknowns
     residual = residuals(problem, z)[i]
     _, weight = weighted_residuals(residual, fit.residual_stds[i])
-    count = _own_count(problem)
-    own = z[problem.own_slice(i)][:count]
-    parts = [z[: len(problem.free)]]
-    parts += [own if j == i else np.zeros(count) for j in range(len(problem.segments))]
-    return residual + replace(problem, waves=()).predicted(np.concatenate(parts), i), weight
+    layout = problem.own_layout
+    own = z[problem.own_slice(i)][: layout.calm].copy()
+    own[layout.first_scale :] = 0.0
+    rest = np.zeros(layout.calm)
+    parts = [own if j == i else rest for j in range(len(problem.segments))]
+    calm = replace(problem, waves=()).predicted(np.concatenate((z[: problem.common], *parts)), i)
+    return (residual + calm)[:, : layout.waved], weight[:, : layout.waved]
 
 
-def _own_count(problem: Problem) -> int:
-    """Count a segment's own unknowns, waves excepted."""
-    return len(problem.model.state) + (problem.nuisance.rudder_std > 0) + len(problem.biases)
+def _local_problem(problem: Problem) -> Problem:
+    """Return the problem as a filter takes it: no positions, each segment's rudder zero its own."""
+    given = problem.nuisance
+    own_std = float(np.hypot(given.common_rudder_std, given.rudder_std))
+    return replace(
+        problem,
+        outputs=problem.outputs[: problem.own_layout.waved],
+        nuisance=replace(given, common_rudder_std=0.0, rudder_std=own_std),
+        waves=(),
+    )
 
 
 def _initial_estimate(
@@ -107,7 +116,7 @@ def _initial_estimate(
 ) -> _Estimate:
     """Return the estimate at the beginning of segment i, given that of the parameters."""
     segment, p = fit.problem.segments[i], len(values)
-    problem = replace(fit.problem, waves=())
+    problem = _local_problem(fit.problem)
     own, outputs = problem.own_slice(i), problem.outputs
     mean = np.concatenate((values, problem.start()[own]))
     with np.errstate(divide="ignore"):  # a measured state has no prior, and a precision of 0

@@ -24,9 +24,11 @@ from shiplog.ships import Model
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
+from .fix_blocks import GROUND_VELOCITY
 from .initial_guess import initial_guesses
 from .least_squares import Minimum, ResidualStd, minimise
-from .problem import Nuisance, Problem, residuals
+from .nuisance import Nuisance
+from .problem import Problem, residuals
 from .residual_noise import (
     FINE_WHITE_SHARE,
     MIN_WHITE_SHARE,
@@ -35,16 +37,19 @@ from .residual_noise import (
     fit_residual_noise,
     interval_secs,
 )
-from .segment import Segment, initial_level
+from .segment import Segment, averaged, initial_level
 from .swell import swell_frequency
 
 DEFAULT_LENGTH = 150.0  # m, for the scale of dimensionless models where no length is given
 MIN_SPEED, MIN_RPM = 0.1, 1.0  # m/s, rpm: initial values of a ship under way
+NOT_PROPORTIONAL = ("heading", *GROUND_VELOCITY)
+SAMPLES_PER_LENGTH = 60  # in the time of sailing a ship length: the fastest that a fit needs
 MAX_SLOW_SHARE = 0.2  # of the slow noise that may remain when waves are fitted
 REWEIGHTINGS = 3
 MAX_RMS_GROWTH = 1.5  # of an output's residuals in a reweighted fit
 MIN_STDS = {  # of any instrument: rad/s, m/s, m/s, rad
-    "yaw_rate": radians(1e-5), "speed": 1e-4, "sway": 1e-4, "heading": radians(0.02)
+    "yaw_rate": radians(1e-5), "speed": 1e-4, "sway": 1e-4, "heading": radians(0.02),
+    "velocity_north": 0.005, "velocity_east": 0.005,
 }  # fmt: skip
 
 
@@ -151,10 +156,16 @@ def make_problem(
     _require_way(segments, speed, rpm)
     scale = model.scale(length or DEFAULT_LENGTH, speed, rpm)
     used = [o for o in (outputs or model.outputs) if any(segment.has(o) for segment in segments)]
+    if "sway" in model.outputs and any(segment.fixes is not None for segment in segments):
+        used += GROUND_VELOCITY
+    fitted = segments
+    if model.dimensionless:
+        fitted = [averaged(segment, scale.secs / SAMPLES_PER_LENGTH) for segment in segments]
     return Problem(
-        model, tuple(segments), scale, tuple(used), values,
+        model, tuple(fitted), scale, tuple(used), values,
         tuple(i for i, name in enumerate(model.names) if name in free_names),
         Nuisance() if nuisance is None else nuisance,
+        recorded=tuple(segments),
     )  # fmt: skip
 
 
@@ -268,6 +279,35 @@ def reweighted_fit(
     return OutputError(problem, minimum, tuple(noises), tuple(residual_stds))
 
 
+def tempered_fit(fit: OutputError, inflation: float) -> OutputError:
+    """Repeat a fit with the variance of its residuals multiplied.
+
+    Residuals contain the errors of the model, which are not independent from run to run. Where
+    runs that were not fitted are predicted worse than the fit's covariance states, the data have
+    less weight against the priors than their noise alone would give them (a power posterior).
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    inflation
+        By how much the squared errors of held-out runs exceed the predicted ones, at least 1.
+
+    References
+    ----------
+    P. Grünwald and T. van Ommen, "Inconsistency of Bayesian inference for misspecified linear
+    models, and a proposal for repairing it", Bayesian Analysis 12, 2017.
+    """
+    if inflation <= 1:
+        return fit
+    factor = float(np.sqrt(inflation))
+    stds = tuple(
+        ResidualStd(each.effective * factor, each.typical * factor) for each in fit.residual_stds
+    )
+    minimum = minimise(fit.problem, fit.minimum.unknowns, stds)
+    return replace(fit, minimum=minimum, residual_stds=stds)
+
+
 def _with_fine_weights(fit: OutputError) -> OutputError:
     """Repeat the fit with a lower limit of the white noise, unless that reveals slow noise.
 
@@ -289,9 +329,10 @@ def _rms_residuals(problem: Problem, minimum: Minimum) -> FloatArray:
 def _with_waves(fit: OutputError) -> OutputError:
     """Repeat the fit with a wave in each segment that has one, if they explain the slow noise."""
     problem = fit.problem
-    slow = [noise.slow for noise in fit.noises]
+    waved = problem.own_layout.waved
+    slow = [noise.slow for noise in fit.noises[:waved]]
     frequencies = [
-        swell_frequency(residual, std.typical, segment.dt_secs, slow)
+        swell_frequency(residual[:, :waved], std.typical[:, :waved], segment.dt_secs, slow)
         for segment, residual, std in zip(
             problem.segments,
             residuals(problem, fit.minimum.unknowns),
@@ -304,7 +345,7 @@ def _with_waves(fit: OutputError) -> OutputError:
     waves = tuple(() if omega is None else (omega,) for omega in frequencies)
     with_waves = replace(problem, waves=waves)
     start = with_waves.start()
-    start[: len(problem.free)] = fit.minimum.unknowns[: len(problem.free)]
+    start[: problem.common] = fit.minimum.unknowns[: problem.common]
     for i in range(len(problem.segments)):
         own, old = with_waves.own_slice(i), fit.minimum.unknowns[problem.own_slice(i)]
         start[own.start : own.start + len(old)] = old
@@ -366,7 +407,7 @@ def estimate_noise(
                 )
                 for i in segments
             ],
-            proportional=output != "heading", least=MIN_STDS[output], share=share,
+            proportional=output not in NOT_PROPORTIONAL, least=MIN_STDS[output], share=share,
         )
         for c, output in enumerate(problem.outputs)
     ]  # fmt: skip

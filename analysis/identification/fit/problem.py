@@ -1,9 +1,9 @@
 """The unknowns of a fit: a model's free parameters, and each segment's own unknowns."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, pi, radians
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,42 +12,29 @@ from shiplog.ships import Model, Scale, StateValue
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
+from .fix_blocks import (
+    FIT_OUTPUTS,
+    GROUND_VELOCITY,
+    FixBlocks,
+    course_at_start,
+    fix_blocks,
+    simulated_track,
+    simulated_track_derivatives,
+)
+from .nuisance import Nuisance
+from .own_unknowns import OwnLayout, OwnUnknowns, add_waves, wave_derivatives, wave_prior_stds
 from .segment import Segment
 
+BLOCK_LENGTHS = 0.25  # ship lengths sailed at the approach speed in a block of position fixes
 INITIAL_STATE_SECS = 3.0  # at the start of a segment, whose median is the guess of its first state
-WAVE_FREQUENCY_CYCLES = 0.25  # over a segment: prior standard deviation of a wave's frequency
-WAVE_AMPLITUDE_STD = 1.0  # of its prior, rad/s, m/s or rad: far above any real wave
-
-
-@dataclass(frozen=True)
-class Nuisance:
-    """Prior standard deviations about zero of each segment's unknowns besides its initial state.
-
-    Attributes
-    ----------
-    rudder_std
-        Of the rudder offset, rad, which stands for the rudder's zero error and for every constant
-        yaw moment; 0 to have none.
-    bias_stds
-        Of the sensor bias of each output named, in its SI unit; the others have none.
-    """
-
-    rudder_std: float = radians(0.5)
-    bias_stds: Mapping[str, float] = field(default_factory=lambda: {"yaw_rate": radians(0.005)})
-
-    @classmethod
-    def none(cls) -> "Nuisance":
-        """Return no unknowns besides the initial state."""
-        return cls(0.0, {})
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
     """A model, the segments to fit it to, and the layout of the vector of unknowns.
 
-    The m unknowns are the free parameters, then for each segment: its initial state in the units
-    of the equations, the rudder offset (rad), the sensor biases (SI), and its waves, each with a
-    frequency (rad/s), a cosine and a sine amplitude for every output (SI).
+    The m unknowns are the free parameters, the rudder zero of all runs (rad), then for each segment
+    its own, as `OwnLayout` orders them.
 
     Attributes
     ----------
@@ -67,6 +54,8 @@ class Problem:
         The priors of the segments' own unknowns.
     waves
         For each segment the initial frequencies of its waves, rad/s; empty for none at all.
+    recorded
+        The segments as they were given; `segments` may be means of theirs (`averaged`).
     """
 
     model: Model
@@ -77,11 +66,12 @@ class Problem:
     free: tuple[int, ...]
     nuisance: Nuisance
     waves: tuple[tuple[float, ...], ...] = ()
+    recorded: tuple[Segment, ...] = ()
 
     @cached_property
     def columns(self) -> list[int]:
-        """The columns of `Segment.measured` that are fitted."""
-        return [MODEL_OUTPUTS.index(output) for output in self.outputs]
+        """The numbers of the fitted outputs among `FIT_OUTPUTS`."""
+        return [FIT_OUTPUTS.index(output) for output in self.outputs]
 
     @cached_property
     def free_names(self) -> tuple[str, ...]:
@@ -95,19 +85,44 @@ class Problem:
         return tuple((i, stds[o]) for i, o in enumerate(self.outputs) if stds.get(o, 0) > 0)
 
     @property
-    def _offsets(self) -> int:
-        return int(self.nuisance.rudder_std > 0)
+    def common(self) -> int:
+        """How many unknowns all segments share: the free parameters, and the rudder zero."""
+        return len(self.free) + int(self.nuisance.common_rudder_std > 0)
+
+    @cached_property
+    def uses_positions(self) -> bool:
+        """Whether velocities over ground are fitted."""
+        return GROUND_VELOCITY[0] in self.outputs
+
+    @cached_property
+    def own_layout(self) -> OwnLayout:
+        """How a segment's own unknowns are laid out."""
+        given, positions = self.nuisance, self.uses_positions
+        return OwnLayout(
+            states=len(self.model.state),
+            rudder=int(given.rudder_std > 0),
+            biases=len(self.biases),
+            speed_scale=int(positions and "speed" in self.outputs and given.speed_scale_std > 0),
+            current=2 * int(positions and given.current_std > 0),
+            # not the velocities over ground, which are means
+            waved=sum(output in MODEL_OUTPUTS for output in self.outputs),
+        )
+
+    @cached_property
+    def _blocks(self) -> tuple[FixBlocks | None, ...]:
+        secs = BLOCK_LENGTHS * self.scale.secs
+        return tuple(
+            None if each.fixes is None else fix_blocks(each.fixes, each.dt_secs, secs, each.antenna)
+            for each in self.segments
+        )
 
     @cached_property
     def _edges(self) -> list[int]:
         """Where each segment's own unknowns start, and where the last ones end."""
-        calm = len(self.model.state) + self._offsets + len(self.biases)
-        sizes = [calm + len(self._waves(i)) * self._per_wave for i in range(len(self.segments))]
-        return [int(edge) for edge in np.cumsum([len(self.free), *sizes])]
-
-    @property
-    def _per_wave(self) -> int:
-        return 1 + 2 * len(self.outputs)
+        layout = self.own_layout
+        counts = [len(self._waves(i)) for i in range(len(self.segments))]
+        sizes = [layout.calm + count * layout.per_wave for count in counts]
+        return [int(edge) for edge in np.cumsum([self.common, *sizes])]
 
     def _waves(self, i: int) -> tuple[float, ...]:
         return self.waves[i] if self.waves else ()
@@ -138,7 +153,7 @@ class Problem:
         """
         waves = tuple(self.waves[i] for i in kept) if self.waves else ()
         rest = replace(self, segments=tuple(self.segments[i] for i in kept), waves=waves)
-        return rest, np.concatenate([z[: len(self.free)], *(z[self.own_slice(i)] for i in kept)])
+        return rest, np.concatenate([z[: self.common], *(z[self.own_slice(i)] for i in kept)])
 
     @property
     def size(self) -> int:
@@ -151,10 +166,11 @@ class Problem:
 
     def start(self) -> FloatArray:
         """Return the initial guess of the unknowns, (m,): all but states and frequencies zero."""
-        parts = [self.values[list(self.free)]]
+        parts = [self.values[list(self.free)], np.zeros(self.common - len(self.free))]
+        layout = self.own_layout
         for i, segment in enumerate(self.segments):
-            parts += [self._first_state(segment), np.zeros(self._offsets + len(self.biases))]
-            parts += [np.append(wave, np.zeros(self._per_wave - 1)) for wave in self._waves(i)]
+            parts += [self._first_state(segment), np.zeros(layout.calm - layout.states)]
+            parts += [np.append(wave, np.zeros(layout.per_wave - 1)) for wave in self._waves(i)]
         return np.concatenate(parts)
 
     def _first_state(self, segment: Segment) -> FloatArray:
@@ -165,6 +181,8 @@ class Problem:
                 measured = segment.measured[:, MODEL_OUTPUTS.index(value.channel)]
                 measured = measured[np.isfinite(measured)][:first]
                 state[i] = np.median(measured) / self.scale.of_channel(value.channel)
+            elif value.channel == "heading" and segment.fixes is not None:
+                state[i] = course_at_start(segment.fixes)
             elif np.isinf(value.prior_std):
                 state[i] = self._typical_state(value)[0]
         return state
@@ -190,34 +208,42 @@ class Problem:
         The precision is 0 where there is no prior: for an initial state that is measured.
         """
         parameters = [self.model.parameters[i] for i in self.free]
-        centres, stds = [p.start for p in parameters], [p.prior_std for p in parameters]
-        for i, segment in enumerate(self.segments):
-            for value in self.model.state:
-                measured = value.channel in self.outputs and segment.has(value.channel or "")
-                std = (
-                    value.prior_std
-                    if np.isfinite(value.prior_std)
-                    else self._typical_state(value)[1]
-                )
-                stds.append(inf if measured else std)
-            stds += [self.nuisance.rudder_std] * self._offsets + [std for _, std in self.biases]
-            for _ in self._waves(i):
-                stds += [WAVE_FREQUENCY_CYCLES * 2 * pi / (len(segment) * segment.dt_secs)]
-                stds += [WAVE_AMPLITUDE_STD] * (self._per_wave - 1)
+        stds = [p.prior_std for p in parameters]
+        stds += [self.nuisance.common_rudder_std] * (self.common - len(self.free))
         centre = self.start()
-        for number in range(len(self.segments)):
-            own = self.own_slice(number)
-            waves = own.stop - self._per_wave * len(self._waves(number))
-            centre[own.start : waves] = 0.0
-        centre[: len(centres)] = centres
-        heading = [i for i, value in enumerate(self.model.state) if value.channel == "heading"]
-        precision = np.array(stds) ** -2.0
-        for number, segment in enumerate(self.segments):
-            if "heading" not in self.outputs or not segment.has("heading"):
-                at = self.own_slice(number).start + heading[0]
+        centre[: len(parameters)] = [p.start for p in parameters]
+        for i, segment in enumerate(self.segments):
+            own = self.own_slice(i)
+            centre[own.start : own.start + self.own_layout.calm] = 0.0
+            stds += self._own_prior_stds(i, segment)
+            if not self._observes_heading(segment):
+                heading = [value.channel for value in self.model.state].index("heading")
                 # no output depends on it: any prior keeps it from drifting
-                centre[at], precision[at] = self._first_state(segment)[heading[0]], 1.0
-        return centre, precision
+                centre[own.start + heading] = self._first_state(segment)[heading]
+                stds[own.start + heading] = 1.0
+        return centre, np.array(stds) ** -2.0
+
+    def _observes_heading(self, segment: Segment) -> bool:
+        measured = "heading" in self.outputs and segment.has("heading")
+        return measured or (self.uses_positions and segment.fixes is not None)
+
+    def _own_prior_stds(self, i: int, segment: Segment) -> list[float]:
+        """Return the prior standard deviations of segment i's own unknowns."""
+        layout, given, stds = self.own_layout, self.nuisance, []
+        for value in self.model.state:
+            std = value.prior_std
+            if not np.isfinite(std):
+                std = self._typical_state(value)[1]
+            measured = value.channel in self.outputs and segment.has(value.channel or "")
+            if value.channel == "heading":
+                measured = measured or self._observes_heading(segment)
+            stds.append(inf if measured else std)
+        stds += [given.rudder_std] * layout.rudder + [std for _, std in self.biases]
+        stds += [given.speed_scale_std] * layout.speed_scale
+        stds += [given.current_std] * layout.current
+        for _ in self._waves(i):
+            stds += wave_prior_stds(layout, len(segment) * segment.dt_secs)
+        return stds
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -251,11 +277,11 @@ class Problem:
         outputs
             (n, 4) in the order of `MODEL_OUTPUTS`, SI; NaN where the simulation diverges.
         """
-        state, offset, _, _ = self._own(z, i)
-        segment = self.segments[i]
+        own, segment = self.own(z, i), self.segments[i]
         return self.model.simulate(
-            self.parameters(z), state, segment.path, len(segment), offset=offset, scale=self.scale
-        )
+            self.parameters(z), own.state, segment.path, len(segment),
+            offset=self.rudder_zero(z) + own.rudder, scale=self.scale,
+        )  # fmt: skip
 
     def predicted(self, z: FloatArray, i: int) -> FloatArray:
         """Simulate segment i.
@@ -272,16 +298,24 @@ class Problem:
         outputs
             (n, c) the fitted outputs with biases and waves, SI; NaN where the simulation diverges.
         """
-        _, _, biases, waves = self._own(z, i)
-        segment = self.segments[i]
-        out = self.simulated(z, i)[:, self.columns]
-        for (column, _), bias in zip(self.biases, biases, strict=True):
+        own, segment = self.own(z, i), self.segments[i]
+        out = self._with_velocities(self.simulated(z, i), own.current, i)[:, self.columns]
+        if self.own_layout.speed_scale:
+            out[:, self.outputs.index("speed")] *= 1 + own.speed_scale
+        for (column, _), bias in zip(self.biases, own.biases, strict=True):
             out[:, column] += bias
-        for omega, *amplitudes in waves:
-            phase = omega * segment.signals.time_secs
-            cosine, sine = np.array(amplitudes).reshape(2, -1)
-            out += np.outer(np.cos(phase), cosine) + np.outer(np.sin(phase), sine)
+        add_waves(out[:, : self.own_layout.waved], own.waves, segment.signals.time_secs)
         return out
+
+    def _with_velocities(self, simulated: FloatArray, current: FloatArray, i: int) -> FloatArray:
+        """Return the simulated outputs, (n, 4), with the velocities over ground, (n, 6)."""
+        if not self.uses_positions:
+            return simulated
+        velocities, blocks = np.full((len(simulated), 2), np.nan), self._blocks[i]
+        if blocks is not None:
+            track = simulated_track(simulated, self.segments[i].dt_secs, blocks.antenna)
+            velocities = blocks.velocities(track) + current
+        return np.column_stack((simulated, velocities))
 
     def jacobian(self, z: FloatArray, i: int) -> FloatArray:
         """Compute the derivatives of segment i's outputs.
@@ -299,29 +333,61 @@ class Problem:
             (n, c, k) with respect to the free parameters and the segment's own unknowns, k in all,
             in the order of `unknown_indices`.
         """
-        state, offset, _, waves = self._own(z, i)
-        segment, p, s = self.segments[i], len(self.values), len(self.model.state)
-        simulated = [*self.free, *range(p, p + s + self._offsets)]
-        directions = np.eye(p + s + 1)[simulated]
-        sensitivities = self.model.sensitivities(
-            self.parameters(z), state, segment.path, len(segment), directions,
-            offset=offset, scale=self.scale,
-        )[:, :, self.columns]  # fmt: skip
-        calm = len(simulated) + len(self.biases)
-        jacobian = np.zeros((*sensitivities.shape[1:], calm + waves.size))
-        jacobian[:, :, : len(simulated)] = np.moveaxis(sensitivities, 0, 2)
-        for at, (column, _) in enumerate(self.biases):
-            jacobian[:, column, len(simulated) + at] = 1.0
-        for number, (omega, *sizes) in enumerate(waves):
-            at = calm + number * self._per_wave
-            _fill_wave_derivatives(
-                jacobian[:, :, at : at + self._per_wave], omega, np.array(sizes), segment
-            )
+        own, layout, segment = self.own(z, i), self.own_layout, self.segments[i]
+        p, s = len(self.values), layout.states
+        zeros = [p + s] * (self.common - len(self.free))
+        simulated = [*self.free, *zeros, *range(p, p + s + layout.rudder)]
+        run = self.model.propagate(
+            self.parameters(z), own.state, segment.path, len(segment),
+            np.eye(p + s + 1)[simulated],
+            offset=self.rudder_zero(z) + own.rudder, scale=self.scale,
+        )  # fmt: skip
+        by = np.moveaxis(run.outputs_by, 0, 2)
+        if self.uses_positions:
+            by = self._with_velocity_derivatives(run.outputs, by, i)
+        jacobian = np.zeros((len(segment), len(self.outputs), len(self.unknown_indices(i))))
+        jacobian[:, :, : len(simulated)] = by[:, self.columns]
+        for at, (column, _) in enumerate(self.biases, self.common + layout.first_bias):
+            jacobian[:, column, at] = 1.0
+        if layout.speed_scale:
+            speed = self.outputs.index("speed")
+            jacobian[:, speed] *= 1 + own.speed_scale
+            speeds = run.outputs[:, MODEL_OUTPUTS.index("speed")]
+            jacobian[:, speed, self.common + layout.first_scale] = speeds
+        for at in range(layout.current):
+            column = self.outputs.index(GROUND_VELOCITY[at])
+            jacobian[:, column, self.common + layout.first_current + at] = 1.0
+        for at, wave in enumerate(own.waves):
+            first = self.common + layout.calm + at * layout.per_wave
+            columns = slice(first, first + layout.per_wave)
+            jacobian[:, : layout.waved, columns] = wave_derivatives(wave, segment.signals.time_secs)
         return jacobian
+
+    def _with_velocity_derivatives(
+        self, simulated: FloatArray, by: FloatArray, i: int
+    ) -> FloatArray:
+        """Return the derivatives of the outputs, (n, 4, k), with the velocities', (n, 6, k)."""
+        velocities, blocks = np.full((len(by), 2, by.shape[2]), np.nan), self._blocks[i]
+        if blocks is not None:
+            dt = self.segments[i].dt_secs
+            track = simulated_track_derivatives(simulated, by, dt, blocks.antenna)
+            velocities = blocks.velocities(track)
+        return np.concatenate((by, velocities), axis=1)
 
     def measured(self, i: int) -> FloatArray:
         """Return the measured values of segment i's outputs, (n, c); NaN where not measured."""
-        return self.segments[i].measured[:, self.columns]
+        return self._measured[i]
+
+    @cached_property
+    def _measured(self) -> tuple[FloatArray, ...]:
+        measured = [segment.measured for segment in self.segments]
+        if self.uses_positions:
+            for i, segment in enumerate(self.segments):
+                velocities, blocks = np.full((len(segment), 2), np.nan), self._blocks[i]
+                if blocks is not None and segment.fixes is not None:
+                    velocities = blocks.velocities(segment.fixes)
+                measured[i] = np.column_stack((measured[i], velocities))
+        return tuple(each[:, self.columns] for each in measured)
 
     def measured_mask(self, i: int) -> NDArray[np.bool_]:
         """Return where segment i's outputs were measured, (n, c)."""
@@ -330,27 +396,15 @@ class Problem:
     def unknown_indices(self, i: int) -> list[int]:
         """Return where the k unknowns of `jacobian` are among all m."""
         own = self.own_slice(i)
-        return [*range(len(self.free)), *range(own.start, own.stop)]
+        return [*range(self.common), *range(own.start, own.stop)]
 
-    def _own(self, z: FloatArray, i: int) -> tuple[FloatArray, float, FloatArray, FloatArray]:
-        """Return segment i's initial state, rudder offset, biases, and waves as rows."""
-        own, s = z[self.own_slice(i)], len(self.model.state)
-        biases = s + self._offsets
-        waves = biases + len(self.biases)
-        offset = float(own[s]) if self._offsets else 0.0
-        return own[:s], offset, own[biases:waves], own[waves:].reshape(-1, self._per_wave)
+    def rudder_zero(self, z: FloatArray) -> float:
+        """Return the rudder offset that all runs share, rad."""
+        return float(z[len(self.free)]) if self.common > len(self.free) else 0.0
 
-
-def _fill_wave_derivatives(
-    jacobian: FloatArray, omega: float, sizes: FloatArray, segment: Segment
-) -> None:
-    """Fill in the derivatives, (n, c, 1 + 2c), by a wave's frequency and amplitudes."""
-    time, outputs = segment.signals.time_secs, jacobian.shape[1]
-    cosine, sine = np.cos(omega * time), np.sin(omega * time)
-    for c in range(outputs):
-        jacobian[:, c, 0] = time * (sizes[outputs + c] * cosine - sizes[c] * sine)
-        jacobian[:, c, 1 + c] = cosine
-        jacobian[:, c, 1 + outputs + c] = sine
+    def own(self, z: FloatArray, i: int) -> OwnUnknowns:
+        """Return segment i's own unknowns."""
+        return self.own_layout.split(z[self.own_slice(i)])
 
 
 def residuals(problem: Problem, z: FloatArray) -> Sequence[FloatArray]:

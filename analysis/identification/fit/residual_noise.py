@@ -59,7 +59,8 @@ class ResidualNoise:
         >>> [float(each[0].round(6)) for each in noise.stds(np.zeros(1), interval_secs=1.0)]
         [0.2, 0.1]
         """
-        white = self.white**2 + (self.relative * level) ** 2
+        # velocities over ground have no level between blocks of fixes, but an absolute noise only
+        white = self.white**2 + (self.relative * np.nan_to_num(level)) ** 2
         samples = max(self.slow_secs / interval_secs, 1.0)
         return np.sqrt(white + self.slow**2 * samples), np.sqrt(white + self.slow**2)
 

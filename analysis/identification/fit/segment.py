@@ -30,12 +30,18 @@ class Segment:
         The inputs as the ship models take them: the rudder linear from sample to sample.
     measured
         (n, 4) outputs in the order of `MODEL_OUTPUTS`, SI; NaN where not measured.
+    fixes
+        (n, 2) position fixes north and east, m, NaN where there is none; None without any.
+    antenna
+        Place of the fixes ahead and to starboard of the midship point, m.
     """
 
     name: str
     signals: Signals
     path: InputPath
     measured: FloatArray
+    fixes: FloatArray | None = None
+    antenna: tuple[float, float] = (0.0, 0.0)
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -53,7 +59,10 @@ class Segment:
     def part(self, start: int, stop: int) -> "Segment":
         """Return the samples from `start` to before `stop` as a segment."""
         signals = self.signals.part(start, stop)
-        return Segment(self.name, signals, input_path(signals), self.measured[start:stop])
+        fixes = None if self.fixes is None else self.fixes[start:stop]
+        return Segment(
+            self.name, signals, input_path(signals), self.measured[start:stop], fixes, self.antenna
+        )
 
 
 def split_into_segments(signals: Signals, name: str) -> tuple[Segment, ...]:
@@ -100,6 +109,41 @@ def _segment(signals: Signals, name: str) -> Segment:
     missing = np.full(len(signals), np.nan)
     columns = [signals.values.get(output, missing) for output in MODEL_OUTPUTS]
     return Segment(name, signals, input_path(signals), np.column_stack(columns))
+
+
+def averaged(segment: Segment, secs: float) -> Segment:
+    """Return a segment of the means over blocks of about `secs`; the same if samples are longer.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    secs
+        The new sample interval, rounded to a whole number of samples.
+    """
+    every = round(secs / segment.dt_secs)
+    count = len(segment) // max(every, 1)
+    if every < 2 or count < 2:
+        return segment
+
+    def means(values: FloatArray) -> FloatArray:
+        blocks = values[: count * every].reshape(count, every, *values.shape[1:])
+        known = np.isfinite(blocks)
+        total = np.where(known, blocks, 0.0).sum(axis=1)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(total / np.where(known.any(axis=1), known.sum(axis=1), np.nan))
+
+    signals, dt = segment.signals, segment.dt_secs
+    middle_secs = (signals.first + (every - 1) / 2) * dt
+    mean_signals = Signals(
+        signals.start_ns + round(middle_secs * 1e9), dt * every,
+        {name: means(values) for name, values in signals.values.items()},
+    )  # fmt: skip
+    fixes = None if segment.fixes is None else means(segment.fixes)
+    return Segment(
+        segment.name, mean_signals, input_path(mean_signals), means(segment.measured), fixes,
+        segment.antenna,
+    )  # fmt: skip
 
 
 def _interpolated(values: FloatArray, dt: float) -> FloatArray:

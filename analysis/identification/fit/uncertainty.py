@@ -164,6 +164,15 @@ def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
     )
 
 
+def parameter_covariance(fit: OutputError) -> FloatArray:
+    """Return the covariance of the unknowns that all runs share, (k, k), from noise and priors.
+
+    The free parameters come first, then the rudder zero.
+    """
+    common = fit.problem.common
+    return _covariance(fit.problem, fit.minimum.information)[:common, :common]
+
+
 def _covariance(problem: Problem, information: FloatArray) -> FloatArray:
     """Invert information plus prior, (m, m); what nothing determines gets a huge variance."""
     precision = information + np.diag(problem.prior[1])

@@ -10,7 +10,7 @@ import pytest
 from fitted_runs import fitted
 from trial_logs import as_log
 
-from analysis.identification.fit.problem import Nuisance
+from analysis.identification.fit.nuisance import Nuisance
 from analysis.identification.runs import run_from_log
 from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate

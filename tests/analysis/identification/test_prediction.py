@@ -12,12 +12,12 @@ from trial_logs import as_log
 from analysis.identification.fit.output_error import OutputError, output_error
 from analysis.identification.fit.segment import Segment, split_into_segments
 from analysis.identification.fit.uncertainty import uncertainty
+from analysis.identification.held_out import misfit
 from analysis.identification.model_selection import rank_models
 from analysis.identification.prediction import (
     Zigzag,
     dead_reckoning,
     manoeuvre_motion,
-    misfit,
     predict,
     zigzag_overshoots,
 )

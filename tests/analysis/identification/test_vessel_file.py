@@ -66,7 +66,7 @@ def identified_by_papers_model(name: str) -> IdentifiedShip:
 def nomoto_ship() -> IdentifiedShip:
     """Return the identified Nomoto ship, with the fit of the paper's model to the same logs."""
     paper, ship = identified_by_papers_model("nomoto"), identified("nomoto")[0]
-    return replace(ship, candidates=(Candidate(paper.model, paper.fit, np.zeros((3, 4))),))
+    return replace(ship, candidates=(Candidate(paper.model, paper.fit, np.zeros((3, 5))),))
 
 
 def exact_motion(vessel: Vessel, run: str) -> dict[str, FloatArray]:
@@ -162,7 +162,7 @@ def test_the_papers_model_among_the_candidates_is_not_fitted_again(
 ) -> None:
     ship, text = identified("slipstream")
     paper = identified_by_papers_model("slipstream")
-    compared = replace(ship, candidates=(Candidate(paper.model, paper.fit, np.zeros((3, 4))),))
+    compared = replace(ship, candidates=(Candidate(paper.model, paper.fit, np.zeros((3, 5))),))
     monkeypatch.setattr(vessel_file, "output_error", None)
     assert vessel_toml(compared) == text
 

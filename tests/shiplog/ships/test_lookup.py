@@ -26,7 +26,7 @@ def test_unknown_models_and_parameters_are_rejected_with_the_nearest_name() -> N
 def test_models_are_named_without_numba() -> None:
     code = "import shiplog.ships as s, sys; print(len(s.model_names()), 'numba' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["7", "False"]
+    assert done.stdout.split() == ["8", "False"]
 
 
 def test_all_models_come_from_the_simplest_to_the_richest() -> None:
@@ -47,7 +47,7 @@ def test_a_broken_package_is_reported_and_leaves_the_other_models(
     with pytest.raises(ShiplogError, match=r"'fast' cannot be loaded.*the package fastships"):
         ship_model("fast")
     models, warnings = loadable_models()
-    assert len(models) == 7
+    assert len(models) == 8
     assert len(warnings) == 1
     assert "fastships" in warnings[0]
 

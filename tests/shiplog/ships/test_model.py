@@ -111,7 +111,46 @@ def as_three_dof(
     return rates, [rho, nu, sigma, psi]
 
 
+def as_mmg(
+    c: SimpleNamespace, x: FloatArray, delta: float, _: float, eta: float
+) -> tuple[list[float], ...]:
+    rho, sigma, nu, psi = x
+    speed = np.hypot(nu, sigma)
+
+    def hull(k: str) -> float:
+        cubic = [sigma**3, sigma**2 * rho, sigma * rho**2, rho**3]
+        terms = [getattr(c, k + name) for name in ("vvv", "vvr", "vrr", "rrr")]
+        linear = getattr(c, k + "v") * sigma + getattr(c, k + "r") * rho
+        return float(speed * linear + np.dot(terms, cubic) / speed)
+
+    slip = (rho / 2 - sigma) / speed
+    wake = c.cw + np.sign(slip) * c.dcw
+    into = nu * (1 + wake * (1 - np.exp(-2 * abs(slip))))
+    thrust = abs(eta) * (eta + c.p * (eta - into))
+
+    def race(u: float, t: float) -> float:
+        behind = u + c.k * (np.sqrt(u**2 + c.ct * t) - u)
+        return float(c.d * behind**2 + (1 - c.d) * u**2)
+
+    ahead = np.sqrt(race(into, thrust) / race(1.0, 1.0) + c.ms * (into**2 - eta**2))
+    side = sigma + c.lr * rho
+    across = -(c.gamma + np.sign(side) * c.dgamma) * side
+    force = c.f0 * (ahead**2 + across**2) * np.sin(delta - np.arctan2(across, ahead))
+    surge = (
+        (c.m + c.my + c.xvr) * sigma * rho + c.xvv * sigma**2 + (c.xrr + c.xg * c.m) * rho**2
+        + c.xvvvv * sigma**4 / speed**2 + c.r0 * (thrust - (1 + c.g) * nu * abs(nu))
+        - (1 - c.tr) * force * np.sin(delta)
+    )  # fmt: skip
+    sway = -(c.m + c.mx) * nu * rho + hull("y") - (1 + c.ah) * force * np.cos(delta)
+    yaw = -c.xg * c.m * nu * rho + hull("n") + (0.5 - c.ah * c.xh) * force * np.cos(delta)
+    sway, yaw = sway - 2 * c.nw * thrust, yaw + c.nw * thrust
+    inertia = [[c.m + c.my, c.xg * c.m], [c.xg * c.m, c.iz]]
+    sigma_dot, rho_dot = np.linalg.solve(inertia, [sway, yaw])
+    return [rho_dot, sigma_dot, surge / (c.m + c.mx), rho], [rho, nu, sigma, psi]
+
+
 ORACLES: dict[str, Oracle] = {
+    "mmg": as_mmg,
     "nomoto": as_norrbin,
     "norrbin": as_norrbin,
     "burylin": as_burylin,
@@ -133,11 +172,11 @@ def a_ship(name: str) -> tuple[Model, FloatArray, FloatArray, Scale]:
     """A model, parameters at which every term acts, an initial state, and the scale."""
     model = ship_model(name)
     start = model.start_values()
-    parameters = start + 0.1 * np.where(start == 0, 1.0, np.abs(start))
+    parameters = start + 0.1 * np.array([parameter.size for parameter in model.parameters])
     if not model.dimensionless:
         parameters[model.names.index("b3")] = -0.5
     scale = model.scale(LENGTH, SPEED, RPM)
-    begins = {"speed": SPEED / scale.speed, "yaw_rate": 1e-3 * scale.secs, "sway": 0.01}
+    begins = {"speed": SPEED / scale.speed, "yaw_rate": 1e-3 * scale.secs, "sway": 0.02}
     state = np.array([begins.get(value.channel or "", 0.0) for value in model.state])
     return model, parameters, state, scale
 

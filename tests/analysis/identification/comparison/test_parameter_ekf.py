@@ -15,8 +15,8 @@ from analysis.identification.comparison.parameter_ekf import (
     _update_and_predict,
     parameter_ekf,
 )
+from analysis.identification.fit.nuisance import Nuisance
 from analysis.identification.fit.output_error import output_error
-from analysis.identification.fit.problem import Nuisance
 from analysis.identification.fit.uncertainty import uncertainty
 from shiplog.ships import ship_model
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from trial_logs import as_log
 
+from analysis.identification.fit.nuisance import Nuisance
 from analysis.identification.fit.output_error import OutputError, output_error
-from analysis.identification.fit.problem import Nuisance
 from analysis.identification.fit.residual_noise import OutputResiduals, fit_residual_noise
 from analysis.identification.fit.segment import Segment, split_into_segments
 from analysis.identification.fit.swell import swell_frequency
@@ -95,9 +95,11 @@ def test_each_segment_has_its_own_rudder_offset_and_gyro_bias() -> None:
         }  # fmt: skip
         segments += split_into_segments(Signals(s.start_ns, s.dt_secs, values), f"{seed}.mcap")
     fit = output_error(segments, ship_model("burylin-tied"), fixed={"T3": 0.5})
-    own = [fit.minimum.unknowns[fit.problem.own_slice(i)] for i in (0, 1)]
-    assert [u[4] for u in own] == pytest.approx(offsets, abs=radians(0.03))
-    assert [u[5] for u in own] == pytest.approx(biases, abs=radians(0.001))
+    z = fit.minimum.unknowns
+    own = [fit.problem.own(z, i) for i in (0, 1)]
+    zeros = [fit.problem.rudder_zero(z) + each.rudder for each in own]
+    assert zeros == pytest.approx(offsets, abs=radians(0.03))
+    assert [each.biases[0] for each in own] == pytest.approx(biases, abs=radians(0.001))
     assert max(errors(fit).values()) < 3
 
 
