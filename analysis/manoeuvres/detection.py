@@ -33,7 +33,7 @@ MIN_SWITCH, MIN_SWITCH_SHARE = radians(1.0), 0.4  # of the heading at a reversal
 MIN_RETURN = 0.5  # of the heading at the last reversal, that a zig-zag goes back from it
 MAX_RECOVERY_SECS = 150.0
 INITIAL_TURN = radians(10.0)
-INITIAL_TURN_RUDDER, RUDDER_TOLERANCE = radians(10.0), radians(0.9)
+INITIAL_TURN_RUDDER, RUDDER_TOLERANCE = radians(10.0), radians(1.25)
 MIN_MOVING_SPEED = 0.5  # m/s: a slower ship is stopped
 OVERSHOOT_TAIL = 0.5  # of the last hold of a zig-zag, in which its last overshoot is looked for
 

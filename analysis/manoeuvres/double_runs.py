@@ -51,9 +51,12 @@ def _means(
     indices = []
     note = f"mean of this run and of manoeuvre {number}, in which the current cancels"
     if signals.has("positions"):
-        speeds, stds = zip(*(_ground_speed(signals, run) for run in pair), strict=True)
-        std = float(np.hypot(*stds)) / 2
-        indices.append(_mean_index(DOUBLE_RUN_SPEED, float(np.mean(speeds)), "m/s", std, note))
+        made, stds = zip(*(_ground_velocity(signals, run) for run in pair), strict=True)
+        headings = [float(np.mean(signals.heading[run.execute : run.end])) for run in pair]
+        # the difference of the velocities: the mean of their sizes has a current abeam in it
+        apart = abs(np.exp(1j * headings[0]) - np.exp(1j * headings[1]))
+        speed, std = abs(made[0] - made[1]) / apart, float(np.hypot(*stds)) / apart
+        indices.append(_mean_index(DOUBLE_RUN_SPEED, float(speed), "m/s", float(std), note))
     if signals.has("power"):
         parts = [signals.power[run.execute : run.end] for run in pair]
         means = [float(np.mean(part)) for part in parts]
@@ -63,12 +66,12 @@ def _means(
     return indices
 
 
-def _ground_speed(signals: TrialSignals, run: FoundManoeuvre) -> tuple[float, float]:
-    """Return the speed made good over the ground, and its standard uncertainty, m/s."""
+def _ground_velocity(signals: TrialSignals, run: FoundManoeuvre) -> tuple[complex, float]:
+    """Return the velocity made good over the ground, north + i east, and its uncertainty, m/s."""
     first, last = signals.positions[run.execute], signals.positions[run.end - 1]
     secs = (run.end - 1 - run.execute) * signals.dt_secs
     error = np.sqrt(2.0) * float(np.hypot(signals.noise.get("position", 0.0), POSITION_DRIFT))
-    return float(np.hypot(*(last - first))) / secs, error / secs
+    return complex(*(last - first)) / secs, error / secs
 
 
 def _mean_index(name: str, value: float, unit: str, std: float, note: str) -> TrialIndex:
