@@ -147,9 +147,10 @@ def _predicted_overshoots(
     ship: IdentifiedShip, manoeuvre: ExactManoeuvre, switch: float
 ) -> dict[str, float]:
     trial, steering = manoeuvre.trial, manoeuvre.steering
+    first = round(LEAD_SECS / STEP)
     zigzag = Zigzag(
         rudder=steering.angle, heading=switch, rudder_rate=trial.ship.rudder_rate,
-        speed=float(trial.speed[0]), rpm=float(trial.rpm[0]),
+        speed=float(trial.speed[first]), rpm=float(trial.rpm[first]),
         duration_secs=float(trial.time[-1]) - LEAD_SECS,
     )  # fmt: skip
     values = zigzag_overshoots(ship.fit, zigzag)[:OVERSHOOTS]
