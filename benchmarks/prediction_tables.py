@@ -177,8 +177,13 @@ def _of_setting(results: Sequence[IdentifiedTrials], setting: str) -> list[Ident
 def summary_table(
     results: Sequence[IdentifiedTrials], before: Sequence[IdentifiedTrials] = ()
 ) -> list[tuple[str, ...]]:
-    """Return the median absolute error by setting, of earlier results before the arrow."""
+    """Return the median absolute error by setting, of earlier results before the arrow.
+
+    Of the earlier results those count whose ship and setting are among the results.
+    """
     settings = [name for name in SETTINGS if _of_setting(results, name)]
+    measured = {(each.ship, each.setting) for each in results}
+    before = [each for each in before if (each.ship, each.setting) in measured]
 
     def cells(of: Callable[[list[IdentifiedTrials]], str]) -> Iterator[str]:
         for setting in settings:

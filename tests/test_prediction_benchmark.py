@@ -189,7 +189,8 @@ def test_coverage_is_of_the_intervals_that_there_are() -> None:
 def test_the_summary_shows_earlier_results_before_the_arrow() -> None:
     before = trials_with(PredictedIndex("circle port", "advance", 500.0, 600.0))
     now = trials_with(PredictedIndex("circle port", "advance", 500.0, 505.0))
-    rows = {row[0]: row[1:] for row in summary_table([now], [before])}
+    other = replace(before, ship="mariner")
+    rows = {row[0]: row[1:] for row in summary_table([now], [before, other])}
     assert rows["advance"] == ("3 %", "20.0 → 1.0")
     assert rows["within the target"] == ("all", "0 of 1 → 1 of 1")
     assert [row[0] for row in setting_table([now])[1 : 1 + len(ROWS)]] == list(ROWS)
