@@ -18,14 +18,10 @@ from time import process_time
 
 import numpy as np
 
-from analysis.identification.fit.segment import split_into_segments
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.identify import identify
-from analysis.identification.prediction import Zigzag, dead_reckoning, predict, zigzag_overshoots
 from analysis.replay.reading_options import ReadingOptions
-from examples.ships.sea_trial import STEP
-from examples.ships.true_indices import circle_indices, turn_from_execute
-from shiplog import ShiplogError, Signals
+from shiplog import ShiplogError
 
 from .prediction_results import (
     IdentifiedTrials,
@@ -38,9 +34,7 @@ from .prediction_results import (
 )
 from .prediction_tables import section_lines
 from .reference_trials import (
-    LEAD_SECS,
     LOG_SECS,
-    OVERSHOOTS,
     SETTINGS,
     SHIP_NAMES,
     ExactManoeuvre,
@@ -51,7 +45,6 @@ from .reference_trials import (
 
 SEEDS, FIRST_SEED = 3, 1
 SHORT_SHIP = "seiun-maru"  # the fastest to turn
-PREDICTED_STEP = 2  # of the samples of the exact motion, at which a circle is predicted
 
 
 @dataclass(frozen=True)
@@ -109,52 +102,16 @@ def predicted_values(
 ) -> dict[str, tuple[float, float, float]]:
     """Predict a manoeuvre: the one function through which the study uses an identified ship.
 
-    A circle is simulated from the straight course under the exact rudder and revolutions, a zig-zag
-    with the rudder controlled by the simulated heading.
-
     Returns
     -------
     values
         By index, its value and the ends of its 95 % interval, SI; NaN for what is not known.
     """
-    switch = manoeuvre.steering.switch
-    values = (
-        _predicted_circle(ship, manoeuvre)
-        if switch is None
-        else _predicted_overshoots(ship, manoeuvre, switch)
-    )
-    return {name: (value, np.nan, np.nan) for name, value in values.items()}
-
-
-def _predicted_circle(ship: IdentifiedShip, manoeuvre: ExactManoeuvre) -> dict[str, float]:
-    trial, dt = manoeuvre.trial, PREDICTED_STEP * STEP
-    exact = {
-        "yaw_rate": trial.yaw_rate, "speed": trial.speed, "heading": trial.heading,
-        "rudder": trial.rudder, "rpm": trial.rpm,
-    }  # fmt: skip
-    signals = Signals(0, dt, {name: each[::PREDICTED_STEP] for name, each in exact.items()})
-    outputs = predict(ship.fit, split_into_segments(signals, manoeuvre.name)[0])
-    yaw_rate, speed, sway, heading = outputs.T
-    if not np.isfinite(heading).all():
-        return {}
-    motion = np.column_stack((speed, np.nan_to_num(sway), yaw_rate))
-    side, first = float(np.sign(manoeuvre.steering.angle)), round(LEAD_SECS / dt)
-    track = dead_reckoning(outputs, dt)
-    return circle_indices(turn_from_execute(dt, first, side, 0.0, heading, motion, track))
-
-
-def _predicted_overshoots(
-    ship: IdentifiedShip, manoeuvre: ExactManoeuvre, switch: float
-) -> dict[str, float]:
-    trial, steering = manoeuvre.trial, manoeuvre.steering
-    first = round(LEAD_SECS / STEP)
-    zigzag = Zigzag(
-        rudder=steering.angle, heading=switch, rudder_rate=trial.ship.rudder_rate,
-        speed=float(trial.speed[first]), rpm=float(trial.rpm[first]),
-        duration_secs=float(trial.time[-1]) - LEAD_SECS,
-    )  # fmt: skip
-    values = zigzag_overshoots(ship.fit, zigzag)[:OVERSHOOTS]
-    return {f"overshoot {number}": float(value) for number, value in enumerate(values, 1)}
+    wanted = manoeuvre.steering.angle, manoeuvre.steering.switch or 0.0
+    for each in ship.predictions:
+        if np.allclose((each.manoeuvre.rudder, each.manoeuvre.switch or 0.0), wanted):
+            return {index.name: (index.value, index.low, index.high) for index in each.indices}
+    return {}
 
 
 def measure_study(size: StudySize, path: Path | None = None) -> PredictionStudy:

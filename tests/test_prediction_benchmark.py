@@ -1,6 +1,7 @@
 """The benchmark of prediction: its logs, its truths, its errors and its tables."""
 
 from dataclasses import replace
+from math import radians
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -8,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.identification.fit.segment import Segment
 from benchmarks import prediction
 from benchmarks.prediction import SHORT_STUDY, StudySize, measure_predictions, measure_study
 from benchmarks.prediction_results import (
@@ -30,7 +30,6 @@ from benchmarks.prediction_tables import (
 )
 from benchmarks.reference_trials import SETTINGS, exact_manoeuvres, reference_ship, zigzag_logs
 from shiplog import LogError
-from shiplog.types import FloatArray
 
 QUICK = replace(SHORT_STUDY, model="slipstream", log_secs=200.0)
 
@@ -103,31 +102,24 @@ def test_every_index_has_a_row_and_a_mild_zigzag_is_predicted_by_a_simple_model(
         assert abs(by_name[f"10/10 {side}", "overshoot 1"].error) < 3.0  # degrees
 
 
-@pytest.mark.parametrize("number", [0, 1], ids=["starboard", "port"])
-def test_a_circle_simulated_exactly_has_no_error(
-    number: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    circle = list(exact_manoeuvres(reference_ship("tanker")))[number]
-
-    def exactly(_fit: object, segment: Segment) -> FloatArray:
-        time, trial = segment.signals.time_secs, circle.trial
-        columns = trial.yaw_rate, trial.speed, trial.sway, trial.heading
-        return np.column_stack([np.interp(time, trial.time, column) for column in columns])
-
-    monkeypatch.setattr(prediction, "predict", exactly)
-    ship: Any = SimpleNamespace(fit=None)
-    values = prediction.predicted_values(ship, circle)
-    for index, true in circle.indices.items():
-        assert values[index][0] == pytest.approx(true, rel=2e-3), index
-
-
-def test_a_simulation_that_diverges_predicts_no_index(monkeypatch: pytest.MonkeyPatch) -> None:
-    circle = next(exact_manoeuvres(reference_ship("seiun-maru")))
-    monkeypatch.setattr(
-        prediction, "predict", lambda _fit, segment: np.full((len(segment), 4), np.nan)
+def test_the_predictions_of_an_identified_ship_are_found_by_rudder_and_switch_heading() -> None:
+    manoeuvres = {each.name: each for each in exact_manoeuvres(reference_ship("seiun-maru"))}
+    advance = SimpleNamespace(name="advance", value=330.0, low=300.0, high=360.0)
+    circle = SimpleNamespace(
+        manoeuvre=SimpleNamespace(rudder=-radians(35.0), switch=None), indices=(advance,)
     )
-    ship: Any = SimpleNamespace(fit=None)
-    assert prediction.predicted_values(ship, circle) == {}
+    overshoot = SimpleNamespace(name="overshoot 1", value=0.1, low=0.05, high=0.15)
+    zigzag = SimpleNamespace(
+        manoeuvre=SimpleNamespace(rudder=radians(20.0), switch=radians(20.0)), indices=(overshoot,)
+    )
+    ship: Any = SimpleNamespace(predictions=(circle, zigzag))
+    assert prediction.predicted_values(ship, manoeuvres["circle port"]) == {
+        "advance": (330.0, 300.0, 360.0)
+    }
+    assert prediction.predicted_values(ship, manoeuvres["20/20 starboard"]) == {
+        "overshoot 1": (0.1, 0.05, 0.15)
+    }
+    assert prediction.predicted_values(ship, manoeuvres["circle starboard"]) == {}
 
 
 def test_a_refused_identification_is_a_row_without_predictions(
