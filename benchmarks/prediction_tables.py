@@ -67,7 +67,8 @@ arrow were printed here while the models were being rebuilt, those after it have
 changes of the models are not blind to these ships."""
 READING = """
 An error is the mean over both sides and all seeds, in % of the true value, of an overshoot in
-degrees; in brackets the largest. It is in bold where the largest misses the target."""
+degrees; in brackets the largest. It is in bold where the largest misses the target. `none`: the
+predicted ship does not reach the index, which then has no interval either."""
 
 
 def targets_text() -> str:
@@ -105,15 +106,15 @@ def errors_by_row(results: Sequence[IdentifiedTrials]) -> dict[str, list[float]]
     return errors
 
 
-def coverage(results: Sequence[IdentifiedTrials]) -> float:
-    """Return the share of intervals that contain the true value, %; NaN without intervals."""
+def coverage(results: Sequence[IdentifiedTrials]) -> tuple[float, int]:
+    """Return the share of intervals that contain the true value, %, and how many there are."""
     predictions = chain.from_iterable(result.predictions for result in results)
     inside = [
         each.low <= each.true <= each.high
         for each in predictions
         if np.isfinite([each.true, each.low, each.high]).all()
     ]
-    return 100.0 * float(np.mean(inside)) if inside else np.nan
+    return (100.0 * float(np.mean(inside)) if inside else np.nan), len(inside)
 
 
 def within_targets(results: Sequence[IdentifiedTrials]) -> tuple[int, int]:
@@ -142,17 +143,18 @@ def _share_cell(results: Sequence[IdentifiedTrials]) -> str:
 
 
 def _coverage_cell(results: Sequence[IdentifiedTrials]) -> str:
-    share = coverage(results)
-    if not np.isfinite(share):
+    share, count = coverage(results)
+    if not count:
         return "no intervals"
     low, high = COVERAGE_TARGET
-    return f"{share:.0f} %" if low <= share <= high else f"**{share:.0f} %**"
+    text = f"{share:.0f} % of {count}"
+    return text if low <= share <= high else f"**{text}**"
 
 
 def _coverage_of_ship_cell(results: Sequence[IdentifiedTrials]) -> str:
     """Return the share, in bold where it is low: few errors of one ship may all be in it."""
-    share = coverage(results)
-    return f"{share:.0f} %" if share > COVERAGE_TARGET[0] else _coverage_cell(results)
+    cell = _coverage_cell(results)
+    return cell.strip("*") if coverage(results)[0] > COVERAGE_TARGET[0] else cell
 
 
 def _models_cell(results: Sequence[IdentifiedTrials]) -> str:
@@ -214,6 +216,8 @@ def summary_table(
     rows.append(("within the target", "all", *cells(_share_cell)))
     low, high = COVERAGE_TARGET
     rows.append(("95 % intervals", f"{low:g} to {high:g} %", *cells(_coverage_cell)))
+    ships = (len({each.ship for each in _of_setting(results, name)}) for name in settings)
+    rows.append(("ships measured", str(len(SHIP_NAMES)), *map(str, ships)))
     return rows
 
 

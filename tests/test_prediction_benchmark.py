@@ -172,10 +172,10 @@ def test_coverage_is_of_the_intervals_that_there_are() -> None:
     inside = PredictedIndex("circle port", "advance", 500.0, 510.0, 490.0, 530.0)
     outside = replace(inside, low=505.0)
     without = replace(inside, low=np.nan, high=np.nan)
-    assert coverage([trials_with(inside, inside, inside, outside, without)]) == 75.0
-    assert np.isnan(coverage([trials_with(without)]))
+    assert coverage([trials_with(inside, inside, inside, outside, without)]) == (75.0, 4)
+    assert np.isnan(coverage([trials_with(without)])[0])
     (*_, cell) = setting_table([trials_with(inside, outside)])[-2]
-    assert cell == "**50 %**"
+    assert cell == "**50 % of 2**"
 
 
 def test_the_summary_shows_earlier_results_before_the_arrow() -> None:
