@@ -291,7 +291,7 @@ def test_the_mean_of_a_double_run_is_free_of_the_current() -> None:
         return keeping(MARINER, 0.0 if time < 300.0 else pi)(time, heading, yaw_rate, rudder)
 
     sailed = sail(MARINER, there_and_back, 1100.0)
-    log = as_log(sailed, GOOD, rng(), current=(0.6, 0.1))
+    log = as_log(sailed, GOOD, rng(), current=(0.6, 1.5))
     at = log["rpm"]
     power = replace(at, name="power", unit="W", values=5e6 + 0.0 * at.values)
     trial = analysed(replace(log, channels=(*log.channels, power)), MARINER)
