@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,13 @@ from shiplog.errors import UsageError
 from shiplog.extensions import extension_names
 from shiplog.files import atomic_write
 
-from .shared_options import add_reading_options, reading_options, show_review
+from .shared_options import (
+    add_antenna_option,
+    add_reading_options,
+    antenna_place,
+    reading_options,
+    show_review,
+)
 
 if TYPE_CHECKING:
     from analysis.identification.identified_ship import IdentifiedShip
@@ -33,6 +40,7 @@ DEFAULT_REVIEW = "identified.rrd"
 def _configure_identify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", metavar="LOG", nargs="+", help="logs of one ship, loaded alike")
     add_reading_options(parser)
+    add_antenna_option(parser)
     parser.add_argument(
         "--model",
         metavar="NAME",
@@ -71,7 +79,7 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
 def _identify(arguments: argparse.Namespace) -> ExitCode:
     review = arguments.review or (DEFAULT_REVIEW if arguments.view else None)
     fixed = assigned_numbers(arguments.fix, "--fix", "T3=0.5")
-    options = reading_options(arguments)
+    options = replace(reading_options(arguments), antenna=antenna_place(arguments.antenna))
     _require_identify_paths(arguments, review)
     from analysis.identification.identify import identify
     from analysis.identification.vessel_file import vessel_toml

@@ -3,7 +3,7 @@
 import argparse
 import shlex
 from dataclasses import replace
-from math import isfinite, nan, radians
+from math import radians
 from typing import TYPE_CHECKING
 
 from shiplog.cli.console import print_line, print_tables, print_warnings, progress, write_json
@@ -12,7 +12,12 @@ from shiplog.cli.verb import ExitCode, Verb
 from shiplog.errors import UsageError
 from shiplog.files import atomic_write
 
-from .shared_options import add_reading_options, reading_options
+from .shared_options import (
+    add_antenna_option,
+    add_reading_options,
+    antenna_place,
+    reading_options,
+)
 
 if TYPE_CHECKING:
     from analysis.trial.trial_options import TrialOptions
@@ -40,11 +45,7 @@ def _configure_report(parser: argparse.ArgumentParser) -> None:
         metavar="SECS",
         help="the executes, s since the log's start, such as 60 or 60,900; the rule is then stated",
     )
-    parser.add_argument(
-        "--antenna",
-        metavar="FORWARD,STARBOARD",
-        help="place of the position's antenna from the midship point, m, such as --antenna=-45,2.5",
-    )
+    add_antenna_option(parser)
     parser.add_argument(
         "--test-speed", type=float, metavar="M/S", help="V of the norm (default: the log's)"
     )
@@ -120,10 +121,8 @@ def _trial_options(arguments: argparse.Namespace) -> "TrialOptions":
     from analysis.manoeuvres.start_rules import StartRule
     from analysis.trial.trial_options import TrialOptions
 
-    executes = _numbers(arguments.execute, "--execute", "60,900")
-    antenna = _numbers(arguments.antenna, "--antenna", "-45,2.5") or (0.0, 0.0)
-    if len(antenna) != 2:
-        raise UsageError(f"--antenna takes two numbers, such as -45,2.5, not {arguments.antenna!r}")
+    executes = finite_numbers(arguments.execute, "--execute", "60,900")
+    antenna = antenna_place(arguments.antenna)
     rule = arguments.start_rule or ("stated" if executes else "order")
     if (rule == "stated") != bool(executes):
         raise UsageError("the start rule stated needs --execute SECS, and no other rule takes it")
@@ -144,17 +143,6 @@ def _trial_options(arguments: argparse.Namespace) -> "TrialOptions":
         test_speed=arguments.test_speed,
     )
     return options if error_deg is None else replace(options, compass_change_std=radians(error_deg))
-
-
-def _numbers(text: str | None, option: str, example: str) -> tuple[float, ...]:
-    """Parse the finite numbers of an option, separated by commas; none where it is not given."""
-    try:
-        numbers = tuple(float(word) for word in text.split(",")) if text else ()
-    except ValueError:
-        numbers = (nan,)
-    if not all(map(isfinite, numbers)):
-        raise UsageError(f"{option} takes numbers, such as {example}, not {text!r}")
-    return numbers
 
 
 def _command(arguments: argparse.Namespace) -> str:

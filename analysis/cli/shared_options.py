@@ -1,6 +1,7 @@
 """Options that replay and identify share: how their logs are read, and the review they show."""
 
 import argparse
+from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from shiplog.cli.options import (
     assigned_numbers,
     assigned_sources,
 )
+from shiplog.errors import UsageError
 
 if TYPE_CHECKING:
     from analysis.replay.reading_options import ReadingOptions
@@ -69,6 +71,46 @@ def _sensor_delays(text: str | None) -> "StatedDelays":
     if text == "auto":
         return "auto"
     return assigned_numbers(text.split(","), "--sensor-delay", "heading=1.2,speed=0.4, or auto")
+
+
+def add_antenna_option(parser: argparse.ArgumentParser) -> None:
+    """Add the option that places the position's antenna; `antenna_place` applies it."""
+    parser.add_argument(
+        "--antenna",
+        metavar="FORWARD,STARBOARD",
+        help="place of the position's antenna from the midship point, m, such as --antenna=-45,2.5",
+    )
+
+
+def antenna_place(text: str | None) -> tuple[float, float]:
+    """Return the place of the antenna ahead and to starboard of midship, m.
+
+    Raises
+    ------
+    UsageError
+        It is not two numbers.
+    """
+    numbers = finite_numbers(text, "--antenna", "-45,2.5") or (0.0, 0.0)
+    if len(numbers) != 2:
+        raise UsageError(f"--antenna takes two numbers, such as -45,2.5, not {text!r}")
+    return numbers[0], numbers[1]
+
+
+def finite_numbers(text: str | None, option: str, example: str) -> tuple[float, ...]:
+    """Parse the finite numbers of an option, separated by commas; none where it is not given.
+
+    Raises
+    ------
+    UsageError
+        Something is no finite number.
+    """
+    try:
+        numbers = tuple(float(word) for word in text.split(",")) if text else ()
+    except ValueError:
+        numbers = (nan,)
+    if not all(map(isfinite, numbers)):
+        raise UsageError(f"{option} takes numbers, such as {example}, not {text!r}")
+    return numbers
 
 
 def show_review(path: str | Path, *, view: bool) -> None:

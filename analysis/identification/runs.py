@@ -80,8 +80,9 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     log
         A log with `REQUIRED_CHANNELS`; `OPTIONAL_CHANNELS` and positions are used if present.
     options
-        Of these the sources of channels, whether contradictions are refused, and the vessel, whose
-        steering gear follows an order of the rudder; by default that of the log.
+        Of these the sources of channels, whether contradictions are refused, the place of the
+        antenna, and the vessel, whose steering gear follows an order of the rudder; by default
+        that of the log.
 
     Returns
     -------
@@ -133,7 +134,8 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     return Run(
         name=log.name,
         segments=tuple(
-            replace(segment, fixes=each) for segment, each in zip(segments, positions, strict=True)
+            replace(segment, fixes=each, antenna=options.antenna)
+            for segment, each in zip(segments, positions, strict=True)
         ),
         positions=positions,
         vessel=vessel,

@@ -30,6 +30,9 @@ class ReadingOptions:
     sensor_delays
         By how much the times of a channel are late, s, by its name, such as ``{"heading": 1.2}``;
         or ``"auto"``, which estimates the delays of heading and speed from the log.
+    antenna
+        Place of the position's antenna ahead and to starboard of the midship point, m, for an
+        identification.
 
     Examples
     --------
@@ -45,6 +48,7 @@ class ReadingOptions:
     strict: bool = False
     derive: tuple[str, ...] = ()
     sensor_delays: StatedDelays = field(default_factory=dict)
+    antenna: tuple[float, float] = (0.0, 0.0)
 
 
 DEFAULT_OPTIONS = ReadingOptions()

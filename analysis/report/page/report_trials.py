@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.identification.identify import identify
@@ -92,7 +92,9 @@ def report_trials(
     if model is not None:
         try:
             opened = [part.open() for part in parts]
-            identified = identify(opened, model, options=options, on_progress=on_progress)
+            antenna = trial_options.antenna_forward, trial_options.antenna_starboard
+            placed = replace(options, antenna=antenna)
+            identified = identify(opened, model, options=placed, on_progress=on_progress)
         except ShiplogError as cause:
             error = str(cause)
     return TrialReport(tuple(reported), __version__, trial_options, command, identified, error)
