@@ -16,6 +16,7 @@ from .shared_options import (
     add_antenna_option,
     add_reading_options,
     antenna_place,
+    finite_numbers,
     reading_options,
 )
 

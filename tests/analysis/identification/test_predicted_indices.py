@@ -111,7 +111,8 @@ def test_a_model_that_diverges_gives_no_value_but_the_reason() -> None:
     best = candidates()[0]
     assert best.fit is not None
     z = best.fit.minimum.unknowns.copy()
-    z[best.fit.problem.free_names.index("nr")] = 0.1  # the yaw rate grows without end
+    for name in ("nr", "nrrr"):  # the yaw rate grows without end
+        z[best.fit.problem.free_names.index(name)] = 0.5
     minimum = replace(best.fit.minimum, unknowns=z)
     broken = replace(best, fit=replace(best.fit, minimum=minimum), excess=1.0)
     (result,) = predict_manoeuvres([broken], approach(), [CIRCLE], draws=10)
@@ -158,9 +159,8 @@ def test_a_parameter_at_its_limit_is_a_fault() -> None:
     fit = mmg_fit()
     assert fault_of(fit) == ""
     z = fit.minimum.unknowns.copy()
-    z[fit.problem.free_names.index("my")] = fit.problem.bounds[0][
-        fit.problem.free_names.index("my")
-    ]
+    added_mass = fit.problem.free_names.index("my")
+    z[added_mass] = fit.problem.bounds[0][added_mass]
     assert fault_of(replace(fit, minimum=replace(fit.minimum, unknowns=z))) == "at its limit: my"
     stopped = replace(fit, minimum=replace(fit.minimum, converged=False))
     assert fault_of(stopped) == "not converged"

@@ -29,18 +29,15 @@ def test_the_sway_that_no_sensor_measured_is_that_of_the_ship() -> None:
 
 
 def test_the_jacobian_is_that_by_differences_for_every_unknown() -> None:
-    segments = [segment.part(0, 60) for segment in zigzag_segments()]
-    segments = [replace(segment, antenna=(-40.0, 3.0)) for segment in segments]
-    problem = make_problem(
-        [*segments[:1], zigzag_segments()[1]], ship_model("three-dof"), length=320.0
-    )
+    segments = [replace(segment, antenna=(-40.0, 3.0)) for segment in zigzag_segments()]
+    problem = make_problem(segments, ship_model("three-dof"), length=320.0)
     z = problem.start() + 0.01 * np.random.default_rng(0).normal(size=problem.size)
     jacobian = problem.jacobian(z, 1)
     for k, at in enumerate(problem.unknown_indices(1)):
         step = np.zeros(problem.size)
         step[at] = 1e-6
         by = (problem.predicted(z + step, 1) - problem.predicted(z - step, 1)) / 2e-6
-        assert np.array_equal(np.isnan(by), np.isnan(jacobian[:, :, k]))
+        assert np.array_equal(np.isfinite(by), problem.measured_mask(1))
         scale = max(float(np.nanmax(np.abs(by))), 1e-9)
         assert np.nanmax(np.abs(by - jacobian[:, :, k])) < 1e-3 * scale
 
