@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from math import sqrt
 from typing import Any
 
+from shiplog.ships.hull_form import HullForm
 from shiplog.toml_text import unknown_key
 from shiplog.units import did_you_mean
 
@@ -87,6 +89,12 @@ class Hull:
             return self.rudder_aspect_ratio
         return self.rudder_height**2 / self.rudder_area
 
+    @property
+    def height(self) -> float | None:
+        """The height of a single rudder, m; None where unknown."""
+        area, ratio = self.rudder_area, self.rudder_aspect_ratio
+        return self.rudder_height if area is None or ratio is None else sqrt(area * ratio)
+
     def fullness(self, length: float | None) -> float | None:
         """Return the block coefficient, given or by the displacement in sea water.
 
@@ -109,6 +117,36 @@ class Hull:
         if self.displacement is None or None in (length, self.breadth, draught):
             return self.block_coefficient
         return self.displacement / (SEA_WATER * length * self.breadth * draught)  # type: ignore[operator]
+
+    def form(self, length: float | None) -> HullForm:
+        """Return the dimensions over the length; those that need an unknown one are None.
+
+        Parameters
+        ----------
+        length
+            Length between perpendiculars, m.
+
+        Examples
+        --------
+        >>> Hull(breadth=32.0).form(200.0).breadth
+        0.16
+        """
+        if length is None:
+            return HullForm()
+
+        def relative(value: float | None) -> float | None:
+            return None if value is None else value / length
+
+        area, draught = self.rudder_area, self.mean_draught
+        return HullForm(
+            breadth=relative(self.breadth),
+            draught=relative(draught),
+            block_coefficient=self.fullness(length),
+            rudder_area=None if area is None or draught is None else area / (length * draught),
+            rudder_aspect_ratio=self.aspect_ratio,
+            rudder_height=relative(self.height),
+            propeller_diameter=relative(self.propeller_diameter),
+        )
 
 
 def parse_hull(table: object, length: float | None, errors: list[str]) -> Hull | None:
