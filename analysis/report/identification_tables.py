@@ -6,6 +6,7 @@ from math import isfinite
 import numpy as np
 
 from analysis.identification.comparison.history import PRIOR_OFFSET
+from analysis.identification.fit.fix_blocks import GROUND_VELOCITY
 from analysis.identification.held_out import JUDGED_COLUMNS, PREDICTED
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.model_selection import Candidate
@@ -17,7 +18,11 @@ from shiplog.units import CATALOGUE, conversion_factor
 
 FIT_METHOD = "output error"
 DISPLAY_UNITS = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}
-OUTPUT_UNITS = {name: CATALOGUE[name].unit for name in MODEL_OUTPUTS} | {"track": "m"}
+OUTPUT_UNITS = (
+    {name: CATALOGUE[name].unit for name in MODEL_OUTPUTS}
+    | dict.fromkeys(GROUND_VELOCITY, "m/s")
+    | {"track": "m"}
+)
 SENSORS = {
     "yaw_rate": "gyro",
     "speed": "speed log",

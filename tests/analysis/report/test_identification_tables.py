@@ -1,11 +1,13 @@
 """Tables and JSON of an identified ship: headings, units, and what is not identifiable."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import pytest
 from trial_logs import as_log
 
+from analysis.identification.fit.fix_blocks import GROUND_VELOCITY
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.identify import identify
 from analysis.report.identification_json import identification_json
@@ -63,6 +65,23 @@ def test_a_run_has_its_residual_rms_its_rudder_zero_and_its_gyro_bias() -> None:
         "gyro bias [deg/s]", "swell period [s]",
     ]  # fmt: skip
     assert table.rows[0][:2] == ("zigzag-20-20.mcap", "300")
+
+
+def test_velocities_of_positions_are_outputs_in_knots() -> None:
+    known = ship()
+    outputs = (*known.fit.problem.outputs, *GROUND_VELOCITY)
+    fit = replace(known.fit, problem=replace(known.fit.problem, outputs=outputs))
+    rms = {**known.runs[0].rms, "velocity_north": 1852 / 3600, "velocity_east": 926 / 3600}
+    (table,) = (
+        table
+        for table in identification_tables(
+            replace(known, fit=fit, runs=(replace(known.runs[0], rms=rms),))
+        )
+        if table.title.startswith("Fit")
+    )
+    at = table.columns.index("velocity north\n[kn]")
+    assert table.columns[at + 1] == "velocity east\n[kn]"
+    assert table.rows[0][at : at + 2] == ("1", "0.5")
 
 
 def test_json_holds_numbers_in_si_and_none_where_nothing_is_identifiable() -> None:
