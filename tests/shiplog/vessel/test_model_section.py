@@ -88,7 +88,7 @@ def test_all_errors_are_reported_at_once_in_one_line() -> None:
         (
             '"three-dof"',
             "3",
-            "model.name must be one of drift-lag, nomoto, norrbin, slipstream, three-dof,",
+            "model.name must be one of drift-lag, mmg, nomoto, norrbin, slipstream, three-dof,",
         ),
         ('name = "three-dof"', "", "but [model] has none"),
         ('"three-dof"', '"burylin"', "'burylin' is not allowed, this model is given by [yaw]"),
