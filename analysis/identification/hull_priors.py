@@ -1,13 +1,34 @@
-"""Priors from the hull of the vessel file, for the models that have any."""
+"""Priors from the hull of the vessel file or of the log, for the models that have any."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from analysis.trial.hull_conditions import hull_of_conditions, stated_conditions
 from shiplog.ships import Model
 from shiplog.ships.hull_form import HullForm
 from shiplog.ships.mmg_priors import beyond_regressions, mmg_with_hull
+from shiplog.types import Log
+from shiplog.vessel.hull import Hull
 from shiplog.vessel.vessel import Vessel
 
 MMG = "mmg"  # the model whose priors follow from a hull form
+
+
+def with_stated_hull(vessel: Vessel | None, logs: Sequence[Log]) -> Vessel | None:
+    """Return the vessel with the hull of its file, or else that which the logs state.
+
+    Parameters
+    ----------
+    vessel
+        The vessel; None where neither it nor its length is known.
+    logs
+        The logs, whose metadata can state the conditions of the trial; the first one with a hull
+        counts, since draughts differ a little from run to run.
+    """
+    if vessel is None or vessel.hull != Hull():
+        return vessel
+    stated = (hull_of_conditions(stated_conditions(log.metadata), vessel.length) for log in logs)
+    return replace(vessel, hull=next((hull for hull in stated if hull != Hull()), Hull()))
 
 
 def with_hull_priors(

@@ -25,7 +25,7 @@ from shiplog.vessel.vessel import Vessel, with_length
 from .advice import check_ties, manoeuvres_to_identify
 from .fit_warnings import fit_warnings
 from .fixed_parameters import check_fixed, fixed_values
-from .hull_priors import with_hull_priors
+from .hull_priors import with_hull_priors, with_stated_hull
 from .identified_ship import IdentifiedShip, run_fits
 from .model_selection import Candidate, rank_models, require_two_runs
 from .parallel import single_blas_thread
@@ -100,6 +100,7 @@ def identify(
     steps.begin("read")
     runs, held_out = distinct_runs(to_fit, to_predict, options)
     ship = with_length(common_vessel([*runs, *held_out], options.vessel), options.length)
+    ship = with_stated_hull(ship, to_fit)
     models, hull_warnings = with_hull_priors(models, ship)
     warnings += hull_warnings
     steps.begin("fit")

@@ -20,12 +20,11 @@ from analysis.replay.reading_options import DEFAULT_OPTIONS, ReadingOptions
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.types import Log
 
-from .hull_conditions import with_hull_conditions
+from .hull_conditions import stated_conditions, stated_number, with_hull_conditions
 from .trial_analysis import CriterionFinding, CurrentEstimate, TrialAnalysis, TrialConditions
 from .trial_options import DEFAULT_TRIAL_OPTIONS, TrialOptions
 from .trial_record import TrialRecord, read_trial
 
-CONDITION_PREFIX = "condition."
 GROUND_SPEED_SECS = 30.0  # of an approach, over which a speed over the ground is taken
 STOPPED_SPEED = 0.5  # m/s: a ship that is never faster does not move
 PERMITTED_COMPASS_ERROR = radians(0.25)  # at the equator, IMO A.821(19), 4.1.2
@@ -150,11 +149,7 @@ def _conditions(
     options: TrialOptions,
 ) -> TrialConditions:
     """Gather the conditions of the trial from vessel, metadata and signals."""
-    stated = {
-        key.removeprefix(CONDITION_PREFIX): text
-        for key, text in record.metadata.items()
-        if key.startswith(CONDITION_PREFIX)
-    }
+    stated = stated_conditions(record.metadata)
     stated = with_hull_conditions(stated, record.vessel)
     length = record.vessel.length if record.vessel is not None else None
     speed, origin = _test_speed(filled, detection, stated, options)
@@ -166,7 +161,7 @@ def _conditions(
         )
     return TrialConditions(
         ship=record.vessel.name if record.vessel is not None else "",
-        length=_stated_number(stated, "length_pp") if length is None else length,
+        length=stated_number(stated, "length_pp") if length is None else length,
         test_speed=speed,
         test_speed_origin=origin,
         stated=stated,
@@ -176,21 +171,13 @@ def _conditions(
     )
 
 
-def _stated_number(stated: dict[str, str], name: str) -> float:
-    """Return the number at the beginning of a stated condition; NaN where there is none."""
-    try:
-        return float(stated.get(name, "").split(" ")[0])
-    except ValueError:
-        return nan
-
-
 def _test_speed(
     filled: TrialSignals, detection: Detection, stated: dict[str, str], options: TrialOptions
 ) -> tuple[float, str]:
     """Return V of the norm and where it came from."""
     if options.test_speed is not None:
         return options.test_speed, "given"
-    number = _stated_number(stated, "test_speed")
+    number = stated_number(stated, "test_speed")
     if np.isfinite(number):
         return number, "stated in the log"
     steered = [each for each in detection.manoeuvres if each.kind in STEERED]

@@ -1,11 +1,29 @@
-"""Conditions of a trial that follow from the hull of the vessel file."""
+"""Conditions of a trial from the hull of the vessel file, and a hull from stated conditions."""
 
 from collections.abc import Mapping
+from math import nan
 
+from shiplog.vessel.hull import MOST, Hull, parse_hull
 from shiplog.vessel.vessel import Vessel
 
+CONDITION_PREFIX = "condition."  # of metadata
 DRAUGHTS = ("draught", "draught_forward", "draught_aft")
 FULLNESS = ("block_coefficient", "displacement")
+
+
+def stated_conditions(metadata: Mapping[str, str]) -> dict[str, str]:
+    """Return the conditions that the metadata of a log state, by name.
+
+    Examples
+    --------
+    >>> stated_conditions({"condition.draught_aft": "8.5 m", "source": "bridge"})
+    {'draught_aft': '8.5 m'}
+    """
+    return {
+        key.removeprefix(CONDITION_PREFIX): text
+        for key, text in metadata.items()
+        if key.startswith(CONDITION_PREFIX)
+    }
 
 
 def with_hull_conditions(stated: Mapping[str, str], vessel: Vessel | None) -> dict[str, str]:
@@ -54,6 +72,49 @@ def with_hull_conditions(stated: Mapping[str, str], vessel: Vessel | None) -> di
                 del values[name]
     texts = {name: _text(value, unit) for name, (value, unit) in values.items()}
     return {name: text for name, text in texts.items() if text} | dict(stated)
+
+
+def hull_of_conditions(stated: Mapping[str, str], length: float | None) -> Hull:
+    """Return the hull that a log states in its conditions.
+
+    Parameters
+    ----------
+    stated
+        Conditions by name, such as ``{"breadth": "32 m"}``.
+    length
+        Length between perpendiculars, m; None where unknown.
+
+    Returns
+    -------
+    Hull
+        Without any dimension where those stated contradict each other.
+
+    Examples
+    --------
+    >>> hull_of_conditions({"breadth": "32 m", "loading": "ballast"}, 200.0).breadth
+    32.0
+    """
+    numbers = {name: stated_number(stated, name) for name in MOST if name in stated}
+    if "block_coefficient" in numbers:
+        numbers.pop("displacement", None)
+    known = {name: value for name, value in numbers.items() if value > 0}
+    if not {"draught_forward", "draught_aft"} <= known.keys():
+        known = {name: value for name, value in known.items() if name not in DRAUGHTS}
+    return parse_hull(known, length, []) or Hull()
+
+
+def stated_number(stated: Mapping[str, str], name: str) -> float:
+    """Return the number at the beginning of a stated condition; NaN where there is none.
+
+    Examples
+    --------
+    >>> stated_number({"draught_aft": "8.5 m"}, "draught_aft")
+    8.5
+    """
+    try:
+        return float(stated.get(name, "").split(" ")[0])
+    except ValueError:
+        return nan
 
 
 def _text(value: float | str | None, unit: str) -> str:

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.identification.hull_priors import with_hull_priors
-from shiplog import Vessel
+from analysis.identification.hull_priors import with_hull_priors, with_stated_hull
+from shiplog import TrialLog, Vessel
 from shiplog.ships import ship_model
 from shiplog.ships.mmg_priors import mmg_with_hull
 from shiplog.vessel.hull import Hull
@@ -45,3 +45,39 @@ def test_a_hull_outside_the_regressions_gives_a_warning() -> None:
 def test_a_height_follows_from_area_and_aspect_ratio() -> None:
     assert HULL.form(200.0).rudder_height == pytest.approx((36.0 * 1.8) ** 0.5 / 200.0)
     assert replace(HULL, rudder_aspect_ratio=None).form(200.0).rudder_height is None
+
+
+def log_with(**conditions: str) -> TrialLog:
+    return TrialLog("a log", (), {f"condition.{name}": text for name, text in conditions.items()})
+
+
+def test_a_hull_that_a_log_states_holds_where_the_file_has_none() -> None:
+    stated = log_with(
+        breadth="32 m", draught_forward="9.5 m", draught_aft="10.5 m", displacement="46000 t",
+        loading="full load",
+    )  # fmt: skip
+    bare = replace(SHIP, hull=Hull())
+    ship = with_stated_hull(bare, [log_with(), stated])
+    assert ship is not None
+    assert ship.hull == Hull(
+        breadth=32.0, draught_forward=9.5, draught_aft=10.5, displacement=46_000.0
+    )
+    assert with_stated_hull(SHIP, [stated]) is SHIP
+    assert with_stated_hull(bare, [log_with()]) == bare
+    assert with_stated_hull(None, [stated]) is None
+
+
+@pytest.mark.parametrize(
+    ("conditions", "hull"),
+    [
+        ({"breadth": "wide"}, Hull()),
+        ({"breadth": "0 m"}, Hull()),
+        ({"breadth": "300 m"}, Hull()),  # more than the length
+        ({"draught_aft": "9 m", "breadth": "32 m"}, Hull(breadth=32.0)),
+        ({"block_coefficient": "0.7", "displacement": "9 t"}, Hull(block_coefficient=0.7)),
+    ],
+)
+def test_conditions_that_are_no_hull_are_not_used(conditions: dict[str, str], hull: Hull) -> None:
+    ship = with_stated_hull(replace(SHIP, hull=Hull()), [log_with(**conditions)])
+    assert ship is not None
+    assert ship.hull == hull
