@@ -29,9 +29,10 @@ from .hull_priors import with_hull_priors, with_stated_hull
 from .identified_ship import IdentifiedShip, run_fits
 from .model_selection import Candidate, rank_models, require_two_runs
 from .parallel import single_blas_thread
-from .predicted_indices import PredictedManoeuvre, approach_of, predict_manoeuvres
+from .predicted_indices import PredictedManoeuvre, predict_manoeuvres
 from .prior_sensitivity import PriorSensitivity, prior_sensitivity
 from .runs import Run, common_vessel, consistency_warnings, distinct_runs
+from .simulated_manoeuvres import approach_of
 from .validation import validate
 
 AUTO = "auto"
@@ -193,7 +194,7 @@ def _fit(
         return [], output_error(segments, model, fixed=given[model.name], length=length)
     make_problem(segments, models[0], length=length)  # rejects logs that are useless to any model
     candidates = rank_models(
-        segments, models, fixed=given, length=length, on_progress=steps.within_fit
+        segments, models, fixed=given, vessel=ship, on_progress=steps.within_fit
     )
     return candidates, _best_fit(candidates)
 
@@ -233,7 +234,8 @@ def _predictions(
             "one run does not show how well the model predicts another; give two or more, such as "
             "zig-zags 10/10 and 20/20"
         )
-    return predict_manoeuvres(candidates, approach_of(runs, ship)), ""
+    segments = [segment for run in runs for segment in run.segments]
+    return predict_manoeuvres(candidates, approach_of(segments, ship)), ""
 
 
 def _assumed_length(fit: OutputError, ship: Vessel | None) -> Iterator[str]:

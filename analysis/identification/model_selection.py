@@ -20,9 +20,11 @@ from shiplog.errors import LogError, UsageError
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model
 from shiplog.types import FloatArray
+from shiplog.vessel.vessel import Vessel
 
 from .held_out import JUDGED_COLUMNS, PREDICTED, HeldOutErrors, predict_without
 from .parallel import parallel_map
+from .simulated_manoeuvres import Approach, turns_hard_over
 
 MAX_MISFIT = 10.0  # relative error that a diverging simulation counts with
 RUN_NUMBERS = 4  # independent numbers of a run: its error is slow, and yaw, speed and track differ
@@ -50,8 +52,8 @@ class Candidate:
     excess
         The mean square of those errors over that predicted; at least 1.
     fault
-        Why the model is not to be chosen: it has not converged, or a parameter is at its limit;
-        empty for none.
+        Why the model is not to be chosen: it has not converged, a parameter is at its limit, or
+        the simulated ship does not turn with the rudder hard over; empty for none.
     weight
         Its share in predictions that average over the models, 0 to 1.
     """
@@ -77,7 +79,7 @@ def rank_models(
     models: Sequence[Model],
     *,
     fixed: Mapping[str, Mapping[str, float]] | None = None,
-    length: float | None = None,
+    vessel: Vessel | None = None,
     on_progress: ProgressCallback = no_progress,
     threads: int | None = None,
 ) -> list[Candidate]:
@@ -93,8 +95,8 @@ def rank_models(
         The models to compare.
     fixed
         By model name, the parameters that are not estimated.
-    length
-        Ship length, m, for dimensionless models.
+    vessel
+        Gives the ship's length for dimensionless models, and the rate of the steering gear.
     on_progress
         Given ``"model 3 of 7 (slipstream), run 2 of 6"`` and the share of this ranking.
     threads
@@ -112,6 +114,7 @@ def rank_models(
     """
     runs = _runs_of(segments)
     require_two_runs(len(runs))
+    length = vessel.length if vessel else None
     # the models with the most parameters take longest, and are begun first
     order = sorted(range(len(models)), key=lambda i: -_free_count(models[i]))
     progress = _RankingProgress(models, order, len(held_out_sets(segments)), on_progress)
@@ -162,8 +165,14 @@ def _candidate(
         np.minimum(np.mean(errors[hardest].misfits, axis=0), MAX_MISFIT),
         max(angles) / left[hardest],
         max(1.0, excess) if np.isfinite(excess) else 1.0,
-        fault_of(fit),
     )
+
+
+def _checked(candidate: Candidate, approach: Approach) -> Candidate:
+    """Return the candidate with its fault, if it has one."""
+    if candidate.fit is None:
+        return candidate
+    return replace(candidate, fault=fault_of(candidate.fit, approach))
 
 
 def largest_rudder(segment: Segment) -> float:
@@ -171,15 +180,16 @@ def largest_rudder(segment: Segment) -> float:
     return float(np.quantile(np.abs(segment.signals["rudder"]), 0.9))
 
 
-def fault_of(fit: OutputError) -> str:
+def fault_of(fit: OutputError, approach: Approach) -> str:
     """Return why a fit is not to be trusted; empty for none."""
     if not fit.minimum.converged:
         return "not converged"
     lowest, highest = fit.problem.bounds
     z = fit.minimum.unknowns
     at_limit = np.flatnonzero((z <= lowest) | (z >= highest))
-    names = [fit.problem.free_names[i] for i in at_limit]
-    return f"at its limit: {', '.join(names)}" if names else ""
+    if len(at_limit):
+        return f"at its limit: {', '.join(fit.problem.free_names[i] for i in at_limit)}"
+    return "" if turns_hard_over(fit, approach) else "no 35° turn"
 
 
 def _weighted(ranked: Sequence[Candidate], runs: int) -> list[Candidate]:

@@ -13,19 +13,16 @@ from math import degrees, radians
 
 import numpy as np
 
-from analysis.identification.fit.output_error import DEFAULT_LENGTH, OutputError, tempered_fit
-from analysis.identification.fit.segment import Segment, initial_level
+from analysis.identification.fit.output_error import OutputError, tempered_fit
 from analysis.identification.fit.uncertainty import parameter_covariance
 from analysis.manoeuvres.imo_criteria import criterion_of, probability_below
 from analysis.manoeuvres.index_names import SYMBOLS, index_unit
 from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreKind
 from analysis.manoeuvres.trial_index import TrialIndex
 from shiplog.types import FloatArray
-from shiplog.vessel.vessel import Vessel
 
 from .held_out import PREDICTED, TRACK
 from .model_selection import Candidate, largest_rudder
-from .runs import Run
 from .simulated_manoeuvres import (
     Approach,
     ShipDraws,
@@ -38,9 +35,6 @@ DRAWS = 60  # in all models together
 LEAST_DRAWS = 10  # of a model, however small its weight
 SEED = 20020  # of the draws: the same fit gives the same intervals
 MIN_SPREAD = radians(0.1)  # of the rudder zero from run to run
-RATE_SECS = 2.0  # over which a rate of the rudder is taken
-FASTEST_SHARE = 0.97  # of the rates: a few per cent of a zig-zag are reversals
-LEAST_RATE = radians(0.5)  # per second
 MAX_GROWTH = 3.0  # of the model's error with the rudder angle
 OUTPUT_OF = {  # whose error on held-out runs stands for that of an index
     TRACK: ("advance", "transfer", "tactical diameter", "initial turning distance"),
@@ -124,28 +118,6 @@ class PredictedManoeuvre:
     manoeuvre: StandardManoeuvre
     indices: tuple[TrialIndex, ...]
     note: str = ""
-
-
-def approach_of(runs: Sequence[Run], vessel: Vessel | None) -> Approach:
-    """Return the straight run that predictions begin with: the approach of the logs.
-
-    The rate of the steering gear is that of the vessel file, or else the one that the logs show.
-    """
-    segments = [segment for run in runs for segment in run.segments]
-    length = vessel.length if vessel and vessel.length else DEFAULT_LENGTH
-    if vessel and "rate" in vessel.gear_given:
-        rate = vessel.rudder_rate
-    else:
-        rate = max(_rudder_rate(segment) for segment in segments)
-    return Approach(length, initial_level(segments, "speed"), initial_level(segments, "rpm"), rate)
-
-
-def _rudder_rate(segment: Segment) -> float:
-    """Return the rate at which the rudder moves from one order to the next, rad/s."""
-    every = max(1, round(RATE_SECS / segment.dt_secs))
-    rudder = segment.signals["rudder"][::every]
-    rates = np.abs(np.diff(rudder)) / (every * segment.dt_secs)
-    return max(float(np.quantile(rates, FASTEST_SHARE)), LEAST_RATE)
 
 
 def predict_manoeuvres(

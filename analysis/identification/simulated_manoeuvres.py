@@ -1,19 +1,28 @@
 """Standard manoeuvres simulated with ship models: turning circles and zig-zags."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import radians
 
 import numpy as np
 
+from analysis.identification.fit.output_error import DEFAULT_LENGTH, OutputError
+from analysis.identification.fit.segment import Segment, initial_level
 from analysis.manoeuvres.turning_circle import TurningCircle, turning_circle
 from shiplog.ships import Model, Scale
 from shiplog.ships.motion import InputPath
 from shiplog.types import FloatArray
+from shiplog.vessel.vessel import Vessel
 
 from .prediction import dead_reckoning, manoeuvre_motion
 
 STEPS_PER_LENGTH = 40  # of the integration, in the time of sailing a ship length
 CIRCLE_LENGTHS = 40.0  # sailed at the approach speed: a circle of a slow ship is complete
 LEG_LENGTHS = 15.0  # the longest leg of a zig-zag
+RATE_SECS = 2.0  # over which a rate of the rudder is taken
+FASTEST_SHARE = 0.97  # of the rates: a few per cent of a zig-zag are reversals
+LEAST_RATE = radians(0.5)  # per second
+HARD_OVER = radians(35.0)
 LEGS = 4  # of a zig-zag: from the first order to after the third reversal
 
 
@@ -40,6 +49,27 @@ class Approach:
     def length_secs(self) -> float:
         """The time in which a ship length is sailed, s."""
         return self.length / self.speed
+
+
+def approach_of(segments: Sequence[Segment], vessel: Vessel | None) -> Approach:
+    """Return the approach of recorded runs.
+
+    The rate of the steering gear is that of the vessel file, or else the one that the runs show.
+    """
+    length = vessel.length if vessel and vessel.length else DEFAULT_LENGTH
+    if vessel and "rate" in vessel.gear_given:
+        rate = vessel.rudder_rate
+    else:
+        rate = max(_rudder_rate(segment) for segment in segments)
+    return Approach(length, initial_level(segments, "speed"), initial_level(segments, "rpm"), rate)
+
+
+def _rudder_rate(segment: Segment) -> float:
+    """Return the rate at which the rudder moves from one order to the next, rad/s."""
+    every = max(1, round(RATE_SECS / segment.dt_secs))
+    rudder = segment.signals["rudder"][::every]
+    rates = np.abs(np.diff(rudder)) / (every * segment.dt_secs)
+    return max(float(np.quantile(rates, FASTEST_SHARE)), LEAST_RATE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +111,24 @@ class ShipDraws:
     def step_secs(self) -> float:
         """The step of a simulation, s."""
         return self.approach.length_secs / STEPS_PER_LENGTH
+
+
+def best_estimate(fit: OutputError, approach: Approach) -> ShipDraws:
+    """Return the one ship of a fit's estimates, with the rudder zero that its runs share."""
+    zero = fit.problem.rudder_zero(fit.minimum.unknowns)
+    return ShipDraws(
+        fit.problem.model, fit.problem.scale, approach, fit.parameters[None], np.array([zero])
+    )
+
+
+def turns_hard_over(fit: OutputError, approach: Approach) -> bool:
+    """Return whether a fitted ship turns by 180° with the rudder hard over to either side.
+
+    One whose simulation diverges or goes astern in the turn does not.
+    """
+    ship = best_estimate(fit, approach)
+    circles = [simulate_circles(ship, side * HARD_OVER)[0] for side in (1, -1)]
+    return all(np.isfinite(circle.time_180_secs) for circle in circles)
 
 
 def simulate_circles(ships: ShipDraws, rudder: float) -> list[TurningCircle]:

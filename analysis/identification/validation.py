@@ -92,7 +92,7 @@ def _validate_segment(fit: OutputError, segment: Segment, fixes: FloatArray | No
     measured_track = dead_reckoning(measured, segment.dt_secs)
     if fixes is not None:
         reference = measured_track if np.isnan(track).any() else track
-        measured_track = _shifted_to(fixes, reference)
+        measured_track = shifted_to(fixes, reference)
     residual = simulated - segment.measured
     predicted = (*fit.problem.model.outputs, "heading")
     rms = {
@@ -181,8 +181,8 @@ def _with_heading(segment: Segment, heading: FloatArray) -> Segment:
     return Segment(segment.name, segment.signals, segment.path, measured)
 
 
-def _shifted_to(fixes: FloatArray, track: FloatArray) -> FloatArray:
-    """Shift the fixes onto a track at the first fix, which may be later than the run's start."""
+def shifted_to(fixes: FloatArray, track: FloatArray) -> FloatArray:
+    """Shift fixes, (n, 2), onto a track at the first fix, which may be later than its start."""
     fixed = np.flatnonzero(np.isfinite(fixes).all(axis=1))
     return fixes - fixes[fixed[0]] + track[fixed[0]] if len(fixed) else fixes
 

@@ -40,7 +40,8 @@ def residual_panels(
     lag_secs
         The largest lag, s.
     """
-    names = [name for name in ship.fit.problem.outputs if segment.has(name)]
+    outputs = ship.fit.problem.outputs
+    names = [name for name in outputs if name in MODEL_OUTPUTS and segment.has(name)]
     normalised = {name: _normalised(ship, segment, predicted, name) for name in names}
     normalised = {name: each for name, each in normalised.items() if np.isfinite(each).any()}
     lag_secs = min(MAX_LAG_SECS, MAX_LAG_SHARE * (len(segment) - 1) * segment.dt_secs)

@@ -3,10 +3,12 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from analysis.identification.fit.segment import Segment
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.prediction import dead_reckoning
-from analysis.identification.validation import filled_measurements
+from analysis.identification.validation import filled_measurements, shifted_to
 from analysis.manoeuvres.manoeuvre_spans import ManoeuvreSpan, manoeuvre_spans
 from analysis.report.identification_tables import fitted_run_tables, validation_tables
 from analysis.report.markdown import markdown_tables
@@ -117,21 +119,32 @@ def _validations(ship: IdentifiedShip) -> Iterator[_Run]:
 
 
 def _fitted(ship: IdentifiedShip) -> Iterator[_Run]:
-    """Yield the fitted segments; their tracks are reckoned from heading and speed."""
+    """Yield the fitted segments.
+
+    A track is of the position fixes and of the simulation with the estimated current, or, without
+    fixes, of heading and speed.
+    """
     problem, unknowns = ship.fit.problem, ship.fit.minimum.unknowns
     for i, segment in enumerate(problem.segments):
         title, dt = f"fitted: {segment.name}", segment.dt_secs
         simulated = problem.simulated(unknowns, i)
         predicted = simulated.copy()
-        predicted[:, problem.columns] = problem.predicted(unknowns, i)
+        for name, values in zip(problem.outputs, problem.predicted(unknowns, i).T, strict=True):
+            if name in MODEL_OUTPUTS:
+                predicted[:, MODEL_OUTPUTS.index(name)] = values
+        measured_track = dead_reckoning(filled_measurements(segment, float(simulated[0, -1])), dt)
+        track = dead_reckoning(simulated, dt)
+        if problem.uses_positions and segment.fixes is not None:
+            track += np.outer(np.arange(len(segment)) * dt, problem.own(unknowns, i).current)
+            measured_track = shifted_to(segment.fixes, track)
         yield _Run(
             title,
             f"run_{i + 1}",
             segment,
             simulated,
             predicted,
-            dead_reckoning(filled_measurements(segment, float(simulated[0, -1])), dt),
-            dead_reckoning(simulated, dt),
+            measured_track,
+            track,
             markdown_tables(fitted_run_tables(ship, i)),
         )
 

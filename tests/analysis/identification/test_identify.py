@@ -25,6 +25,7 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import Channel, LogError, TrialLog, UsageError, load_vessel, write
 from shiplog.ships import ship_model
+from shiplog.vessel.vessel import with_length
 from shiplog.vessel.vessel_parser import parse_vessel
 
 pytestmark = pytest.mark.usefixtures("fit_alone")
@@ -429,7 +430,9 @@ def test_models_are_ranked_the_same_by_one_thread_and_by_two() -> None:
     logs = [a_log(seconds=200.0), a_log("zigzag-10-10", 1, seconds=200.0)]
     segments = [segment for log in logs for segment in run_from_log(log).segments]
     models = [ship_model(name) for name in ("nomoto", "norrbin", "burylin-tied")]
-    one, two = (rank_models(segments, models, length=150.0, threads=k) for k in (1, 2))
+    one, two = (
+        rank_models(segments, models, vessel=with_length(None, 150.0), threads=k) for k in (1, 2)
+    )
     for a, b in zip(one, two, strict=True):
         assert a.model is b.model
         assert a.score == b.score

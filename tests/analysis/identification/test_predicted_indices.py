@@ -25,6 +25,7 @@ from analysis.identification.simulated_manoeuvres import Approach
 from analysis.manoeuvres.trial_index import TrialIndex
 from examples.ships.sea_trial import STEP
 from shiplog.ships import ship_model
+from shiplog.vessel.vessel import with_length
 
 CIRCLE = StandardManoeuvre(radians(35.0))
 ZIGZAG = StandardManoeuvre(radians(-20.0), radians(20.0))
@@ -34,7 +35,7 @@ ZIGZAG = StandardManoeuvre(radians(-20.0), radians(20.0))
 def candidates() -> tuple[Candidate, ...]:
     ship = tanker()
     models = [ship_model("mmg"), ship_model("norrbin")]
-    return tuple(rank_models(zigzag_segments(), models, length=ship.length))
+    return tuple(rank_models(zigzag_segments(), models, vessel=with_length(None, ship.length)))
 
 
 def approach() -> Approach:
@@ -157,10 +158,13 @@ def test_a_tempered_fit_lies_nearer_to_the_priors() -> None:
 
 def test_a_parameter_at_its_limit_is_a_fault() -> None:
     fit = mmg_fit()
-    assert fault_of(fit) == ""
+    assert fault_of(fit, approach()) == ""
     z = fit.minimum.unknowns.copy()
     added_mass = fit.problem.free_names.index("my")
     z[added_mass] = fit.problem.bounds[0][added_mass]
-    assert fault_of(replace(fit, minimum=replace(fit.minimum, unknowns=z))) == "at its limit: my"
+    assert (
+        fault_of(replace(fit, minimum=replace(fit.minimum, unknowns=z)), approach())
+        == "at its limit: my"
+    )
     stopped = replace(fit, minimum=replace(fit.minimum, converged=False))
-    assert fault_of(stopped) == "not converged"
+    assert fault_of(stopped, approach()) == "not converged"

@@ -26,6 +26,7 @@ from recorders.simulated.sensors import suite
 from recorders.simulated.simulate import simulate
 from shiplog import TrialLog, UsageError, load_vessel, resample
 from shiplog.ships import ship_model
+from shiplog.vessel.vessel import with_length
 
 LENGTH = 320.0
 CHANNELS, OPTIONAL = ("yaw_rate", "speed", "rudder", "rpm"), ("sway", "heading")
@@ -99,7 +100,9 @@ def test_turning_circle_is_predicted_from_zigzags_of_another_tank() -> None:
 def test_zigzags_select_the_model_that_predicts_the_circle() -> None:
     names = ("nomoto", "norrbin", "slipstream", "three-dof")
     candidates = rank_models(
-        [marin("zz_10")[1], marin("zz_20")[1]], [ship_model(name) for name in names], length=LENGTH
+        [marin("zz_10")[1], marin("zz_20")[1]],
+        [ship_model(name) for name in names],
+        vessel=with_length(None, LENGTH),
     )
     assert candidates[0].model.name == "three-dof"
     assert candidates[-1].model.name == "nomoto"
