@@ -58,10 +58,10 @@ def with_hull_conditions(stated: Mapping[str, str], vessel: Vessel | None) -> di
         "draught": (hull.draught, "m"),
         "draught_forward": (hull.draught_forward, "m"),
         "draught_aft": (hull.draught_aft, "m"),
-        "block_coefficient": (hull.fullness(vessel.length), ""),
+        "block_coefficient": (_rounded(hull.fullness(vessel.length)), ""),
         "displacement": (hull.displacement, "t"),
         "rudder_area": (hull.rudder_area, "m2"),
-        "rudder_aspect_ratio": (hull.aspect_ratio, ""),
+        "rudder_aspect_ratio": (_rounded(hull.aspect_ratio), ""),
         "propeller_diameter": (hull.propeller_diameter, "m"),
         "propeller_pitch_ratio": (hull.propeller_pitch_ratio, ""),
         "propeller_turning": (hull.propeller_turning, ""),
@@ -120,4 +120,9 @@ def stated_number(stated: Mapping[str, str], name: str) -> float:
 def _text(value: float | str | None, unit: str) -> str:
     if value is None or isinstance(value, str):
         return value or ""
-    return f"{value:.4g} {unit}".strip()
+    return f"{value:.10g} {unit}".strip()
+
+
+def _rounded(value: float | None) -> float | None:
+    """Round a computed ratio to four places, as far as the dimensions justify."""
+    return None if value is None else round(value, 4)

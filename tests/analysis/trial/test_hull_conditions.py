@@ -27,7 +27,7 @@ def test_a_hull_fills_the_lines_of_the_form() -> None:
         "B/T": "3.2",
         "Rudder: total area": "36 m2",
         "Rudder: area / (L·T)": "0.018",
-        "Rudder: aspect ratio": "1.778",
+        "Rudder: aspect ratio": "1.7778",
         "Propeller: diameter": "7 m",
         "Propeller: pitch / diameter": "0.8",
         "Propeller: turning ahead": "left-handed",
@@ -45,6 +45,12 @@ def test_what_the_log_states_precedes_and_loadings_are_not_mixed() -> None:
         .keys()
         .isdisjoint({"block_coefficient"})
     )
+
+
+def test_a_given_dimension_is_printed_as_given_and_a_computed_one_rounded() -> None:
+    hull = Hull(breadth=58.0, draught=20.8, displacement=312_622.5)
+    stated = with_hull_conditions({}, Vessel("", None, length=320.0, hull=hull))
+    assert (stated["displacement"], stated["block_coefficient"]) == ("312622.5 t", "0.7901")
 
 
 def test_without_a_vessel_the_conditions_are_those_of_the_log() -> None:
