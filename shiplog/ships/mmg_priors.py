@@ -17,7 +17,10 @@ With k = 2 T/L and c = CB B/L, and everything in the dimensions of `shiplog.ship
     ct   = r0 L T / ((1 - t) (1 - w)^2 pi D^2/4)      w = 0.5 CB - 0.05, t = 0.6 w
     d    = D / rudder height, at most 1
 
-with u_R/U of the race by the model's own d, k and ct behind a wake of e (1 - w) = 0.68.
+with u_R/U of the race by the model's own d, k and ct behind a wake of e (1 - w) = 0.68, which
+e = 2.26 - 1.82 (1 - w) of Yoshimura and Masumoto gives to 0.02 for CB of 0.5 to 0.85; t = 0.6 w is
+assumed. Copies of their yvvv in print have 0.48 - 0.185 L/B; the force in drift by Kijima's
+regression is that of the sum above.
 
 Widths. Of yv, yr, nv and nr, the root-mean-square difference of four other regressions (Wagner
 Smitt, Norrbin, Inoue, Clarke) from these, over L/B of 5 to 8, B/T of 2.3 to 3.8 and CB of 0.55 to
