@@ -18,7 +18,7 @@ With k = 2 T/L and c = CB B/L, and everything in the dimensions of `shiplog.ship
     d    = D / rudder height, at most 1
 
 with u_R/U of the race by the model's own d, k and ct behind a wake of e (1 - w) = 0.68, which
-e = 2.26 - 1.82 (1 - w) of Yoshimura and Masumoto gives to 0.02 for CB of 0.5 to 0.85; t = 0.6 w is
+e = 2.26 - 1.82 (1 - w) of Yoshimura and Masumoto gives to 0.04 for CB of 0.5 to 0.85; t = 0.6 w is
 assumed. Copies of their yvvv in print have 0.48 - 0.185 L/B; the force in drift by Kijima's
 regression is that of the sum above.
 
@@ -67,7 +67,7 @@ GYRATION_SCATTER = 0.06  # relative
 LINEAR_SCATTER = {"yv": 0.15, "yr": 0.33, "nv": 0.15, "nr": 0.20}  # relative
 SWAY_MASS_SCATTER, YAW_MASS_SCATTER = 0.15, 0.13  # relative
 CUBIC_STD = {"yvvv": 0.6, "yvrr": 0.15}
-BEHIND_WAKE = 0.68  # e (1 - w): 0.66 to 0.70 for CB of 0.5 to 0.85
+BEHIND_WAKE = 0.68  # e (1 - w): 0.64 to 0.70 for CB of 0.5 to 0.85
 RUDDER_SCATTER = 0.25  # relative
 LOADING_SCATTER = 0.4  # relative: the resistance to 33 %, the wake to 10 %
 
