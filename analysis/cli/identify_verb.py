@@ -106,7 +106,10 @@ def _identify(arguments: argparse.Namespace) -> ExitCode:
         from analysis.view.identification_review import write_identification_review
 
         write_identification_review(ship, review)
-    print_tables(identification_tables(ship), to_stderr=arguments.json == "-")
+    to_stderr = arguments.json == "-"
+    print_tables(identification_tables(ship), to_stderr=to_stderr)
+    if ship.no_predictions:
+        print_line(f"no predicted manoeuvres: {ship.no_predictions}", to_stderr=to_stderr)
     print_warnings(ship.warnings)
     if review:
         show_review(review, view=arguments.view)

@@ -16,14 +16,14 @@ _FAST_TURN = "a 20/20 zig-zag or a 35° turning circle, which hold a fast turn"
 _REVERSALS = "a zig-zag or a pseudo-random run, in which the rudder is often reversed"
 _CIRCLE = "a 35° turning circle, held until the speed is steady"
 _TWO_SPEEDS = "straight runs or turns at two or more rates of revolutions"
-_SWAY = "a zig-zag and a turning circle with the sway velocity measured too"
+DRIFT_MANOEUVRES = "a zig-zag and a turning circle with positions or the sway velocity measured too"
 MANOEUVRES = {
     **dict.fromkeys(("a", "d", "e", "T3", "k", "yd", "nd"), _REVERSALS),
     **dict.fromkeys(("b1", "nr", "nv"), _SLOW_TURN),
     **dict.fromkeys(("b2", "b3", "a3", "cy", "cn"), _FAST_TURN),
     **dict.fromkeys(("f", "f1", "f2", "xvr", "x4", "xd"), _CIRCLE),
     **dict.fromkeys(("g", "h", "p", "m", "w", *RUDDER_PARAMETERS), _TWO_SPEEDS),
-    **dict.fromkeys(("c1", "c2", "Td", "yv", "yr"), _SWAY),
+    **dict.fromkeys(("c1", "c2", "Td", "yv", "yr"), DRIFT_MANOEUVRES),
     "e0": "the same manoeuvre to port and to starboard",
 }
 

@@ -4,6 +4,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from analysis.identification.fit.drift import (
+    DRIFT_INDICES,
+    DRIFT_REMEDY,
+    DRIFT_UNKNOWN,
+    drift_is_unknown,
+)
 from analysis.identification.fit.output_error import OutputError
 from analysis.identification.fit.problem import residuals
 from analysis.identification.fit.uncertainty import Uncertainty
@@ -30,6 +36,7 @@ def fit_warnings(
             f"from another start the fit ends in another minimum, which is {better}: the logs "
             "hardly determine this model; add manoeuvres, or fit a model with fewer parameters"
         )
+    yield from _unknown_drift(fit, fitted)
     yield from _large_residuals(fit)
     yield from _contradiction(fit, fitted)
     if set(fitted.unidentifiable) == set(fitted.names):
@@ -37,6 +44,18 @@ def fit_warnings(
     for validation in validations:
         if validation.diverged:
             yield f"{validation.segment.name}: the simulation diverges, so there is no prediction"
+
+
+def _unknown_drift(fit: OutputError, fitted: Uncertainty) -> Iterator[str]:
+    """Yield a line where nothing that was measured shows the drift of the model."""
+    if not drift_is_unknown(fit.problem.model, fit.problem.segments):
+        return
+    names = f" ({', '.join(fitted.unobserved)})" if fitted.unobserved else ""
+    *first, last = DRIFT_INDICES
+    yield (
+        f"the drift{names} is {DRIFT_UNKNOWN}: {', '.join(first)} and {last} are not predicted; "
+        f"{DRIFT_REMEDY}"
+    )
 
 
 def _large_residuals(fit: OutputError) -> Iterator[str]:

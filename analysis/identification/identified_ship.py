@@ -17,6 +17,7 @@ from .advice import TieCheck
 from .model_selection import Candidate
 from .predicted_indices import PredictedManoeuvre
 from .prior_sensitivity import PriorSensitivity
+from .simulated_manoeuvres import Approach
 from .validation import Validation, nan_rms
 
 
@@ -75,6 +76,8 @@ class IdentifiedShip:
         The standard manoeuvres as the models predict them, each by its weight.
     no_predictions
         Why there are none; else empty.
+    approach
+        The straight run before each predicted manoeuvre; None without predictions.
     ties
         Whether the ties of the paper's model hold; None for another model.
     vessel
@@ -101,6 +104,7 @@ class IdentifiedShip:
     candidates: tuple[Candidate, ...]
     predictions: tuple[PredictedManoeuvre, ...]
     no_predictions: str
+    approach: Approach | None
     ties: TieCheck | None
     vessel: Vessel | None
     length_given: bool

@@ -22,14 +22,14 @@ from shiplog.ships import Model, loadable_models, ship_model
 from shiplog.types import Log
 from shiplog.vessel.vessel import Vessel, with_length
 
-from .advice import check_ties, manoeuvres_to_identify
+from .advice import DRIFT_MANOEUVRES, check_ties, manoeuvres_to_identify
 from .fit_warnings import fit_warnings
 from .fixed_parameters import check_fixed, fixed_values
 from .hull_priors import with_hull_priors, with_stated_hull
 from .identified_ship import IdentifiedShip, run_fits
 from .model_selection import Candidate, rank_models, require_two_runs
 from .parallel import single_blas_thread
-from .predicted_indices import PredictedManoeuvre, predict_manoeuvres
+from .predicted_indices import predict_manoeuvres
 from .prior_sensitivity import PriorSensitivity, prior_sensitivity
 from .runs import Run, common_vessel, consistency_warnings, distinct_runs
 from .simulated_manoeuvres import approach_of
@@ -113,7 +113,8 @@ def identify(
     steps.begin("validation")
     validations = [each for run in held_out for each in validate(fit, run)]
     steps.begin("predictions")
-    predictions, no_predictions = _predictions(candidates, runs, ship)
+    no_predictions = _reason_without_predictions(runs)
+    approach = None if no_predictions else approach_of(fit.problem.recorded, ship)
     all_runs = [*runs, *held_out]
     warnings += [warning for run in all_runs for warning in run.warnings]
     warnings += consistency_warnings(all_runs)
@@ -129,13 +130,14 @@ def identify(
         runs=tuple(run_fits(fit)),
         validations=tuple(validations),
         candidates=tuple(candidates),
-        predictions=predictions,
+        predictions=predict_manoeuvres(candidates, approach) if approach else (),
         no_predictions=no_predictions,
+        approach=approach,
         ties=check_ties(fit),
         vessel=ship,
         length_given=ship is not None and ship.length is not None,
         fixed={n: v for n, v in zip(names, values, strict=True) if n not in estimates.names},
-        advice={name: manoeuvres_to_identify(name) for name in estimates.unidentifiable},
+        advice=_advice(estimates),
         warnings=tuple(warnings),
         data_lost=any(run.data_lost for run in all_runs),
     )
@@ -225,17 +227,22 @@ def _histories(fit: OutputError, estimates: Uncertainty) -> tuple[ParameterHisto
     return tuple(history for history in histories if history is not None)
 
 
-def _predictions(
-    candidates: Sequence[Candidate], runs: Sequence[Run], ship: Vessel | None
-) -> tuple[tuple[PredictedManoeuvre, ...], str]:
-    """Return the predicted standard manoeuvres, or why there are none."""
-    if len(runs) < 2:
-        return (), (
-            "one run does not show how well the model predicts another; give two or more, such as "
-            "zig-zags 10/10 and 20/20"
-        )
-    segments = [segment for run in runs for segment in run.segments]
-    return predict_manoeuvres(candidates, approach_of(segments, ship)), ""
+def _reason_without_predictions(runs: Sequence[Run]) -> str:
+    """Return why the standard manoeuvres cannot be predicted with intervals; empty if they can."""
+    if len(runs) > 1:
+        return ""
+    return (
+        "one run does not show how well the model predicts another; give two or more, such as "
+        "zig-zags 10/10 and 20/20"
+    )
+
+
+def _advice(estimates: Uncertainty) -> dict[str, str]:
+    """Return by parameter that is not identifiable the manoeuvre that would determine it."""
+    return {
+        name: DRIFT_MANOEUVRES if name in estimates.unobserved else manoeuvres_to_identify(name)
+        for name in estimates.unidentifiable
+    }
 
 
 def _assumed_length(fit: OutputError, ship: Vessel | None) -> Iterator[str]:

@@ -13,6 +13,12 @@ from math import degrees, radians
 
 import numpy as np
 
+from analysis.identification.fit.drift import (
+    DRIFT_INDICES,
+    DRIFT_REMEDY,
+    DRIFT_UNKNOWN,
+    shows_drift,
+)
 from analysis.identification.fit.output_error import OutputError, tempered_fit
 from analysis.identification.fit.uncertainty import parameter_covariance
 from analysis.manoeuvres.imo_criteria import criterion_of, probability_below
@@ -110,7 +116,8 @@ class PredictedManoeuvre:
         The manoeuvre.
     indices
         With 95 % intervals, standard uncertainty by source, and the limit of the norm. The value is
-        NaN for what the predicted ship does not reach.
+        NaN for what the predicted ship does not reach, and for what its drift changes where the
+        logs do not show it; the note of the index is the reason.
     note
         Why the prediction reaches beyond the logs; empty where it does not.
     """
@@ -155,6 +162,7 @@ class _Members:
     fitted_rudder: float
     misfits: Mapping[str, float]
     hard_ratio: float
+    shows_drift: bool
 
     def discrepancy(self, name: str, manoeuvre: StandardManoeuvre) -> float:
         """Return the relative error of an index that held-out runs show.
@@ -192,7 +200,8 @@ def _members(candidate: Candidate, approach: Approach, count: int) -> _Members:
     if not np.isfinite(misfits[TRACK]):  # no positions
         misfits[TRACK] = misfits["heading"]
     ships = ShipDraws(problem.model, problem.scale, approach, parameters, zeros)
-    return _Members(ships, largest, misfits, candidate.hard_ratio)
+    drift = shows_drift(problem.segments)
+    return _Members(ships, largest, misfits, candidate.hard_ratio, drift)
 
 
 def _zero_spread(fit: OutputError) -> float:
@@ -210,6 +219,9 @@ def _predicted(
     approach = members[0].ships.approach
     indices = []
     for name in values[0]:
+        if name in DRIFT_INDICES and not members[0].shows_drift:
+            indices.append(_without_value(name, f"{DRIFT_UNKNOWN}; {DRIFT_REMEDY}"))
+            continue
         discrepancy = [each.discrepancy(name, manoeuvre) for each in members]
         of_models = _OfModels([each[name] for each in values], weights, np.array(discrepancy))
         indices.append(_index(name, manoeuvre, of_models, approach))
@@ -258,7 +270,7 @@ def _index(
     central = np.array([each[CENTRAL] for each in values])
     sound = np.isfinite(central)
     if not sound.any():
-        return _without_value(name)
+        return _without_value(name, "the predicted ship does not reach it")
     share = np.where(sound, weights, 0.0) / weights[sound].sum()
     value = float(np.nansum(share * np.nan_to_num(central)))
     within = np.array([_robust_std(each[FIRST_DRAW:]) for each in values])
@@ -277,23 +289,23 @@ def _index(
     std = (high - low) / (2 * 1.96)
     unit = index_unit(name)
     angles = manoeuvre.rudder, manoeuvre.switch or 0.0
-    data = {"length": approach.length, "test_speed": approach.speed}
+    length = approach.length if approach.length_given else float("nan")
+    data = {"length": length, "test_speed": approach.speed}
     criterion = criterion_of(name, manoeuvre.kind, angles, data, astern=False)
     return TrialIndex(
         name, SYMBOLS.get(name, ""), value, unit, std, low, high,
         sources=sources,
-        in_lengths=value / approach.length if unit == "m" else float("nan"),
+        in_lengths=value / length if unit == "m" else float("nan"),
         criterion=criterion,
         probability=probability_below(criterion.limit, value, std) if criterion else float("nan"),
     )  # fmt: skip
 
 
-def _without_value(name: str) -> TrialIndex:
+def _without_value(name: str, reason: str) -> TrialIndex:
     nan = float("nan")
     return TrialIndex(
-        name, SYMBOLS.get(name, ""), nan, index_unit(name), nan, nan, nan,
-        note="the predicted ship does not reach it",
-    )  # fmt: skip
+        name, SYMBOLS.get(name, ""), nan, index_unit(name), nan, nan, nan, note=reason
+    )
 
 
 def _robust_std(values: FloatArray) -> float:

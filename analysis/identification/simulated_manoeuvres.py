@@ -38,12 +38,16 @@ class Approach:
         m/s, and revolutions.
     rudder_rate
         Of the steering gear, rad/s.
+    length_given
+        Whether the length is that of the ship; otherwise one is assumed, and no limit of the norm
+        can be computed from it.
     """
 
     length: float
     speed: float
     rpm: float
     rudder_rate: float
+    length_given: bool = True
 
     @property
     def length_secs(self) -> float:
@@ -56,12 +60,15 @@ def approach_of(segments: Sequence[Segment], vessel: Vessel | None) -> Approach:
 
     The rate of the steering gear is that of the vessel file, or else the one that the runs show.
     """
-    length = vessel.length if vessel and vessel.length else DEFAULT_LENGTH
+    given = vessel.length if vessel else None
     if vessel and "rate" in vessel.gear_given:
         rate = vessel.rudder_rate
     else:
         rate = max(_rudder_rate(segment) for segment in segments)
-    return Approach(length, initial_level(segments, "speed"), initial_level(segments, "rpm"), rate)
+    return Approach(
+        given or DEFAULT_LENGTH, initial_level(segments, "speed"), initial_level(segments, "rpm"),
+        rate, length_given=bool(given),
+    )  # fmt: skip
 
 
 def _rudder_rate(segment: Segment) -> float:

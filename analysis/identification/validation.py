@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.identification.fit.drift import DRIFT_INDICES, drift_is_unknown, without_sway
 from analysis.identification.fit.output_error import OutputError
 from analysis.identification.fit.segment import Segment
 from analysis.manoeuvres.execute import first_execute
@@ -34,6 +35,7 @@ class Validation:
         The inputs and what was measured.
     simulated
         (n, 4) outputs in the order of `MODEL_OUTPUTS`, SI; NaN from where the simulation diverges.
+        The sway is zero where the fitted logs show no drift.
     track
         (n, 2) simulated position north and east of the start, m.
     measured_track
@@ -42,7 +44,8 @@ class Validation:
         Root mean square of simulated minus measured of each output that was measured and that the
         model predicts, and of the distance between the tracks (``track``): rad/s, m/s, rad, m.
     indices
-        Indices of a turning circle or of a zig-zag; empty for any other run.
+        Indices of a turning circle or of a zig-zag; empty for any other run. Those that depend on
+        the drift are missing where the fitted logs do not show it.
     no_indices
         The reason why there are no indices; empty where there are some.
     """
@@ -88,20 +91,24 @@ def _validate_segment(fit: OutputError, segment: Segment, fixes: FloatArray | No
         heading, fixes = 0.0, None
     measured = filled_measurements(segment, heading)
     simulated = predict(fit, _with_heading(segment, measured[:, HEADING]))
+    no_drift = drift_is_unknown(fit.problem.model, fit.problem.segments)
+    if no_drift:
+        simulated = without_sway(simulated)
     track = dead_reckoning(simulated, segment.dt_secs)
     measured_track = dead_reckoning(measured, segment.dt_secs)
     if fixes is not None:
         reference = measured_track if np.isnan(track).any() else track
         measured_track = shifted_to(fixes, reference)
     residual = simulated - segment.measured
-    predicted = (*fit.problem.model.outputs, "heading")
+    predicted = {*fit.problem.model.outputs, "heading"} - ({"sway"} if no_drift else set())
     rms = {
         name: nan_rms(residual[:, i])
         for i, name in enumerate(MODEL_OUTPUTS)
         if segment.has(name) and name in predicted
     }
     rms["track"] = nan_rms(np.hypot(*(track - measured_track).T))
-    indices = predicted_indices(segment, measured, measured_track, simulated, track)
+    compared = predicted_indices(segment, measured, measured_track, simulated, track)
+    indices = tuple(each for each in compared if not (no_drift and each.name in DRIFT_INDICES))
     no_indices = (
         ""
         if indices

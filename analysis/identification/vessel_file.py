@@ -10,6 +10,7 @@ from math import pi
 
 import numpy as np
 
+from analysis.identification.fit.drift import DRIFT_REMEDY, DRIFT_UNKNOWN, drift_is_unknown
 from analysis.identification.fit.output_error import DEFAULT_LENGTH, OutputError, output_error
 from analysis.identification.fit.segment import initial_level
 from analysis.identification.fit.uncertainty import (
@@ -182,6 +183,9 @@ def _model_section(ship: IdentifiedShip) -> Iterator[str]:
     scale = ship.fit.problem.scale
     comment = _comments(ship.uncertainty, converged=ship.fit.minimum.converged)
     yield "\n# `shiplog record simulate` uses this model."
+    if drift_is_unknown(ship.model, ship.fit.problem.segments):
+        yield f"# Its drift is {DRIFT_UNKNOWN}:"
+        yield f"# simulated sway and positions are not the ship's; {DRIFT_REMEDY}."
     yield "[model]"
     yield f"name = {toml_string(ship.model.name)}"
     yield f"speed = {scale.speed!r}  # m/s; with length and rpm, the scale of the parameters"
@@ -246,7 +250,10 @@ def _comments(
     def precision(name: str) -> str:
         if name in estimates.unidentifiable:
             origin = "mostly its prior" if prior[name] else "one of many values that fit them"
-            return f"NOT IDENTIFIABLE from these logs: {origin}"
+            cause = (
+                "without positions or sway" if name in estimates.unobserved else "from these logs"
+            )
+            return f"NOT IDENTIFIABLE {cause}: {origin}"
         if name in half:
             return f"± {half[name] / (divisors or {}).get(name, 1.0):.2g} (95 %)"
         if tied and name in ("b1", "e"):

@@ -1,5 +1,6 @@
 """An identified ship as plain numbers in SI, for JSON."""
 
+from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
@@ -8,10 +9,12 @@ import numpy as np
 from analysis.identification.held_out import JUDGED_COLUMNS, PREDICTED
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.model_selection import Candidate
+from analysis.identification.predicted_indices import PredictedManoeuvre
 from analysis.identification.validation import Validation
 from shiplog import __version__
 
 from .identification_tables import mean_misfits, prior_shares_by_method
+from .index_json import index_json
 
 
 def identification_json(ship: IdentifiedShip) -> dict[str, Any]:
@@ -26,7 +29,10 @@ def identification_json(ship: IdentifiedShip) -> dict[str, Any]:
     -------
     tree
         Dictionaries, lists, strings and numbers; None for a number that is not finite, and for the
-        value of a parameter that is not identifiable.
+        value of a parameter that is not identifiable. ``predictions`` has for each standard
+        manoeuvre its ``indices`` with ``value``, ``std``, ``interval_95``, ``sources``,
+        ``criterion``, ``verdict`` and ``probability``; where there are none, ``no_predictions`` is
+        the reason.
     """
     estimates, scale = ship.uncertainty, ship.fit.problem.scale
     tree = {
@@ -56,6 +62,9 @@ def identification_json(ship: IdentifiedShip) -> dict[str, Any]:
         "fit": _fit(ship),
         "validation": [_validation(each) for each in ship.validations],
         "models": [_candidate(each) for each in ship.candidates],
+        "predictions": [_prediction(each) for each in ship.predictions],
+        "no_predictions": ship.no_predictions or None,
+        "approach": asdict(ship.approach) if ship.approach else None,
         "warnings": list(ship.warnings),
     }
     return _finite(tree)  # type: ignore[no-any-return]
@@ -132,6 +141,19 @@ def _validation(validation: Validation) -> dict[str, Any]:
             }
             for index in validation.indices
         ],
+    }
+
+
+def _prediction(predicted: PredictedManoeuvre) -> dict[str, Any]:
+    """Return a predicted manoeuvre; of what is not predicted, the reason is the index's note."""
+    manoeuvre = predicted.manoeuvre
+    return {
+        "manoeuvre": manoeuvre.name,
+        "kind": str(manoeuvre.kind),
+        "rudder": manoeuvre.rudder,
+        "switch_heading": manoeuvre.switch,
+        "note": predicted.note,
+        "indices": [index_json(index) for index in predicted.indices],
     }
 
 

@@ -1,11 +1,12 @@
 """Tables of an identified ship for people, in the units they use."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import isfinite
 
 import numpy as np
 
 from analysis.identification.comparison.history import PRIOR_OFFSET
+from analysis.identification.fit.drift import DRIFT_INDICES, DRIFT_UNKNOWN, drift_is_unknown
 from analysis.identification.fit.fix_blocks import GROUND_VELOCITY
 from analysis.identification.held_out import JUDGED_COLUMNS, PREDICTED
 from analysis.identification.identified_ship import IdentifiedShip
@@ -15,6 +16,8 @@ from analysis.manoeuvres.manoeuvre import ManoeuvreIndex
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.text_table import TextTable
 from shiplog.units import CATALOGUE, conversion_factor
+
+from .predicted_tables import prediction_tables
 
 FIT_METHOD = "output error"
 DISPLAY_UNITS = {"rad": "deg", "rad/s": "deg/s", "m/s": "kn"}
@@ -28,6 +31,7 @@ SENSORS = {
     "speed": "speed log",
     "heading": "compass",
 }  # whose bias is estimated
+FAULT_MARKS = {"not converged": "*", "at its limit": "limit", "no 35° turn": "turn"}
 NOT_CONVERGED_MARK = " (*)"  # after each value of a fit that has not converged
 MIN_CORRELATION, MAX_PAIRS = 0.97, 3  # of the correlated pairs that are reported
 
@@ -45,9 +49,9 @@ def identification_tables(ship: IdentifiedShip) -> tuple[TextTable, ...]:
     tables
         Where models were compared, their scores; then the parameters, the share of prior by
         method, and the fitted runs; where runs were predicted, the validation and the indices of
-        each manoeuvre.
+        each manoeuvre; the predicted standard manoeuvres.
     """
-    return (*parameter_tables(ship), *proof_tables(ship))
+    return (*parameter_tables(ship), *proof_tables(ship), *prediction_tables(ship))
 
 
 def parameter_tables(ship: IdentifiedShip) -> tuple[TextTable, ...]:
@@ -95,23 +99,41 @@ def _transposed(table: TextTable, number: int, title: str) -> TextTable:
 
 def _model_table(ship: IdentifiedShip) -> TextTable:
     names = [PREDICTED[i].replace("_", " ") for i in JUDGED_COLUMNS]
-    columns = ("model", "free\nparameters", "score\n[%]", *(f"{name}\n[%]" for name in names))
+    columns = (
+        "model", "n", "score\n[%]", *(f"{name}\n[%]" for name in names), "weight\n[%]", "fault",
+    )  # fmt: skip
     remark = (
-        "Each run in turn is predicted by the model fitted to the other runs; only its initial "
-        "state, rudder zero and gyro bias are estimated from the run itself. The error is the rms "
-        "of predicted minus measured over the standard deviation of the measured, the score its "
-        "mean. The model with the lowest score is taken."
+        "Each run in turn, and all runs with the largest rudder angles together, are predicted by "
+        "the model fitted to the other runs; only initial state, rudder zero, sensor errors and "
+        "current are estimated from the run itself. The error is the rms of predicted minus "
+        "measured over the standard deviation of the measured, the score its mean. The model with "
+        "the lowest score and without a fault is taken; the weight is its share in predictions. "
+        "n: number of free parameters."
     )
     title = f"Models by cross-validation: {ship.model.name}"
-    return TextTable(title, columns, tuple(map(_model_row, ship.candidates)), (remark,))
+    remarks = (remark, *_fault_remarks(ship.candidates))
+    return TextTable(title, columns, tuple(map(_model_row, ship.candidates)), remarks)
+
+
+def _fault_remarks(candidates: Sequence[Candidate]) -> Iterator[str]:
+    faults = [f"{each.model.name}: {each.fault}" for each in candidates if each.fault]
+    if faults:
+        yield f"Faults: {'; '.join(faults)}."
+
+
+def _fault_mark(candidate: Candidate) -> str:
+    """Return the fault of a model in a word; the remarks have it in full."""
+    marks = (mark for fault, mark in FAULT_MARKS.items() if candidate.fault.startswith(fault))
+    return next(marks, candidate.fault)
 
 
 def _model_row(candidate: Candidate) -> tuple[str, ...]:
     if candidate.fit is None:
-        return (candidate.model.name, "", "diverges", *("" for _ in JUDGED_COLUMNS))
+        return (candidate.model.name, "", "diverges", *("" for _ in JUDGED_COLUMNS), "", "")
     errors = [f"{100 * error:.3g}" if isfinite(error) else "" for error in mean_misfits(candidate)]
     free = str(len(candidate.fit.problem.free))
-    return (candidate.model.name, free, f"{100 * candidate.score:.3g}", *errors)
+    score, weight = f"{100 * candidate.score:.3g}", f"{100 * candidate.weight:.0f}"
+    return (candidate.model.name, free, score, *errors, weight, _fault_mark(candidate))
 
 
 def mean_misfits(candidate: Candidate) -> list[float]:
@@ -120,7 +142,7 @@ def mean_misfits(candidate: Candidate) -> list[float]:
     Returns
     -------
     errors
-        Of yaw rate, speed and heading; NaN where no run has a finite one.
+        Of yaw rate, speed, heading and track; NaN where no run has a finite one.
     """
     columns = [column[np.isfinite(column)] for column in candidate.misfits[:, JUDGED_COLUMNS].T]
     return [float(np.mean(column)) if len(column) else np.nan for column in columns]
@@ -292,6 +314,11 @@ def _validation_table(ship: IdentifiedShip) -> TextTable:
         for each in ship.validations
         if each.no_indices
     ]
+    if drift_is_unknown(ship.model, ship.fit.problem.segments):
+        reasons.append(
+            f"The drift is {DRIFT_UNKNOWN} in the fitted logs: the simulated tracks are without "
+            f"drift, and {', '.join(DRIFT_INDICES)} are not compared."
+        )
     title = "Validation: rms of simulated minus measured"
     return TextTable(title, columns, tuple(rows), (remark, *reasons))
 

@@ -10,6 +10,7 @@ import rerun as rr
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.report.identification_tables import parameter_tables, proof_tables
 from analysis.report.markdown import markdown_page
+from analysis.report.predicted_tables import prediction_tables
 from shiplog.printable import printable
 
 from .identification_layout import identification_blueprint, text_origin
@@ -40,7 +41,7 @@ def write_identification_review(ship: IdentifiedShip, path: str | os.PathLike[st
     with save_recording(recording, path):
         rr.send_blueprint(identification_blueprint(ship, sheets, parameters), recording=recording)
         title = f"{ship.model.title}, identified"
-        tables = (*proof_tables(ship), *parameter_tables(ship))
+        tables = (*proof_tables(ship), *prediction_tables(ship), *parameter_tables(ship))
         page = markdown_page(title, tables, ship.warnings)
         send_text(recording, SUMMARY, page)
         fitted = ship.fit.problem.segments

@@ -35,8 +35,8 @@ def residual_panels(
     Returns
     -------
     panels
-        One for each output that was fitted and is measured here; last, their autocorrelations
-        over the lag.
+        One for each output of `MODEL_OUTPUTS` that was fitted and is measured here; last, their
+        autocorrelations over the lag.
     lag_secs
         The largest lag, s.
     """

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.identification.fit.drift import drift_is_unknown, without_sway
 from analysis.identification.fit.segment import Segment
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.prediction import dead_reckoning
@@ -128,6 +129,8 @@ def _fitted(ship: IdentifiedShip) -> Iterator[_Run]:
     for i, segment in enumerate(problem.segments):
         title, dt = f"fitted: {segment.name}", segment.dt_secs
         simulated = problem.simulated(unknowns, i)
+        if drift_is_unknown(ship.model, problem.segments):
+            simulated = without_sway(simulated)
         predicted = simulated.copy()
         for name, values in zip(problem.outputs, problem.predicted(unknowns, i).T, strict=True):
             if name in MODEL_OUTPUTS:
@@ -175,7 +178,9 @@ def _sheet(ship: IdentifiedShip, run: _Run) -> RunSheet:
 
 def _history(ship: IdentifiedShip, run: _Run) -> MotionHistory:
     """Return the motion of a run; what the model predicts is simulated."""
-    segment, outputs = run.segment, (*ship.model.outputs, "heading")
+    segment, outputs = run.segment, {*ship.model.outputs, "heading"}
+    if drift_is_unknown(ship.model, ship.fit.problem.segments):
+        outputs -= {"sway"}
     columns = dict(enumerate(MODEL_OUTPUTS))
     return MotionHistory(
         segment.signals.time_secs,

@@ -31,6 +31,7 @@ from analysis.regression.newey_west import small_sample_factor
 from shiplog.types import FloatArray
 
 from .agreement import Agreement, assess_agreement
+from .drift import unobserved_parameters
 from .least_squares import information_matrix, marginal_information, minimise, weighted_residuals
 from .output_error import OutputError
 from .problem import Problem, residuals
@@ -73,6 +74,9 @@ class Uncertainty:
         Condition number of the root of the scaled information about the parameters.
     sizes
         (p,) the parameters' magnitudes for ships in general.
+    unobserved
+        Those of the sway equation where nothing that was measured shows the drift, as of
+        `unobserved_parameters`.
     """
 
     names: tuple[str, ...]
@@ -87,6 +91,7 @@ class Uncertainty:
     covariance: FloatArray
     condition: float
     sizes: FloatArray
+    unobserved: tuple[str, ...] = ()
 
     @property
     def interval(self) -> FloatArray:
@@ -104,11 +109,16 @@ class Uncertainty:
         """The parameters that these data do not determine.
 
         Their standard error exceeds both `MAX_RELATIVE_STD` of the value and `MAX_STD_SHARE` of
-        the magnitude for ships in general, or more than `MAX_PRIOR_SHARE` of the value is prior.
+        the magnitude for ships in general, or more than `MAX_PRIOR_SHARE` of the value is prior, or
+        they are `unobserved`.
         """
         limit = np.maximum(MAX_RELATIVE_STD * np.abs(self.values), MAX_STD_SHARE * self.sizes)
         identifiable = (self.std <= limit) & (self.prior_share <= MAX_PRIOR_SHARE)
-        return tuple(name for name, ok in zip(self.names, identifiable, strict=True) if not ok)
+        return tuple(
+            name
+            for name, ok in zip(self.names, identifiable, strict=True)
+            if not ok or name in self.unobserved
+        )
 
 
 def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
@@ -161,6 +171,7 @@ def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
         covariance=covariance * np.outer(factor, factor),
         condition=_condition(precision, p),
         sizes=np.array([problem.model.parameters[i].size for i in problem.free]),
+        unobserved=unobserved_parameters(problem.model, problem.segments),
     )
 
 

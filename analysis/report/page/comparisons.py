@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from analysis.manoeuvres.sailed_manoeuvre import ManoeuvreSeries
+from analysis.report.display import NOT_KNOWN
 from shiplog.text_table import TextTable
 from shiplog.types import FloatArray
 from shiplog.units import UNITS
@@ -24,7 +25,7 @@ from .manoeuvre_track import (
 )
 from .numbering import ManoeuvrePlace
 from .svg_figure import SERIES, PageFigure, new_figure, page_figure
-from .value_text import NOT_KNOWN, half_width_text
+from .value_text import half_width_text
 
 KNOT = UNITS["kn"][1]  # m/s
 DASHES: tuple[tuple[float, ...], ...] = ((), (6, 1.5), (2, 1.5), (6, 1.5, 1, 1.5))

@@ -9,10 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import atan2, degrees, hypot, isfinite, pi
 
+from analysis.report.display import number_text
 from analysis.trial.trial_analysis import TrialConditions
 from shiplog.units import UNITS
-
-from .value_text import number_text
 
 KNOT = UNITS["kn"][1]  # m/s
 

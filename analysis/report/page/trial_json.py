@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 from typing import Any
 
 from analysis.manoeuvres.sailed_manoeuvre import NotComputed, SailedManoeuvre
-from analysis.manoeuvres.trial_index import TrialIndex
 from analysis.report.identification_json import identification_json
+from analysis.report.index_json import index_json
 from analysis.report.replay_json import JsonObject, replay_json, without_nan
 from analysis.trial.trial_analysis import CriterionFinding, TrialConditions
 
@@ -83,27 +83,9 @@ def _manoeuvre(place: ManoeuvrePlace) -> JsonObject:
         **{name: _plain(getattr(manoeuvre, name)) for name in FACTS},
         "marks": [asdict(mark) for mark in manoeuvre.marks],
         "spiral": manoeuvre.spiral.tolist(),
-        "indices": [_index(index) for index in manoeuvre.indices],
+        "indices": [index_json(index) for index in manoeuvre.indices],
         "not_computed": _reasons(manoeuvre.not_computed),
         "notes": list(manoeuvre.notes),
-    }
-
-
-def _index(index: TrialIndex) -> JsonObject:
-    return {
-        "name": index.name,
-        "symbol": index.symbol,
-        "value": index.value,
-        "unit": index.unit,
-        "std": index.std,
-        "interval_95": [index.low, index.high],
-        "in_lengths": index.in_lengths,
-        "sources": dict(index.sources),
-        "start_rules": dict(index.start_rules),
-        "criterion": asdict(index.criterion) if index.criterion else None,
-        "verdict": _plain(index.verdict),
-        "probability": index.probability,
-        "note": index.note,
     }
 
 
@@ -116,7 +98,7 @@ def _criterion(finding: CriterionFinding) -> JsonObject:
         "manoeuvre": finding.manoeuvre,
         "side": finding.side,
         "verdict": _plain(index.verdict) if index else None,
-        "index": _index(index) if index else None,
+        "index": index_json(index) if index else None,
         "reason": finding.reason,
     }
 

@@ -1,41 +1,13 @@
 """Numbers of a report as texts: units people use, and the digits that their uncertainty allows."""
 
-from math import ceil, floor, isfinite, log10, nan
+from math import ceil, floor, isfinite, nan
 
 from analysis.manoeuvres.trial_index import TrialIndex
-from analysis.report.display import decimals
+from analysis.report.display import NOT_KNOWN, number_text
 
-NOT_KNOWN = "–"
-DIGITS = 3  # significant ones, of a number without uncertainty
 # the most decimals that an index is written with: finer ones are below any sensor of a ship
 MAX_DECIMALS = {"m": 1, "s": 2, "°": 2, "°/s": 4, "kn": 3, "m/s": 3, "rpm": 2, "L": 3}
 OTHER_DECIMALS = 4
-
-
-def number_text(value: float, std: float, most: int = 6) -> str:
-    """Write a number with the digits that its standard uncertainty allows.
-
-    Parameters
-    ----------
-    value
-        NaN gives a dash.
-    std
-        In the same unit; where NaN or 0, three significant digits are written.
-    most
-        The greatest number of decimals.
-
-    Examples
-    --------
-    >>> number_text(999.273, 8.1), number_text(15.114, float("nan")), number_text(-1e-9, 0.1)
-    ('999.3', '15.1', '0.00')
-    """
-    if not isfinite(value):
-        return NOT_KNOWN
-    if isfinite(std) and std > 0:
-        return f"{value:z.{min(decimals(std), most)}f}"
-    if value == 0:
-        return "0"
-    return f"{value:z.{min(max(DIGITS - 1 - floor(log10(abs(value))), 0), most)}f}"
 
 
 def index_text(index: TrialIndex, value: float) -> str:
