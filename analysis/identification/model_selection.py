@@ -24,7 +24,7 @@ from shiplog.vessel.vessel import Vessel
 
 from .held_out import JUDGED_COLUMNS, PREDICTED, HeldOutErrors, predict_without
 from .parallel import parallel_map
-from .simulated_manoeuvres import Approach, turns_hard_over
+from .simulated_manoeuvres import Approach, approach_of, turns_hard_over
 
 MAX_MISFIT = 10.0  # relative error that a diverging simulation counts with
 RUN_NUMBERS = 4  # independent numbers of a run: its error is slow, and yaw, speed and track differ
@@ -141,6 +141,8 @@ def rank_models(
     for (i, _), each in zip(held_out, errors, strict=True):
         by_model[i].append(each)
     candidates = [_candidate(model, fits[i], sets, by_model[i]) for i, model in enumerate(models)]
+    approach = approach_of(segments, vessel)
+    candidates = [_checked(each, approach) for each in candidates]
     ranked = sorted(candidates, key=lambda c: (c.fit is None, bool(c.fault), c.score))
     return _weighted(ranked, len(runs))
 

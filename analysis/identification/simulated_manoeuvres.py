@@ -129,13 +129,13 @@ def best_estimate(fit: OutputError, approach: Approach) -> ShipDraws:
 
 
 def turns_hard_over(fit: OutputError, approach: Approach) -> bool:
-    """Return whether a fitted ship turns by 180° with the rudder hard over to either side.
+    """Return whether a fitted ship turns steadily with the rudder hard over to either side.
 
     One whose simulation diverges or goes astern in the turn does not.
     """
     ship = best_estimate(fit, approach)
     circles = [simulate_circles(ship, side * HARD_OVER)[0] for side in (1, -1)]
-    return all(np.isfinite(circle.time_180_secs) for circle in circles)
+    return all(np.isfinite(circle.steady_speed) for circle in circles)
 
 
 def simulate_circles(ships: ShipDraws, rudder: float) -> list[TurningCircle]:
@@ -151,7 +151,7 @@ def simulate_circles(ships: ShipDraws, rudder: float) -> list[TurningCircle]:
     Returns
     -------
     list of TurningCircle
-        All its values are NaN where the simulation diverges.
+        Where a simulation diverges or goes astern, what it had not reached by then is NaN.
     """
     count = round(CIRCLE_LENGTHS * STEPS_PER_LENGTH)
     path, angles = _order_path(ships, 0.0, rudder, count)
@@ -163,11 +163,17 @@ def simulate_circles(ships: ShipDraws, rudder: float) -> list[TurningCircle]:
 
 
 def _circle(outputs: FloatArray, rudder: FloatArray, dt: float) -> TurningCircle:
-    valid = np.isfinite(outputs[:, 0]) & np.isfinite(outputs[:, 1])
-    if not valid.all() or not (outputs[:, 1] > 0).all():
-        outputs = np.full_like(outputs, np.nan)
-    motion = manoeuvre_motion(outputs, dead_reckoning(outputs, dt))
-    return turning_circle(motion, rudder, dt, approach=0.0)
+    sound = np.isfinite(outputs[:, 0]) & (outputs[:, 1] > 0)
+    count = len(outputs) if sound.all() else int(np.argmin(sound))
+    sailed = outputs[:count]
+    motion = manoeuvre_motion(sailed, dead_reckoning(sailed, dt))
+    circle = turning_circle(motion, rudder[:count], dt, approach=0.0)
+    if count == len(outputs):
+        return circle
+    nan = float("nan")
+    return replace(
+        circle, steady_yaw_rate=nan, steady_speed=nan, steady_diameter=nan, drift_angle=nan
+    )
 
 
 @dataclass(frozen=True)

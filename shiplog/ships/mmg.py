@@ -220,7 +220,7 @@ MMG = Model(
         Parameter("nvvv", "1", -0.10, -5.0, 5.0, prior_std=0.15),
         Parameter("nvvr", "1", -0.35, -5.0, 5.0, prior_std=0.15),
         Parameter("nvrr", "1", 0.05, -5.0, 5.0, prior_std=0.06),
-        Parameter("nrrr", "1", -0.015, -1.0, 1.0, prior_std=0.015),
+        Parameter("nrrr", "1", -0.02, -1.0, 1.0, prior_std=0.012),
         Parameter("xvv", "1", -0.03, -1.0, 1.0, prior_std=0.06),
         Parameter("xvr", "1", 0.0, -1.0, 1.0, prior_std=0.07, typical=0.1),
         Parameter("xrr", "1", 0.005, -0.5, 0.5, prior_std=0.015),
