@@ -21,7 +21,8 @@ from analysis.identification.fit.least_squares import (
     information_matrix,
     marginal_information,
 )
-from analysis.identification.fit.output_error import MIN_STDS, make_problem, output_error
+from analysis.identification.fit.noise_weights import MIN_STDS
+from analysis.identification.fit.output_error import make_problem, output_error
 from analysis.identification.fit.segment import Segment, split_into_segments
 from analysis.identification.fit.uncertainty import uncertainty
 from recorders.simulated.sensors import Sensor, suite

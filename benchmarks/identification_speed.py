@@ -9,11 +9,11 @@ from scipy.optimize import least_squares
 
 from analysis.identification.fit.initial_guess import initial_guesses
 from analysis.identification.fit.least_squares import OUTLIER_STDS
+from analysis.identification.fit.noise_weights import initial_residual_stds
 from analysis.identification.fit.nuisance import Nuisance
 from analysis.identification.fit.output_error import (
     OutputError,
     fit_problem,
-    initial_residual_stds,
     make_problem,
     output_error,
 )

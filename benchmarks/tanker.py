@@ -12,8 +12,12 @@ from PIL import Image
 
 from analysis.identification.identified_ship import IdentifiedShip
 from analysis.identification.identify import identify
-from analysis.identification.prediction import Zigzag, zigzag_overshoots
 from analysis.identification.runs import run_from_log
+from analysis.identification.simulated_manoeuvres import (
+    Approach,
+    best_estimate,
+    simulate_zigzags,
+)
 from analysis.identification.validation import Validation, validate
 from analysis.replay.reading_options import ReadingOptions
 from shiplog import TrialLog, Vessel
@@ -38,7 +42,7 @@ OVERSHOOTS = {10: (9.39, 15.11), 20: (15.59, 12.81)}  # degrees, first and secon
 EXECUTES = {10: 10.11, 20: 20.85}  # degrees of heading at which the rudder was reversed
 MAX_FIRST_OVERSHOOT_ERROR = 2.0  # degrees
 SPEEDS = {10: 7.97, 20: 8.11}  # m/s, initial of those runs
-STEERING = {"rudder_rate": radians(2.32), "rpm": 91.7, "duration_secs": 700.0}
+RUDDER_RATE, RPM = radians(2.32), 91.7
 INTRODUCTION = """
 ## The turning circle of a tanker from zig-zags
 
@@ -166,13 +170,15 @@ def _simulated_rudder_rows(ships: dict[str, IdentifiedShip]) -> Iterator[tuple[s
     """Yield a row for each overshoot, the rudder controlled by the simulated heading."""
     for angle, measured in OVERSHOOTS.items():
         execute, delay = radians(EXECUTES[angle]), EXECUTES[angle] - angle
-        zigzag = Zigzag(radians(-angle), execute, speed=SPEEDS[angle], **STEERING)
-        overshoots = [
-            delay + np.degrees(zigzag_overshoots(ship.fit, zigzag)) for ship in ships.values()
-        ]
+        approach = Approach(320.0, SPEEDS[angle], RPM, RUDDER_RATE)
+        overshoots = []
+        for ship in ships.values():
+            draws = best_estimate(ship.fit, approach)
+            (zigzag,) = simulate_zigzags(draws, radians(-angle), execute)
+            overshoots.append(delay + np.degrees(zigzag.overshoots))
         for k, name in enumerate(("first", "second")):
             cells = [
-                _overshoot_cell(each[k] if k < len(each) else None, k, measured[k])
+                _overshoot_cell(each[k] if np.isfinite(each[k]) else None, k, measured[k])
                 for each in overshoots
             ]
             yield (f"{angle}/{angle}, {name}, simulated heading", f"{measured[k]}°", *cells)

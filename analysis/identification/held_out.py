@@ -7,7 +7,8 @@ import numpy as np
 
 from analysis.identification.fit.fix_blocks import simulated_track
 from analysis.identification.fit.least_squares import minimise
-from analysis.identification.fit.output_error import OutputError, initial_residual_stds
+from analysis.identification.fit.noise_weights import initial_residual_stds
+from analysis.identification.fit.output_error import OutputError
 from analysis.identification.fit.problem import Problem
 from analysis.identification.fit.segment import Segment
 from analysis.identification.fit.uncertainty import parameter_covariance

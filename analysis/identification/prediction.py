@@ -1,6 +1,6 @@
 """Prediction of runs that were not fitted: open-loop simulation, its misfit, and zig-zags."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,11 +8,7 @@ from analysis.identification.fit.output_error import OutputError
 from analysis.identification.fit.segment import Segment
 from analysis.manoeuvres.indices import manoeuvre_indices
 from analysis.manoeuvres.manoeuvre import ManoeuvreIndex, ManoeuvreMotion
-from analysis.manoeuvres.zigzag import overshoots
-from shiplog.ships.path import input_path
-from shiplog.types import FloatArray, Signals
-
-ZIGZAG_STEP_SECS = 0.5  # of the simulation of a zig-zag
+from shiplog.types import FloatArray
 
 
 def predict(fit: OutputError, segment: Segment) -> FloatArray:
@@ -105,72 +101,3 @@ def predicted_indices(
         indices = manoeuvre_indices(rudder, motion, motion, dt)
         return tuple(replace(index, simulated=np.nan) for index in indices)
     return tuple(manoeuvre_indices(rudder, motion, manoeuvre_motion(simulated, track), dt))
-
-
-@dataclass(frozen=True)
-class Zigzag:
-    """A zig-zag from a straight course, the rudder controlled by the heading.
-
-    Attributes
-    ----------
-    rudder, heading
-        Rudder angle, its sign that of the first order, and switch heading, rad.
-    rudder_rate
-        Of the steering gear, rad/s.
-    speed, rpm
-        Initial speed, m/s, and constant revolutions.
-    duration_secs
-        Length of the simulation, s.
-    """
-
-    rudder: float
-    heading: float
-    rudder_rate: float
-    speed: float
-    rpm: float
-    duration_secs: float
-
-
-def zigzag_overshoots(fit: OutputError, zigzag: Zigzag) -> FloatArray:
-    """Simulate a zig-zag of a fitted ship and compute its overshoots.
-
-    The rudder is reversed whenever the heading has changed by the switch heading to its side.
-
-    Parameters
-    ----------
-    fit
-        The fitted model.
-    zigzag
-        The manoeuvre.
-
-    Returns
-    -------
-    overshoots
-        (k,) rad, of those from which the ship came back to the next execute.
-    """
-    problem = fit.problem
-    state = np.zeros(len(problem.model.state))
-    for i, value in enumerate(problem.model.state):
-        if value.channel == "speed":
-            state[i] = zigzag.speed / problem.scale.speed
-    time = np.arange(0, zigzag.duration_secs, ZIGZAG_STEP_SECS)
-    times, angles = [0.0, abs(zigzag.rudder) / zigzag.rudder_rate], [0.0, zigzag.rudder]
-    executes: list[int] = []
-    while True:
-        # each execute depends on the motion before it: simulate without it, then add it
-        inputs = {"rudder": np.interp(time, times, angles), "rpm": np.full(len(time), zigzag.rpm)}
-        path = input_path(Signals(0, ZIGZAG_STEP_SECS, inputs))
-        out = problem.model.simulate(fit.parameters, state, path, len(time), scale=problem.scale)
-        side = np.sign(angles[-1])
-        excess = side * out[:, 3] - abs(zigzag.heading)
-        since = executes[-1] if executes else 0
-        beyond = since + np.flatnonzero(excess[since:] >= 0)
-        if not len(beyond) or not np.isfinite(excess).all():
-            return overshoots(out[:, 3], executes, abs(zigzag.heading))
-        k = int(beyond[0])
-        executes.append(k)
-        at = time[k - 1] + ZIGZAG_STEP_SECS * float(excess[k - 1] / (excess[k - 1] - excess[k]))
-        present, ordered = float(np.interp(at, times, angles)), float(-side) * abs(zigzag.rudder)
-        past = [t for t in times if t < at]
-        angles = [*angles[: len(past)], present, ordered]
-        times = [*past, at, at + abs(ordered - present) / zigzag.rudder_rate]

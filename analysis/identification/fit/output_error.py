@@ -14,7 +14,6 @@ R. V. Jategaonkar, "Flight Vehicle System Identification", 2nd edition, 2015, ch
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import radians
 
 import numpy as np
 
@@ -27,30 +26,23 @@ from shiplog.types import FloatArray
 from .fix_blocks import GROUND_VELOCITY
 from .initial_guess import initial_guesses
 from .least_squares import Minimum, ResidualStd, minimise
+from .noise_weights import estimate_noise, initial_residual_stds
 from .nuisance import Nuisance
 from .problem import Problem, residuals
 from .residual_noise import (
     FINE_WHITE_SHARE,
     MIN_WHITE_SHARE,
-    OutputResiduals,
     ResidualNoise,
-    fit_residual_noise,
-    interval_secs,
 )
 from .segment import Segment, averaged, initial_level
 from .swell import swell_frequency
 
 DEFAULT_LENGTH = 150.0  # m, for the scale of dimensionless models where no length is given
 MIN_SPEED, MIN_RPM = 0.1, 1.0  # m/s, rpm: initial values of a ship under way
-NOT_PROPORTIONAL = ("heading", *GROUND_VELOCITY)
 SAMPLES_PER_LENGTH = 60  # in the time of sailing a ship length: the fastest that a fit needs
 MAX_SLOW_SHARE = 0.2  # of the slow noise that may remain when waves are fitted
 REWEIGHTINGS = 3
 MAX_RMS_GROWTH = 1.5  # of an output's residuals in a reweighted fit
-MIN_STDS = {  # of any instrument: rad/s, m/s, m/s, rad
-    "yaw_rate": radians(1e-5), "speed": 1e-4, "sway": 1e-4, "heading": radians(0.02),
-    "velocity_north": 0.005, "velocity_east": 0.005,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,73 +347,3 @@ def _with_waves(fit: OutputError) -> OutputError:
         for new, old in zip(wave_fit.noises, fit.noises, strict=True)
     )
     return wave_fit if explained else fit
-
-
-def initial_residual_stds(problem: Problem) -> list[ResidualStd]:
-    """Return residual standard deviations for a first fit, for each segment.
-
-    A tenth of each output's standard deviation, at least `MIN_STDS`.
-    """
-    stds = []
-    for column, output in enumerate(problem.outputs):
-        measured = np.concatenate(
-            [problem.measured(i)[:, column] for i in range(len(problem.segments))]
-        )
-        stds.append(max(float(np.nanstd(measured)) / 10, MIN_STDS[output]))
-    row = np.array(stds)
-    return [
-        ResidualStd(np.tile(row, (len(segment), 1)), np.tile(row, (len(segment), 1)))
-        for segment in problem.segments
-    ]
-
-
-def estimate_noise(
-    problem: Problem, z: FloatArray, share: float = MIN_WHITE_SHARE
-) -> tuple[list[ResidualNoise], list[ResidualStd]]:
-    """Estimate the noise from the residuals.
-
-    Parameters
-    ----------
-    problem
-        The problem.
-    z
-        (m,) unknowns.
-    share
-        As of `fit_residual_noise`.
-
-    Returns
-    -------
-    noises
-        Of each output. The heading's has no part in proportion to the heading.
-    residual_stds
-        Of each segment.
-    """
-    segments = range(len(problem.segments))
-    levels = [problem.predicted(z, i) for i in segments]
-    residual = [problem.measured(i) - levels[i] for i in segments]
-    noises = [
-        fit_residual_noise(
-            [
-                OutputResiduals.of(
-                    residual[i][:, c], levels[i][:, c], problem.segments[i].dt_secs
-                )
-                for i in segments
-            ],
-            proportional=output not in NOT_PROPORTIONAL, least=MIN_STDS[output], share=share,
-        )
-        for c, output in enumerate(problem.outputs)
-    ]  # fmt: skip
-    return noises, [_segment_stds(problem, i, noises, levels[i]) for i in segments]
-
-
-def _segment_stds(
-    problem: Problem, i: int, noises: Sequence[ResidualNoise], level: FloatArray
-) -> ResidualStd:
-    """Return the standard deviations of segment i, whose predicted outputs are `level`, (n, c)."""
-    measured, dt = problem.measured(i), problem.segments[i].dt_secs
-    pairs = [
-        noise.stds(level[:, c], interval_secs(measured[:, c], dt)) for c, noise in enumerate(noises)
-    ]
-    return ResidualStd(
-        np.column_stack([p[0] for p in pairs]), np.column_stack([p[1] for p in pairs])
-    )

@@ -14,12 +14,11 @@ from analysis.identification.fit.segment import Segment, split_into_segments
 from analysis.identification.fit.uncertainty import uncertainty
 from analysis.identification.held_out import misfit
 from analysis.identification.model_selection import rank_models
-from analysis.identification.prediction import (
-    Zigzag,
-    dead_reckoning,
-    manoeuvre_motion,
-    predict,
-    zigzag_overshoots,
+from analysis.identification.prediction import dead_reckoning, manoeuvre_motion, predict
+from analysis.identification.simulated_manoeuvres import (
+    Approach,
+    best_estimate,
+    simulate_zigzags,
 )
 from analysis.manoeuvres.turning_circle import turning_circle
 from recorders.simulated.sensors import suite
@@ -132,24 +131,18 @@ def test_simulated_zigzag_has_the_overshoots_of_an_independent_simulation() -> N
         split_into_segments(resample(as_log(trial), channels=CHANNELS), "z.mcap"),
         ship_model("burylin"),
     )
-    zigzag = Zigzag(
-        np.radians(20), np.radians(20), rudder_rate=np.radians(2.5),
-        speed=10.3279556, rpm=80.0, duration_secs=520.0,
-    )  # fmt: skip
-    overshoots = zigzag_overshoots(fit, zigzag)
+    ship = best_estimate(fit, Approach(200.0, 10.3279556, 80.0, np.radians(2.5)))
+    (zigzag,) = simulate_zigzags(ship, np.radians(20), np.radians(20))
     # heading extrema of 36.355, -34.744 and 33.923 degrees, from an independent simulation
-    np.testing.assert_allclose(np.degrees(overshoots)[:2], [16.355, 14.744], atol=0.01)
+    np.testing.assert_allclose(np.degrees(zigzag.overshoots)[:2], [16.355, 14.744], atol=0.01)
 
 
 def test_first_overshoots_of_the_tanker_are_predicted() -> None:
     fit = marin_zigzag_fit()
     for angle, measured in ((10, 9.39), (20, 15.59)):
-        zigzag = Zigzag(
-            np.radians(-angle), np.radians(angle), rudder_rate=np.radians(2.32),
-            speed=7.97, rpm=91.7, duration_secs=600.0,
-        )  # fmt: skip
-        predicted = zigzag_overshoots(fit, zigzag)
-        assert np.degrees(predicted[0]) == pytest.approx(measured, abs=2.5)
+        ship = best_estimate(fit, Approach(LENGTH, 7.97, 91.7, np.radians(2.32)))
+        (zigzag,) = simulate_zigzags(ship, np.radians(-angle), np.radians(angle))
+        assert np.degrees(zigzag.overshoots[0]) == pytest.approx(measured, abs=2.5)
 
 
 def test_model_selection_requires_two_runs() -> None:
