@@ -80,11 +80,24 @@ def prediction_notes(ship: IdentifiedShip) -> Iterator[str]:
             manoeuvres.setdefault((names, note), []).append(each.manoeuvre.name)
     for (names, note), of_note in manoeuvres.items():
         yield f"{', '.join(of_note)}{names}: {note}."
-    if not ship.length_given and ship.predictions:
-        yield (
-            "The ship's length is not given: no value is in ship lengths, and no limit that "
-            "depends on the length is computed; give it with --length, or in a vessel file."
-        )
+    if note := missing_length_note(ship):
+        yield note
+
+
+def missing_length_note(ship: IdentifiedShip) -> str:
+    """Return what cannot be computed without the ship's length; empty where it is given.
+
+    Parameters
+    ----------
+    ship
+        An identified ship with predictions.
+    """
+    if ship.length_given:
+        return ""
+    return (
+        "The ship's length is not given: no value is in ship lengths, and no limit that depends on "
+        "the length is computed; give it with --length, or in a vessel file."
+    )
 
 
 def _manoeuvre_rows(predicted: PredictedManoeuvre) -> Iterator[tuple[str, ...]]:

@@ -5,7 +5,7 @@ from math import isfinite, nan
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from analysis.report.identification_tables import identification_tables
+from analysis.report.identification_tables import parameter_tables, proof_tables
 from analysis.report.replay_tables import finding_tables, log_table
 from shiplog.checks.event_table import event_table
 from shiplog.printable import printable
@@ -16,6 +16,7 @@ from .comparisons import comparisons_of
 from .condition_rows import condition_groups
 from .manoeuvre_sections import ManoeuvreSection, manoeuvre_section, reasons_in_short, time_text
 from .numbering import manoeuvre_places
+from .predicted_section import predicted_section
 from .trial_report import ReportedLog, TrialReport
 from .verdict_rows import verdict_rows
 
@@ -55,7 +56,10 @@ def report_page(report: TrialReport, on_progress: ProgressCallback = no_progress
         "conditions": condition_groups(conditions),
         "sections": sections,
         "comparisons": comparisons_of(numbered, lengths[0] if lengths else nan),
-        "identified": identification_tables(identified) if identified else (),
+        "identified": (*parameter_tables(identified), *proof_tables(identified))
+        if identified
+        else (),
+        "predicted": predicted_section(identified, numbered) if identified else None,
         "identification_warnings": identified.warnings if identified else (),
         "assumed": tuple(assumptions(report.options)),
         "signatures": SIGNATURES,

@@ -5,10 +5,12 @@ import os
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
+from predicted_ships import ship_with_positions
 from trial_reports import trial_report
 
 from analysis.report.page.browser_pdf import OPTIONS, find_browser, print_pdf
@@ -21,7 +23,7 @@ SECS = 300.0
 
 @cache
 def page() -> str:
-    return report_page(trial_report())
+    return report_page(replace(trial_report(), identified=ship_with_positions()))
 
 
 @pytest.fixture
