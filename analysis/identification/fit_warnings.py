@@ -48,7 +48,7 @@ def fit_warnings(
 
 def _unknown_drift(fit: OutputError, fitted: Uncertainty) -> Iterator[str]:
     """Yield a line where nothing that was measured shows the drift of the model."""
-    if not drift_is_unknown(fit.problem.model, fit.problem.segments):
+    if not drift_is_unknown(fit.problem):
         return
     names = f" ({', '.join(fitted.unobserved)})" if fitted.unobserved else ""
     *first, last = DRIFT_INDICES

@@ -64,8 +64,14 @@ def predict_without(whole: OutputError, held_out: Sequence[int]) -> HeldOutError
     errors = [_predicted_segment(others, whole.problem.segments[i]) for i in held_out]
     return HeldOutErrors(
         np.array([misfit for misfit, _ in errors]),
-        float(np.mean([excess for _, excess in errors])),
+        _mean_known([excess for _, excess in errors]),
     )
+
+
+def _mean_known(values: Sequence[float]) -> float:
+    """Return the mean of the values that are not NaN; NaN where all are."""
+    known = [value for value in values if not np.isnan(value)]
+    return float(np.mean(known)) if known else np.nan
 
 
 def misfit(fit: OutputError, segment: Segment) -> FloatArray:
@@ -80,9 +86,9 @@ def _predicted_segment(fit: OutputError, segment: Segment) -> tuple[FloatArray, 
     misfits = np.full(len(PREDICTED), np.nan)
     for at, name in enumerate(problem.outputs):
         if name in MODEL_OUTPUTS:
-            noise = _white_std(fit, name)
+            white = _white_std(fit, name, problem.measured(0)[:, at])
             misfits[PREDICTED.index(name)] = _relative_rms(
-                residual[:, at], problem.measured(0)[:, at], noise
+                residual[:, at], problem.measured(0)[:, at], white
             )
     misfits[-1] = _track_misfit(problem, z)
     return misfits, _excess(fit, problem, z, residual)
@@ -101,10 +107,13 @@ def _with_own_unknowns(fit: OutputError, segment: Segment) -> tuple[Problem, Flo
     return problem, minimum.unknowns
 
 
-def _white_std(fit: OutputError, name: str) -> float:
-    """Return the standard deviation of an output's white noise; 0 for one that was not fitted."""
+def _white_std(fit: OutputError, name: str, measured: FloatArray) -> float:
+    """Return the rms white noise of a measured output, (n,); 0 for one that was not fitted."""
     outputs = fit.problem.outputs
-    return fit.noises[outputs.index(name)].white if name in outputs else 0.0
+    if name not in outputs or not np.isfinite(measured).any():
+        return 0.0
+    noise = fit.noises[outputs.index(name)]
+    return float(np.hypot(noise.white, noise.relative * np.sqrt(np.nanmean(measured**2))))
 
 
 def _relative_rms(residual: FloatArray, measured: FloatArray, white: float) -> float:
@@ -165,6 +174,7 @@ def _excess(fit: OutputError, problem: Problem, z: FloatArray, residual: FloatAr
         if known.sum() < 2:
             continue
         noise = fit.noises[fit.problem.outputs.index(name)]
-        typical = noise.white**2 + noise.slow**2
-        ratios.append(np.mean(residual[known, at] ** 2) / (typical + np.mean(spread[known, at])))
+        _, typical = noise.stds(problem.measured(0)[known, at], problem.segments[0].dt_secs)
+        predicted = np.mean(typical**2) + np.mean(spread[known, at])
+        ratios.append(np.mean(residual[known, at] ** 2) / predicted)
     return float(np.mean(ratios)) if ratios else np.nan

@@ -11,6 +11,7 @@ Stone, "Cross-validatory choice and assessment of statistical predictions", 1974
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import radians
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from .simulated_manoeuvres import Approach, approach_of, turns_hard_over
 MAX_MISFIT = 10.0  # relative error that a diverging simulation counts with
 RUN_NUMBERS = 4  # independent numbers of a run: its error is slow, and yaw, speed and track differ
 HARD_SHARE = 0.75  # of the largest rudder angle: from it a run is one of the hardest
+LEAST_ANGLE = radians(0.1)  # of a straight run: ratios of angles stay finite
 LEAST_WEIGHT = 0.05  # of the best model's: below it a model is not averaged
 
 
@@ -157,17 +159,25 @@ def _candidate(
         return Candidate(model, None, np.full((1, len(PREDICTED)), np.inf))
     angles = [largest_rudder(segment) for segment in fit.problem.segments]
     # the hardest set is the one after which the others have the smallest angles
-    left = [max(a for i, a in enumerate(angles) if i not in each) for each in sets]
-    hardest = min(range(len(sets)), key=lambda k: (left[k], -len(sets[k])))
+    others = [max(a for i, a in enumerate(angles) if i not in each) for each in sets]
+    hardest = min(range(len(sets)), key=lambda k: (others[k], -len(sets[k])))
     excess = errors[hardest].excess
     return Candidate(
         model,
         fit,
         np.concatenate([each.misfits for each in errors]),
-        np.minimum(np.mean(errors[hardest].misfits, axis=0), MAX_MISFIT),
-        max(angles) / left[hardest],
+        _mean_misfits(errors[hardest].misfits),
+        max(angles) / others[hardest],
         max(1.0, excess) if np.isfinite(excess) else 1.0,
     )
+
+
+def _mean_misfits(misfits: FloatArray) -> FloatArray:
+    """Return the mean over segments, (5,), of misfits, (k, 5); NaN where none was measured."""
+    known = ~np.isnan(misfits)
+    total = np.where(known, np.minimum(misfits, MAX_MISFIT), 0.0).sum(axis=0)
+    count = known.sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _checked(candidate: Candidate, approach: Approach) -> Candidate:
@@ -178,8 +188,8 @@ def _checked(candidate: Candidate, approach: Approach) -> Candidate:
 
 
 def largest_rudder(segment: Segment) -> float:
-    """Return the largest rudder angle of a segment, rad, outliers aside."""
-    return float(np.quantile(np.abs(segment.signals["rudder"]), 0.9))
+    """Return the largest rudder angle of a segment, rad, outliers aside; at least `LEAST_ANGLE`."""
+    return max(float(np.quantile(np.abs(segment.signals["rudder"]), 0.9)), LEAST_ANGLE)
 
 
 def fault_of(fit: OutputError, approach: Approach) -> str:

@@ -50,6 +50,8 @@ OUTPUT_OF = {  # whose error on held-out runs stands for that of an index
     "yaw_rate": ("steady yaw rate",),
     "speed": ("steady speed",),
 }  # fmt: skip
+# whose error stands for that of an output that was not measured
+SUBSTITUTES = (("heading", "yaw_rate"), ("yaw_rate", "heading"), (TRACK, "heading"))
 CIRCLE_INDICES = {
     "advance": "advance",
     "transfer": "transfer",
@@ -197,10 +199,11 @@ def _members(candidate: Candidate, approach: Approach, count: int) -> _Members:
     parameters = np.array([problem.parameters(row) for row in rows])
     largest = max(largest_rudder(segment) for segment in problem.segments)
     misfits = dict(zip(PREDICTED, candidate.hard_misfits.tolist(), strict=True))
-    if not np.isfinite(misfits[TRACK]):  # no positions
-        misfits[TRACK] = misfits["heading"]
+    for name, substitute in SUBSTITUTES:
+        if not np.isfinite(misfits[name]):
+            misfits[name] = misfits[substitute]
     ships = ShipDraws(problem.model, problem.scale, approach, parameters, zeros)
-    drift = shows_drift(problem.segments)
+    drift = shows_drift(problem)
     return _Members(ships, largest, misfits, candidate.hard_ratio, drift)
 
 

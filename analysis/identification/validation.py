@@ -91,7 +91,7 @@ def _validate_segment(fit: OutputError, segment: Segment, fixes: FloatArray | No
         heading, fixes = 0.0, None
     measured = filled_measurements(segment, heading)
     simulated = predict(fit, _with_heading(segment, measured[:, HEADING]))
-    no_drift = drift_is_unknown(fit.problem.model, fit.problem.segments)
+    no_drift = drift_is_unknown(fit.problem)
     if no_drift:
         simulated = without_sway(simulated)
     track = dead_reckoning(simulated, segment.dt_secs)

@@ -183,7 +183,7 @@ def _model_section(ship: IdentifiedShip) -> Iterator[str]:
     scale = ship.fit.problem.scale
     comment = _comments(ship.uncertainty, converged=ship.fit.minimum.converged)
     yield "\n# `shiplog record simulate` uses this model."
-    if drift_is_unknown(ship.model, ship.fit.problem.segments):
+    if drift_is_unknown(ship.fit.problem):
         yield f"# Its drift is {DRIFT_UNKNOWN}:"
         yield f"# simulated sway and positions are not the ship's; {DRIFT_REMEDY}."
     yield "[model]"

@@ -314,7 +314,7 @@ def _validation_table(ship: IdentifiedShip) -> TextTable:
         for each in ship.validations
         if each.no_indices
     ]
-    if drift_is_unknown(ship.model, ship.fit.problem.segments):
+    if drift_is_unknown(ship.fit.problem):
         reasons.append(
             f"The drift is {DRIFT_UNKNOWN} in the fitted logs: the simulated tracks are without "
             f"drift, and {', '.join(DRIFT_INDICES)} are not compared."

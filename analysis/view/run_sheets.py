@@ -129,7 +129,7 @@ def _fitted(ship: IdentifiedShip) -> Iterator[_Run]:
     for i, segment in enumerate(problem.segments):
         title, dt = f"fitted: {segment.name}", segment.dt_secs
         simulated = problem.simulated(unknowns, i)
-        if drift_is_unknown(ship.model, problem.segments):
+        if drift_is_unknown(problem):
             simulated = without_sway(simulated)
         predicted = simulated.copy()
         for name, values in zip(problem.outputs, problem.predicted(unknowns, i).T, strict=True):
@@ -179,7 +179,7 @@ def _sheet(ship: IdentifiedShip, run: _Run) -> RunSheet:
 def _history(ship: IdentifiedShip, run: _Run) -> MotionHistory:
     """Return the motion of a run; what the model predicts is simulated."""
     segment, outputs = run.segment, {*ship.model.outputs, "heading"}
-    if drift_is_unknown(ship.model, ship.fit.problem.segments):
+    if drift_is_unknown(ship.fit.problem):
         outputs -= {"sway"}
     columns = dict(enumerate(MODEL_OUTPUTS))
     return MotionHistory(

@@ -4,15 +4,12 @@ Yaw rate, speed and heading do not determine the sway: a ship with twice the dri
 three. Positions or a measured sway do.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from shiplog.ships import Model
 from shiplog.ships.motion import MODEL_OUTPUTS
 from shiplog.types import FloatArray
 
-from .segment import Segment
+from .problem import Problem
 
 # of the sway equations of all models
 SWAY_PARAMETERS = (
@@ -23,28 +20,29 @@ DRIFT_UNKNOWN = "not identifiable without positions or sway"
 DRIFT_REMEDY = "log the position (GNSS) or the sway velocity"
 
 
-def shows_drift(segments: Sequence[Segment]) -> bool:
-    """Return whether positions or the sway were measured in any segment.
+def shows_drift(problem: Problem) -> bool:
+    """Return whether a sway or velocities over ground were measured in any segment.
 
     Parameters
     ----------
-    segments
-        The segments of a fit.
+    problem
+        The problem of a fit, with fitted sway and velocities or without.
     """
-    return any(segment.has("sway") or _has_fixes(segment) for segment in segments)
+    return any(
+        segment.has("sway") or problem.has_velocities(i)
+        for i, segment in enumerate(problem.segments)
+    )
 
 
-def drift_is_unknown(model: Model, segments: Sequence[Segment]) -> bool:
+def drift_is_unknown(problem: Problem) -> bool:
     """Return whether a model predicts a sway that no segment shows.
 
     Parameters
     ----------
-    model
-        The model.
-    segments
-        The segments of a fit.
+    problem
+        The problem of the fit.
     """
-    return "sway" in model.outputs and not shows_drift(segments)
+    return "sway" in problem.model.outputs and not shows_drift(problem)
 
 
 def without_sway(outputs: FloatArray) -> FloatArray:
@@ -58,21 +56,14 @@ def without_sway(outputs: FloatArray) -> FloatArray:
     return result
 
 
-def unobserved_parameters(model: Model, segments: Sequence[Segment]) -> tuple[str, ...]:
+def unobserved_parameters(problem: Problem) -> tuple[str, ...]:
     """Return the parameters of a model's sway equation, if no segment shows the drift.
 
     Parameters
     ----------
-    model
-        The model.
-    segments
-        The segments of a fit.
+    problem
+        The problem of the fit.
     """
-    if not drift_is_unknown(model, segments):
+    if not drift_is_unknown(problem):
         return ()
-    return tuple(name for name in model.names if name in SWAY_PARAMETERS)
-
-
-def _has_fixes(segment: Segment) -> bool:
-    fixes = segment.fixes
-    return fixes is not None and int(np.isfinite(fixes).all(axis=1).sum()) > 1
+    return tuple(name for name in problem.model.names if name in SWAY_PARAMETERS)

@@ -34,7 +34,7 @@ class FixBlocks:
     secs
         (b - 1,) the time between the means of neighbouring blocks, s.
     at
-        (b - 1,) the sample at which a velocity is placed: the last before the later block.
+        (b - 1,) the sample at which a velocity is placed: the first of the later block.
     antenna
         The place of the fixes ahead and to starboard of the midship point, m.
     """
@@ -45,6 +45,11 @@ class FixBlocks:
     secs: FloatArray
     at: NDArray[np.int64]
     antenna: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def has_velocities(self) -> bool:
+        """Whether two neighbouring blocks have fixes."""
+        return bool(np.isfinite(self.secs).any())
 
     def velocities(self, tracks: FloatArray) -> FloatArray:
         """Compute the mean velocities of tracks.

@@ -148,17 +148,18 @@ def make_problem(
     _require_way(segments, speed, rpm)
     scale = model.scale(length or DEFAULT_LENGTH, speed, rpm)
     used = [o for o in (outputs or model.outputs) if any(segment.has(o) for segment in segments)]
-    if "sway" in model.outputs and any(segment.fixes is not None for segment in segments):
-        used += GROUND_VELOCITY
     fitted = segments
     if model.dimensionless:
         fitted = [averaged(segment, scale.secs / SAMPLES_PER_LENGTH) for segment in segments]
-    return Problem(
+    problem = Problem(
         model, tuple(fitted), scale, tuple(used), values,
         tuple(i for i, name in enumerate(model.names) if name in free_names),
         Nuisance() if nuisance is None else nuisance,
         recorded=tuple(segments),
     )  # fmt: skip
+    if "sway" in model.outputs and any(map(problem.has_velocities, range(len(fitted)))):
+        return replace(problem, outputs=(*problem.outputs, *GROUND_VELOCITY))
+    return problem
 
 
 def _require_steering(segments: Sequence[Segment]) -> None:

@@ -110,11 +110,17 @@ class Problem:
 
     @cached_property
     def _blocks(self) -> tuple[FixBlocks | None, ...]:
+        """The blocks of each segment's fixes; None where they give no velocity."""
         secs = BLOCK_LENGTHS * self.scale.secs
-        return tuple(
+        blocks = (
             None if each.fixes is None else fix_blocks(each.fixes, each.dt_secs, secs, each.antenna)
             for each in self.segments
         )
+        return tuple(each if each and each.has_velocities else None for each in blocks)
+
+    def has_velocities(self, i: int) -> bool:
+        """Return whether the fixes of segment i give velocities over ground, fitted or not."""
+        return self._blocks[i] is not None
 
     @cached_property
     def _edges(self) -> list[int]:
@@ -168,12 +174,13 @@ class Problem:
         """Return the initial guess of the unknowns, (m,): all but states and frequencies zero."""
         parts = [self.values[list(self.free)], np.zeros(self.common - len(self.free))]
         layout = self.own_layout
-        for i, segment in enumerate(self.segments):
-            parts += [self._first_state(segment), np.zeros(layout.calm - layout.states)]
+        for i in range(len(self.segments)):
+            parts += [self._first_state(i), np.zeros(layout.calm - layout.states)]
             parts += [np.append(wave, np.zeros(layout.per_wave - 1)) for wave in self._waves(i)]
         return np.concatenate(parts)
 
-    def _first_state(self, segment: Segment) -> FloatArray:
+    def _first_state(self, number: int) -> FloatArray:
+        segment = self.segments[number]
         first = max(2, round(INITIAL_STATE_SECS / segment.dt_secs))
         state = np.zeros(len(self.model.state))
         for i, value in enumerate(self.model.state):
@@ -181,7 +188,11 @@ class Problem:
                 measured = segment.measured[:, MODEL_OUTPUTS.index(value.channel)]
                 measured = measured[np.isfinite(measured)][:first]
                 state[i] = np.median(measured) / self.scale.of_channel(value.channel)
-            elif value.channel == "heading" and segment.fixes is not None:
+            elif (
+                value.channel == "heading"
+                and segment.fixes is not None
+                and self.has_velocities(number)
+            ):
                 state[i] = course_at_start(segment.fixes)
             elif np.isinf(value.prior_std):
                 state[i] = self._typical_state(value)[0]
@@ -216,16 +227,16 @@ class Problem:
             own = self.own_slice(i)
             centre[own.start : own.start + self.own_layout.calm] = 0.0
             stds += self._own_prior_stds(i, segment)
-            if not self._observes_heading(segment):
+            if not self._observes_heading(i):
                 heading = [value.channel for value in self.model.state].index("heading")
                 # no output depends on it: any prior keeps it from drifting
-                centre[own.start + heading] = self._first_state(segment)[heading]
+                centre[own.start + heading] = self._first_state(i)[heading]
                 stds[own.start + heading] = 1.0
         return centre, np.array(stds) ** -2.0
 
-    def _observes_heading(self, segment: Segment) -> bool:
-        measured = "heading" in self.outputs and segment.has("heading")
-        return measured or (self.uses_positions and segment.fixes is not None)
+    def _observes_heading(self, i: int) -> bool:
+        measured = "heading" in self.outputs and self.segments[i].has("heading")
+        return measured or (self.uses_positions and self.has_velocities(i))
 
     def _own_prior_stds(self, i: int, segment: Segment) -> list[float]:
         """Return the prior standard deviations of segment i's own unknowns."""
@@ -236,7 +247,7 @@ class Problem:
                 std = self._typical_state(value)[1]
             measured = value.channel in self.outputs and segment.has(value.channel or "")
             if value.channel == "heading":
-                measured = measured or self._observes_heading(segment)
+                measured = measured or self._observes_heading(i)
             stds.append(inf if measured else std)
         stds += [given.rudder_std] * layout.rudder + [std for _, std in self.biases]
         stds += [given.speed_scale_std] * layout.speed_scale

@@ -171,7 +171,7 @@ def uncertainty(fit: OutputError, *, between_runs: bool = True) -> Uncertainty:
         covariance=covariance * np.outer(factor, factor),
         condition=_condition(precision, p),
         sizes=np.array([problem.model.parameters[i].size for i in problem.free]),
-        unobserved=unobserved_parameters(problem.model, problem.segments),
+        unobserved=unobserved_parameters(problem),
     )
 
 

@@ -11,9 +11,12 @@ from reference_zigzags import EXECUTE_SECS, mmg_fit, sailed, tanker, zigzag_segm
 from analysis.identification.fit.output_error import tempered_fit
 from analysis.identification.held_out import PREDICTED, predict_without
 from analysis.identification.model_selection import (
+    MAX_MISFIT,
     Candidate,
+    _mean_misfits,
     fault_of,
     held_out_sets,
+    largest_rudder,
     rank_models,
 )
 from analysis.identification.predicted_indices import (
@@ -168,3 +171,26 @@ def test_a_parameter_at_its_limit_is_a_fault() -> None:
     )
     stopped = replace(fit, minimum=replace(fit.minimum, converged=False))
     assert fault_of(stopped, approach()) == "not converged"
+
+
+def test_an_index_has_an_interval_though_neither_heading_nor_track_were_measured() -> None:
+    first = candidates()[0]
+    misfits = first.hard_misfits.copy()
+    misfits[[PREDICTED.index(name) for name in ("heading", "track")]] = np.nan
+    (result,) = predict_manoeuvres(
+        [replace(first, hard_misfits=misfits)], approach(), [ZIGZAG], draws=10
+    )
+    for index in result.indices:
+        assert index.low < index.value < index.high, index.name
+
+
+def test_the_ratios_of_rudder_angles_are_finite_where_a_run_is_straight() -> None:
+    segment = zigzag_segments()[0]
+    signals = segment.signals
+    values = {**signals.values, "rudder": np.zeros(len(signals))}
+    assert largest_rudder(replace(segment, signals=replace(signals, values=values))) > 0
+
+
+def test_the_misfit_of_several_segments_is_the_mean_of_those_measured() -> None:
+    misfits = np.array([[0.1, np.inf, np.nan], [0.3, 0.2, np.nan]])
+    np.testing.assert_allclose(_mean_misfits(misfits), [0.2, (MAX_MISFIT + 0.2) / 2, np.nan])
