@@ -51,8 +51,6 @@ class Run:
         The log's name, unique among the runs of an identification.
     segments
         The stretches in which rudder and revolutions are known.
-    positions
-        For each segment (n, 2) m north and east; None where no position was measured.
     vessel
         The vessel file in the log; None without one.
     warnings
@@ -65,7 +63,6 @@ class Run:
 
     name: str
     segments: tuple[Segment, ...]
-    positions: tuple[FloatArray | None, ...]
     vessel: Vessel | None
     warnings: tuple[str, ...]
     data_lost: bool
@@ -123,6 +120,8 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     contradictions = tuple(f.text for f in findings if f.kind in CONTRADICTIONS)
     with naming_contradictions(contradictions):
         segments = split_into_segments(signals, log.name)
+    positions = fixes.at_samples(segment.signals for segment in segments)
+    stuck = _never_move(positions)
     warnings = [
         *screened.warnings,
         *channel_warnings(stats),
@@ -130,19 +129,32 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
         *(finding.text for finding in findings),
         *end_warnings(stats, clock, REQUIRED_CHANNELS),
     ]
-    positions = fixes.at_samples(segment.signals for segment in segments)
+    if stuck:
+        warnings.append(
+            f"{stats['position'].topic}: constant throughout the log, and not used; if the "
+            "receiver was stuck, choose another source"
+        )
     return Run(
         name=log.name,
         segments=tuple(
-            replace(segment, fixes=each, antenna=options.antenna)
+            replace(segment, fixes=None if stuck else each, antenna=options.antenna)
             for segment, each in zip(segments, positions, strict=True)
         ),
-        positions=positions,
         vessel=vessel,
         warnings=tuple(text if log.name in text else f"{log.name}: {text}" for text in warnings),
         data_lost=log.data_lost,
         contradictions=contradictions,
     )
+
+
+def _never_move(positions: Iterable[FloatArray | None]) -> bool:
+    """Return whether the fixes of a log, (n, 2) of each segment, are all at one place."""
+    given = [each for each in positions if each is not None]
+    if not given:
+        return False
+    fixes = np.concatenate(given)
+    fixes = fixes[np.isfinite(fixes).all(axis=1)]
+    return len(fixes) > 1 and not np.ptp(fixes, axis=0).any()
 
 
 def distinct_runs(

@@ -79,13 +79,11 @@ def validate(fit: OutputError, run: Run) -> list[Validation]:
     validations
         One for each segment, in order.
     """
-    return [
-        _validate_segment(fit, segment, fixes)
-        for segment, fixes in zip(run.segments, run.positions, strict=True)
-    ]
+    return [_validate_segment(fit, segment) for segment in run.segments]
 
 
-def _validate_segment(fit: OutputError, segment: Segment, fixes: FloatArray | None) -> Validation:
+def _validate_segment(fit: OutputError, segment: Segment) -> Validation:
+    fixes = segment.fixes
     heading = 0.0 if fixes is None or segment.has("heading") else initial_heading(segment, fixes)
     if heading is None:  # fixes are of no use where the initial heading is unknown
         heading, fixes = 0.0, None

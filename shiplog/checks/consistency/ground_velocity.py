@@ -60,8 +60,8 @@ def ground_velocity(signals: CoarseSignals) -> GroundVelocity | None:
     Returns
     -------
     GroundVelocity or None
-        None where a channel is missing, where the ship turned too little or to one side only, or
-        where the equation does not explain the velocity.
+        None where a channel is missing, where the ship turned too little or to one side only,
+        where the fixes never move, or where the equation does not explain the velocity.
     """
     length = max(round(WINDOW_SECS / signals.dt_secs), 2)
     step = max(length // 10, len(signals.heading) // MAX_ROWS, 1)
@@ -71,6 +71,8 @@ def ground_velocity(signals: CoarseSignals) -> GroundVelocity | None:
     known = np.isfinite(regressors.sum(axis=1) + displacement)
     X, y = regressors[known], displacement[known]
     if len(y) < MIN_WINDOWS * lags or not _turns_both_ways(signals.heading[::length]):
+        return None
+    if not y.any():  # a stuck receiver: no scale, and no offset
         return None
     rows = np.concatenate([np.column_stack((X.real, -X.imag)), np.column_stack((X.imag, X.real))])
     # rows of one window follow each other, so that lags count windows

@@ -33,8 +33,19 @@ def test_a_log_is_read_once_more_after_its_statistics_and_its_first_instant(
             return super().chunks()
 
     log = Counted(trial.name, trial.channels, trial.metadata)
-    assert run_from_log(log).positions[0] is not None
+    assert run_from_log(log).segments[0].fixes is not None
     assert Counted.passes == 3
+
+
+def test_a_position_that_never_moves_is_not_used_and_named(trial: TrialLog) -> None:
+    channels = [
+        replace(c, values=np.tile(c.values[:1], (len(c), 1))) if c.name == "position" else c
+        for c in trial.channels
+    ]
+    run = run_from_log(replace(trial, channels=tuple(channels)))
+    assert run.segments[0].fixes is None
+    (warning,) = run.warnings
+    assert "constant throughout the log, and not used" in warning
 
 
 def test_two_sources_of_sway_are_compared(trial: TrialLog) -> None:
@@ -62,7 +73,7 @@ def test_contradictions_are_kept_to_explain_an_error_of_the_fit(trial: TrialLog)
 
 
 def run_of(name: str, vessel: Vessel) -> Run:
-    return Run(name, (), (), vessel, (), data_lost=False)
+    return Run(name, (), vessel, (), data_lost=False)
 
 
 def test_a_hull_that_one_log_states_holds_for_all(vessel: Vessel) -> None:

@@ -96,7 +96,8 @@ def test_without_heading_fixes_that_determine_no_heading_are_not_used() -> None:
     log = without(fixes(circle(), course_deg=90.0), "heading")
     late = validated(fixes(log, after_secs=30.0))  # the rudder moves at 10 s
     assert late.rms["track"] < 5  # by speed and yaw rate
-    (trial,), (places,) = run_from_log(log).segments, run_from_log(log).positions
+    (trial,) = run_from_log(log).segments
+    places = trial.fixes
     assert places is not None
     assert initial_heading(trial, places) == pytest.approx(radians(90), abs=1e-3)
     rough = places + np.random.default_rng(0).normal(0, 20, places.shape)

@@ -131,6 +131,11 @@ def test_fixes_without_a_position_are_no_wrong_unit(trial: TrialLog) -> None:
     assert "latitude 91.5, longitude 181" in finding.text
 
 
+def test_a_position_that_never_moves_gives_no_finding_of_the_heading(trial: TrialLog) -> None:
+    stuck = changed(trial, position=lambda x: np.tile(x[:1], (len(x), 1)))
+    assert not [f for f in consistency_findings(stuck) if f.channel == "heading"]
+
+
 def test_a_repeated_sentinel_is_no_wrong_unit(trial: TrialLog) -> None:
     def with_sentinel(values: Values) -> Values:
         return np.where(np.arange(len(values)) % 4, values, np.radians(3600.0))
