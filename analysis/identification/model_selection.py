@@ -16,7 +16,7 @@ from math import radians
 import numpy as np
 
 from analysis.identification.fit.output_error import OutputError, output_error
-from analysis.identification.fit.segment import Segment
+from analysis.identification.fit.segment import Segment, segments_by_run
 from shiplog.errors import LogError, UsageError
 from shiplog.progress import ProgressCallback, no_progress
 from shiplog.ships import Model
@@ -114,7 +114,7 @@ def rank_models(
     UsageError
         There are fewer than two runs.
     """
-    runs = _runs_of(segments)
+    runs = segments_by_run(segments)
     require_two_runs(len(runs))
     length = vessel.length if vessel else None
     # the models with the most parameters take longest, and are begun first
@@ -229,7 +229,7 @@ def held_out_sets(segments: Sequence[Segment]) -> tuple[tuple[int, ...], ...]:
     A run to one side is predicted well from its like to the other side. The runs with the largest
     rudder angles show how a model does beyond what it was fitted to.
     """
-    runs = _runs_of(segments)
+    runs = segments_by_run(segments)
     angles = [max(largest_rudder(segments[i]) for i in run) for run in runs]
     hard = [k for k, angle in enumerate(angles) if angle >= HARD_SHARE * max(angles)]
     if len(hard) < 2 or len(hard) == len(runs):
@@ -250,14 +250,6 @@ def require_two_runs(count: int) -> None:
             "models are compared by predicting each run from the others: give two logs or more, "
             "or name the model"
         )
-
-
-def _runs_of(segments: Sequence[Segment]) -> tuple[tuple[int, ...], ...]:
-    """Return the indices of the segments of each run."""
-    names = [segment.name for segment in segments]
-    return tuple(
-        tuple(i for i, each in enumerate(names) if each == name) for name in dict.fromkeys(names)
-    )
 
 
 def _free_count(model: Model) -> int:

@@ -23,7 +23,7 @@ from .fix_blocks import (
 )
 from .nuisance import Nuisance
 from .own_unknowns import OwnLayout, OwnUnknowns, add_waves, wave_derivatives, wave_prior_stds
-from .segment import Segment
+from .segment import Segment, segments_by_run
 
 BLOCK_LENGTHS = 0.25  # ship lengths sailed at the approach speed in a block of position fixes
 INITIAL_STATE_SECS = 3.0  # at the start of a segment, whose median is the guess of its first state
@@ -136,11 +136,7 @@ class Problem:
     @cached_property
     def runs(self) -> tuple[tuple[int, ...], ...]:
         """The numbers of each run's segments."""
-        names = [segment.name for segment in self.segments]
-        return tuple(
-            tuple(i for i, each in enumerate(names) if each == name)
-            for name in dict.fromkeys(names)
-        )
+        return segments_by_run(self.segments)
 
     def select_segments(self, kept: Sequence[int], z: FloatArray) -> tuple["Problem", FloatArray]:
         """Select some of the segments.

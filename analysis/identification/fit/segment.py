@@ -158,6 +158,14 @@ def _interpolated(values: FloatArray, dt: float) -> FloatArray:
     return filled
 
 
+def segments_by_run(segments: Sequence[Segment]) -> tuple[tuple[int, ...], ...]:
+    """Return the numbers of each run's segments, which are those of one name."""
+    names = [segment.name for segment in segments]
+    return tuple(
+        tuple(i for i, each in enumerate(names) if each == name) for name in dict.fromkeys(names)
+    )
+
+
 def initial_level(segments: Sequence[Segment], channel: str) -> float:
     """Return the initial magnitude of a channel, the largest among the segments.
 
