@@ -41,6 +41,7 @@ DRAWS = 60  # in all models together
 LEAST_DRAWS = 10  # of a model, however small its weight
 SEED = 20020  # of the draws: the same fit gives the same intervals
 MIN_SPREAD = radians(0.1)  # of the rudder zero from run to run
+MAX_MISSED = 0.05  # of the ships drawn, that do not reach an index, without a note
 MAX_GROWTH = 3.0  # of the model's error with the rudder angle
 OUTPUT_OF = {  # whose error on held-out runs stands for that of an index
     TRACK: ("advance", "transfer", "tactical diameter", "initial turning distance"),
@@ -119,7 +120,8 @@ class PredictedManoeuvre:
     indices
         With 95 % intervals, standard uncertainty by source, and the limit of the norm. The value is
         NaN for what the predicted ship does not reach, and for what its drift changes where the
-        logs do not show it; the note of the index is the reason.
+        logs do not show it; the note of the index is the reason. It also
+        states how many of the ships drawn do not reach a value.
     note
         Why the prediction reaches beyond the logs; empty where it does not.
     """
@@ -295,12 +297,15 @@ def _index(
     length = approach.length if approach.length_given else float("nan")
     data = {"length": length, "test_speed": approach.speed}
     criterion = criterion_of(name, manoeuvre.kind, angles, data, astern=False)
+    missed = float(share @ [np.mean(~np.isfinite(each[FIRST_DRAW:])) for each in values])
+    note = f"{100 * missed:.0f} % of the ships drawn do not reach it, nor count in the interval"
     return TrialIndex(
         name, SYMBOLS.get(name, ""), value, unit, std, low, high,
         sources=sources,
         in_lengths=value / length if unit == "m" else float("nan"),
         criterion=criterion,
         probability=probability_below(criterion.limit, value, std) if criterion else float("nan"),
+        note=note if missed > MAX_MISSED else "",
     )  # fmt: skip
 
 

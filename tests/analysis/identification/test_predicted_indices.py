@@ -22,12 +22,15 @@ from analysis.identification.model_selection import (
 from analysis.identification.predicted_indices import (
     PredictedManoeuvre,
     StandardManoeuvre,
+    _index,
+    _OfModels,
     predict_manoeuvres,
 )
 from analysis.identification.simulated_manoeuvres import Approach
 from analysis.manoeuvres.trial_index import TrialIndex
 from examples.ships.sea_trial import STEP
 from shiplog.ships import ship_model
+from shiplog.types import FloatArray
 from shiplog.vessel.vessel import with_length
 
 CIRCLE = StandardManoeuvre(radians(35.0))
@@ -194,3 +197,14 @@ def test_the_ratios_of_rudder_angles_are_finite_where_a_run_is_straight() -> Non
 def test_the_misfit_of_several_segments_is_the_mean_of_those_measured() -> None:
     misfits = np.array([[0.1, np.inf, np.nan], [0.3, 0.2, np.nan]])
     np.testing.assert_allclose(_mean_misfits(misfits), [0.2, (MAX_MISFIT + 0.2) / 2, np.nan])
+
+
+def test_ships_drawn_that_do_not_reach_an_index_are_counted_in_its_note() -> None:
+    values = np.array([100.0, 101.0, 99.0, 98.0, 102.0, np.nan, 100.0, 100.5])
+
+    def note(drawn: FloatArray) -> str:
+        of_models = _OfModels([drawn], np.ones(1), np.zeros(1))
+        return _index("time to 90°", CIRCLE, of_models, approach()).note
+
+    assert note(values).startswith("20 % of the ships drawn do not reach it")
+    assert note(np.nan_to_num(values, nan=100.0)) == ""
