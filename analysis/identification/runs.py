@@ -38,6 +38,7 @@ from shiplog.vessel.vessel_parser import parse_vessel
 
 REQUIRED_CHANNELS = ("yaw_rate", "speed", "rudder", "rpm")
 OPTIONAL_CHANNELS = ("sway", "heading")
+MIN_MOVED_SHARE = 1e-3  # of the distance by the speed: a circle many times around has 1e-2
 MAX_SPEED_PER_RPM_RATIO = 2.0  # between two runs of one ship
 
 
@@ -121,7 +122,7 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     with naming_contradictions(contradictions):
         segments = split_into_segments(signals, log.name)
     positions = fixes.at_samples(segment.signals for segment in segments)
-    stuck = _never_move(positions)
+    stuck = _hardly_move(positions, segments)
     warnings = [
         *screened.warnings,
         *channel_warnings(stats),
@@ -131,8 +132,9 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     ]
     if stuck:
         warnings.append(
-            f"{stats['position'].topic}: constant throughout the log, and not used; if the "
-            "receiver was stuck, choose another source"
+            f"{stats['position'].topic}: at one place throughout the log although the ship makes "
+            "way, and not used; if the receiver was stuck, choose another source; if its unit is "
+            "wrong, correct it"
         )
     return Run(
         name=log.name,
@@ -147,14 +149,17 @@ def run_from_log(log: Log, options: ReadingOptions = DEFAULT_OPTIONS) -> Run:
     )
 
 
-def _never_move(positions: Iterable[FloatArray | None]) -> bool:
-    """Return whether the fixes of a log, (n, 2) of each segment, are all at one place."""
+def _hardly_move(positions: Iterable[FloatArray | None], segments: Iterable[Segment]) -> bool:
+    """Return whether the fixes, (n, 2) of each segment, are at one place while the ship sails."""
     given = [each for each in positions if each is not None]
     if not given:
         return False
     fixes = np.concatenate(given)
     fixes = fixes[np.isfinite(fixes).all(axis=1)]
-    return len(fixes) > 1 and not np.ptp(fixes, axis=0).any()
+    sailed = sum(
+        float(np.nansum(np.abs(each.signals["speed"]))) * each.dt_secs for each in segments
+    )
+    return len(fixes) > 1 and float(np.ptp(fixes, axis=0).max()) <= MIN_MOVED_SHARE * sailed
 
 
 def distinct_runs(
