@@ -84,7 +84,8 @@ def test_unusable_fixes_are_reported_and_change_no_figure(
     run = run_from_log(with_fixes(log, rows, values))
     assert any(warning in text for text in run.warnings)
     unused = run_from_log(with_fixes(log, rows, (np.nan, np.nan)))
-    for one, other in zip(run.positions, unused.positions, strict=True):
+    both = ([each.fixes for each in made.segments] for made in (run, unused))
+    for one, other in zip(*both, strict=True):
         assert one is not None
         assert np.array_equal(one, other, equal_nan=True)
 
@@ -92,7 +93,7 @@ def test_unusable_fixes_are_reported_and_change_no_figure(
 def test_a_wild_jump_in_a_local_frame_is_reported() -> None:
     run = run_from_log(with_fixes(local_log(), slice(50, 60), (90_000.0, 0.0)))
     assert any("10 fixes in 1 stretch that the ship cannot reach" in text for text in run.warnings)
-    (positions,) = run.positions
+    positions = run.segments[0].fixes
     assert positions is not None
     assert np.nanmax(np.abs(positions)) < 10_000
 
@@ -100,4 +101,4 @@ def test_a_wild_jump_in_a_local_frame_is_reported() -> None:
 def test_a_log_without_any_usable_fix_is_dead_reckoned() -> None:
     log = with_fixes(geographic_log(local_log()), slice(None), (91.0, 181.0))
     assert "dead reckoning" in analyse(log).findings.track_origin
-    assert run_from_log(log).positions == (None,)
+    assert [each.fixes for each in run_from_log(log).segments] == [None]

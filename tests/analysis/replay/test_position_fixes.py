@@ -12,7 +12,7 @@ from shiplog import Vessel
 def test_positions_inside_a_gap_are_not_interpolated(vessel: Vessel) -> None:
     trial = as_log(simulate(vessel, "zigzag-20-20", duration_secs=300.0, seed=2), "trial.mcap")
     run = run_from_log(dropout("position", 100.0, 80.0)(trial))
-    (positions,) = run.positions
+    positions = run.segments[0].fixes
     assert positions is not None
     (segment,) = run.segments
     time = segment.signals.time_secs
