@@ -119,7 +119,8 @@ def rank_models(
     length = vessel.length if vessel else None
     # the models with the most parameters take longest, and are begun first
     order = sorted(range(len(models)), key=lambda i: -_free_count(models[i]))
-    progress = _RankingProgress(models, order, len(held_out_sets(segments)), on_progress)
+    sets = held_out_sets(segments)
+    progress = _RankingProgress(models, order, len(sets), on_progress)
 
     def fit_all(i: int) -> OutputError | None:
         given = (fixed or {}).get(models[i].name)
@@ -130,7 +131,6 @@ def rank_models(
 
     done = parallel_map(fit_all, order, progress.reporter([(i, None) for i in order]), threads)
     fits = dict(zip(order, done, strict=True))
-    sets = held_out_sets(segments)
     held_out = [(i, k) for i in order if fits[i] is not None for k in range(len(sets))]
 
     def fit_others(pair: tuple[int, int]) -> HeldOutErrors:

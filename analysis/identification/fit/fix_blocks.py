@@ -17,6 +17,7 @@ from shiplog.types import FloatArray
 GROUND_VELOCITY = ("velocity_north", "velocity_east")
 FIT_OUTPUTS = (*MODEL_OUTPUTS, *GROUND_VELOCITY)  # what a fit can compare with measurements
 YAW_RATE, AHEAD, SWAY, HEADING = range(4)
+STRAIGHT_SHARE = 0.02  # of a segment, from its start: the ship is taken to sail straight
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,15 +110,13 @@ def fix_blocks(
     return FixBlocks(fixed, first, count, secs, at, antenna)
 
 
-def course_at_start(fixes: FloatArray, secs_share: float = 0.02) -> float:
+def course_at_start(fixes: FloatArray) -> float:
     """Estimate the course over ground at the start of a segment, rad.
 
     Parameters
     ----------
     fixes
         (n, 2) north and east, m; NaN where there is no fix.
-    secs_share
-        The share of the segment, from its start, over which the ship is taken to sail straight.
 
     Examples
     --------
@@ -128,7 +127,7 @@ def course_at_start(fixes: FloatArray, secs_share: float = 0.02) -> float:
     fixed = fixes[np.isfinite(fixes).all(axis=1)]
     if len(fixed) < 2:
         return 0.0
-    last = min(max(1, round(secs_share * len(fixed))), len(fixed) - 1)
+    last = min(max(1, round(STRAIGHT_SHARE * len(fixed))), len(fixed) - 1)
     north, east = fixed[last] - fixed[0]
     return float(np.arctan2(east, north))
 
